@@ -1,0 +1,7 @@
+"""``python -m hmc``."""
+
+import sys
+
+from hmc.cli import main
+
+sys.exit(main())

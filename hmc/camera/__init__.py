@@ -1,0 +1,1 @@
+"""Image space: camera model, rigs, epipolar geometry, calibration formats, segmentation."""

@@ -1,0 +1,315 @@
+"""Pinhole cameras with radial and tangential distortion, one or a rig of many, over arrays of points.
+
+Frames: world (metres, Z up), camera (x right, y down, z forward; ``x_cam = R x_world + t``), pixels ((u, v), the centre of
+the top-left pixel at (0, 0)). Source: Canton (2009), section 2.2.2 and 6.4.1.2, with the distortion of Eq. 2.6-2.8 read as
+``1 + k1 r^2 + k2 r^4`` in normalised coordinates; the remaining terms are OpenCV's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from hmc.errors import InputError
+
+__all__ = ["Camera", "Rig", "backproject", "project", "undistort", "look_at"]
+
+#: Points nearer than this to the camera's plane (metres) count as behind it.
+NEAR_M = 1e-6
+
+
+@dataclass(frozen=True)
+class Camera:
+    """One calibrated camera.
+
+    Parameters
+    ----------
+    name : str
+        Name, as in file names (``cam_00``).
+    size : tuple of int
+        (width, height) in pixels.
+    matrix : ndarray, shape (3, 3)
+        Intrinsic matrix K.
+    distortions : ndarray, shape (5,)
+        k1, k2, p1, p2, k3 in OpenCV's model. Four values or fewer are padded with zeros.
+    rotation : ndarray, shape (3, 3)
+        World to camera. A rotation vector (Rodrigues) is accepted too.
+    translation : ndarray, shape (3,)
+        World to camera, metres.
+
+    Raises
+    ------
+    InputError
+        When a shape is wrong, a number is not finite or the rotation is not one.
+    """
+
+    name: str
+    size: tuple[int, int]
+    matrix: np.ndarray
+    distortions: np.ndarray
+    rotation: np.ndarray
+    translation: np.ndarray
+
+    def __post_init__(self) -> None:
+        def say(what: str) -> InputError:
+            return InputError(f"camera '{self.name}': {what}")
+
+        size = tuple(int(n) for n in self.size)
+        if len(size) != 2 or min(size) < 1:
+            raise say(f"`size` must be [width, height] in pixels; got {list(self.size)}")
+        matrix = np.array(self.matrix, float)
+        if matrix.shape != (3, 3):
+            raise say(f"`matrix` must be 3 x 3; got shape {matrix.shape}")
+        distortions = np.array(self.distortions, float).ravel()
+        if distortions.size > 5:
+            raise say(f"`distortions` takes k1, k2, p1, p2 and k3; got {distortions.size} numbers")
+        distortions = np.pad(distortions, (0, 5 - distortions.size))
+        rotation = np.array(self.rotation, float)
+        if rotation.shape == (3,):
+            rotation = _rotation_from_vector(rotation)
+        if rotation.shape != (3, 3):
+            raise say(f"`rotation` must be a rotation vector (3) or a matrix (3 x 3); got shape {rotation.shape}")
+        translation = np.array(self.translation, float).ravel()
+        if translation.shape != (3,):
+            raise say(f"`translation` must be 3 numbers in metres; got {translation.size}")
+        for label, value in (("matrix", matrix), ("distortions", distortions), ("rotation", rotation), ("translation", translation)):
+            if not np.all(np.isfinite(value)):
+                raise say(f"`{label}` holds a number that is not finite; calibrate this camera again or leave it out")
+        if matrix[0, 0] <= 0 or matrix[1, 1] <= 0 or abs(matrix[2, 2] - 1) > 1e-6 or np.abs(matrix[[1, 2, 2], [0, 0, 1]]).max() > 1e-6:
+            raise say("`matrix` is no intrinsic matrix [[fx, s, cx], [0, fy, cy], [0, 0, 1]] with positive focal lengths")
+        if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-3 or np.linalg.det(rotation) < 0:
+            raise say("`rotation` is not a rotation (its rows must be orthonormal and right-handed)")
+        for label, value in (("size", size), ("matrix", matrix), ("distortions", distortions), ("rotation", rotation), ("translation", translation)):
+            if isinstance(value, np.ndarray):
+                value.setflags(write=False)
+            object.__setattr__(self, label, value)
+
+    @property
+    def centre(self) -> np.ndarray:
+        """Camera centre in the world, shape (3,), metres."""
+        return -self.rotation.T @ self.translation
+
+    @property
+    def projection(self) -> np.ndarray:
+        """``P = K [R | t]``, shape (3, 4); without distortion."""
+        return self.matrix @ np.column_stack([self.rotation, self.translation])
+
+    @cached_property
+    def max_radius(self) -> float:
+        """Largest undistorted radius (normalised coordinates) up to which the distortion is one-to-one.
+
+        A strong negative k1 folds far-away rays back into the image; points beyond this radius are never in view.
+        """
+        k1, k2, _, _, k3 = self.distortions
+        roots = np.roots([7 * k3, 5 * k2, 3 * k1, 1.0])  # of d/dr (r + k1 r^3 + k2 r^5 + k3 r^7), in r^2
+        real = roots[np.abs(roots.imag) < 1e-9].real if roots.size else roots
+        real = real[real > 0]
+        return float(np.sqrt(real.min())) if real.size else np.inf
+
+    def scaled(self, factor: float) -> Camera:
+        """The same camera for images resized by ``factor`` (pixel centres on integers).
+
+        Returns
+        -------
+        Camera
+            With ``size`` rounded to whole pixels.
+        """
+        matrix = np.array(self.matrix)
+        matrix[:2, 2] += 0.5
+        matrix[:2] *= factor
+        matrix[:2, 2] -= 0.5
+        width, height = self.size
+        return replace(self, size=(max(1, round(width * factor)), max(1, round(height * factor))), matrix=matrix)
+
+
+@dataclass(frozen=True)
+class Rig:
+    """Calibrated cameras that look at one room, in order. Behaves as a sequence of `Camera`."""
+
+    cameras: tuple[Camera, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "cameras", tuple(self.cameras))
+        names = [camera.name for camera in self.cameras]
+        if not names:
+            raise InputError("a rig needs at least one camera")
+        if len(set(names)) != len(names):
+            raise InputError(f"camera names must differ; got {names}")
+
+    def __len__(self) -> int:
+        return len(self.cameras)
+
+    def __iter__(self):
+        return iter(self.cameras)
+
+    def __getitem__(self, index):
+        return self.cameras[index]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Camera names, in order."""
+        return tuple(camera.name for camera in self.cameras)
+
+    @property
+    def centres(self) -> np.ndarray:
+        """Camera centres in the world, shape (n_cameras, 3), metres."""
+        return np.array([camera.centre for camera in self.cameras])
+
+    def select(self, names) -> Rig:
+        """The rig of the named cameras, in the order given.
+
+        Raises
+        ------
+        InputError
+            When a name is not in the rig.
+        """
+        by_name = {camera.name: camera for camera in self.cameras}
+        missing = [name for name in names if name not in by_name]
+        if missing:
+            raise InputError(f"no camera named {missing[0]!r}; the rig has {', '.join(self.names)}")
+        return Rig(tuple(by_name[name] for name in names))
+
+
+def project(cameras: Camera | Rig, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Project world points into one camera or into every camera of a rig.
+
+    Parameters
+    ----------
+    cameras : Camera or Rig
+    points : ndarray, shape (..., 3)
+        World, metres.
+
+    Returns
+    -------
+    uv : ndarray, shape (..., 2), or (n_cameras, ..., 2) for a rig
+        Pixels; of no meaning where not valid.
+    valid : ndarray of bool, shape (...), or (n_cameras, ...)
+        In front of the camera and inside the one-to-one range of its distortion. The image's border is not considered.
+    """
+    if isinstance(cameras, Rig):
+        pairs = [project(camera, points) for camera in cameras]
+        return np.stack([uv for uv, _ in pairs]), np.stack([valid for _, valid in pairs])
+    points = np.asarray(points, float)
+    cam = points @ cameras.rotation.T + cameras.translation
+    depth = cam[..., 2]
+    front = depth > NEAR_M
+    xy = cam[..., :2] / np.where(front, depth, 1.0)[..., None]
+    r2 = np.einsum("...i,...i->...", xy, xy)
+    valid = front & (r2 < cameras.max_radius**2)
+    xy = distort(cameras, np.where(valid[..., None], xy, 0.0))
+    return xy @ cameras.matrix[:2, :2].T + cameras.matrix[:2, 2], valid
+
+
+def distort(camera: Camera, xy: np.ndarray) -> np.ndarray:
+    """Distort normalised image coordinates, (..., 2) to (..., 2)."""
+    k1, k2, p1, p2, k3 = camera.distortions
+    if not camera.distortions.any():
+        return xy
+    x, y = xy[..., 0], xy[..., 1]
+    r2 = x * x + y * y
+    radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+    return np.stack(
+        [x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x), y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y], axis=-1
+    )
+
+
+def undistort(camera: Camera, uv: np.ndarray, iterations: int = 30) -> np.ndarray:
+    """Pixels to undistorted normalised coordinates, by Newton's iteration on the distortion.
+
+    Parameters
+    ----------
+    camera : Camera
+    uv : ndarray, shape (..., 2)
+        Pixels.
+    iterations : int
+        Most Newton steps; it stops when every point has converged.
+
+    Returns
+    -------
+    ndarray, shape (..., 2)
+        (x / z, y / z) in the camera's frame.
+    """
+    uv = np.asarray(uv, float)
+    target = (uv - camera.matrix[:2, 2]) @ np.linalg.inv(camera.matrix[:2, :2]).T
+    if not camera.distortions.any():
+        return target
+    k1, k2, p1, p2, k3 = camera.distortions
+    # Start inside the one-to-one range, so that Newton stays on the right branch.
+    limit = 0.98 * camera.max_radius
+    radius = np.linalg.norm(target, axis=-1, keepdims=True)
+    xy = target * np.minimum(1.0, limit / np.maximum(radius, 1e-12))
+    for _ in range(iterations):
+        x, y = xy[..., 0], xy[..., 1]
+        r2 = x * x + y * y
+        radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+        slope = 2 * (k1 + r2 * (2 * k2 + 3 * r2 * k3))  # d radial / d r2, times 2
+        a = radial + x * x * slope + 2 * p1 * y + 6 * p2 * x
+        d = radial + y * y * slope + 6 * p1 * y + 2 * p2 * x
+        b = x * y * slope + 2 * p1 * x + 2 * p2 * y
+        error = distort(camera, xy) - target
+        det = a * d - b * b
+        det = np.where(np.abs(det) < 1e-6, 1e-6, det)
+        step = np.stack([d * error[..., 0] - b * error[..., 1], a * error[..., 1] - b * error[..., 0]], axis=-1) / det[..., None]
+        xy = xy - step
+        radius = np.linalg.norm(xy, axis=-1, keepdims=True)
+        xy = xy * np.minimum(1.0, limit / np.maximum(radius, 1e-12))
+        if np.abs(step).max(initial=0.0) < 1e-12:
+            break
+    return xy
+
+
+def backproject(camera: Camera, uv: np.ndarray) -> np.ndarray:
+    """Unit rays of pixels, in the world's frame; each starts at ``camera.centre``.
+
+    Parameters
+    ----------
+    camera : Camera
+    uv : ndarray, shape (..., 2)
+        Pixels.
+
+    Returns
+    -------
+    ndarray, shape (..., 3)
+        Unit directions, world.
+    """
+    xy = undistort(camera, uv)
+    rays = np.concatenate([xy, np.ones_like(xy[..., :1])], axis=-1) @ camera.rotation
+    return rays / np.linalg.norm(rays, axis=-1, keepdims=True)
+
+
+def look_at(name: str, size: tuple[int, int], position, target, fov_deg: float, distortions=(0, 0, 0, 0)) -> Camera:
+    """A camera at ``position`` that looks at ``target``, upright in a Z-up world.
+
+    Parameters
+    ----------
+    name : str
+    size : (width, height)
+    position, target : array_like, shape (3,)
+        World, metres. Looking straight down or up is fine; the image's top then points along world Y.
+    fov_deg : float
+        Horizontal field of view of the undistorted camera, degrees.
+    distortions : array_like
+        k1, k2, p1, p2.
+
+    Returns
+    -------
+    Camera
+    """
+    position, target = np.asarray(position, float), np.asarray(target, float)
+    forward = target - position
+    forward = forward / np.linalg.norm(forward)
+    up = np.array([0.0, 0.0, 1.0]) if abs(forward[2]) < 0.999 else np.array([0.0, 1.0, 0.0])
+    right = np.cross(forward, up)
+    right /= np.linalg.norm(right)
+    rotation = np.stack([right, np.cross(forward, right), forward])
+    focal = size[0] / 2 / np.tan(np.radians(fov_deg) / 2)
+    matrix = np.array([[focal, 0, (size[0] - 1) / 2], [0, focal, (size[1] - 1) / 2], [0, 0, 1]])
+    return Camera(name, size, matrix, np.asarray(distortions, float), rotation, -rotation @ position)
+
+
+def _rotation_from_vector(vector: np.ndarray) -> np.ndarray:
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_rotvec(vector).as_matrix() if np.all(np.isfinite(vector)) else np.full((3, 3), np.nan)
