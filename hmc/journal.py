@@ -1,0 +1,65 @@
+"""An append-only journal, by which a long run that was stopped goes on where it was.
+
+One JSON object a line. A line that was being written when the run died is dropped on reading, so what is read back is always whole.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hmc.errors import InputError
+
+__all__ = ["append_journal", "read_journal"]
+
+
+def append_journal(path: str | Path, record: Mapping[str, Any]) -> None:
+    """Add one record; numbers keep their full precision.
+
+    Parameters
+    ----------
+    path : path
+        Made, with its folder, where it does not exist.
+    record : mapping
+        Plain values and arrays; an array comes back as nested lists.
+    """
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    line = json.dumps(record, default=_plain, separators=(",", ":")) + "\n"
+    with open(path, "a", encoding="utf-8") as file:
+        file.write(line)
+
+
+def read_journal(path: str | Path) -> list[dict[str, Any]]:
+    """All whole records, in order; none where there is no file. An unfinished last line is cut off the file, so that appending can go on.
+
+    Raises
+    ------
+    InputError
+        When an earlier line is damaged.
+    """
+    path = Path(path)
+    if not path.exists():
+        return []
+    data = path.read_bytes()
+    whole = data[: data.rfind(b"\n") + 1]
+    if len(whole) < len(data):
+        with open(path, "r+b") as file:
+            file.truncate(len(whole))
+    records = []
+    for number, line in enumerate(whole.splitlines(), start=1):
+        try:
+            records.append(json.loads(line))
+        except ValueError as error:
+            raise InputError(f"{path}, line {number}: damaged; delete the file to start the run anew ({error})") from error
+    return records
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    raise TypeError(f"{type(value).__name__} cannot go into a journal")
