@@ -1,33 +1,30 @@
 """What a run leaves on disk, and reading it back.
 
 A result is a folder with `joints.csv`, `tracks.csv`, `pose.npz` and `run.toml`. The tables are long, in metres, with one header line.
-Nothing here is pickled, so loading a result never runs code; every file is written beside its place and then moved there, so a reader
-never sees half of one.
+Nothing here is pickled, so loading a result never runs code; every file appears whole or not at all.
 """
 
 from __future__ import annotations
 
 import csv
-import json
-import os
 import platform
 import tomllib
 import zipfile
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field, is_dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 
 from hmc.errors import InputError
+from hmc.files import atomic_write, write_toml
 from hmc.landmarks import LANDMARKS
 
 __all__ = [
-    "PoseStates", "PoseTable", "TrackTable", "atomic_write", "library_versions", "read_centroids", "read_joints", "read_pose", "read_run",
-    "read_tracks", "to_toml", "write_joints", "write_pose", "write_run", "write_toml", "write_tracks",
+    "PoseStates", "PoseTable", "TrackTable", "library_versions", "read_centroids", "read_joints", "read_pose", "read_run",
+    "read_tracks", "write_joints", "write_pose", "write_run", "write_tracks",
 ]  # fmt: skip
 
 JOINT_COLUMNS = ("frame", "person", "joint", "x", "y", "z")
@@ -147,33 +144,6 @@ def _set_rows(table: Any, **tails: tuple[int, ...]) -> None:
         if values.shape != (n, *tail):
             raise InputError(f"{kind}: `{name}` must be {(n, *tail)}; got {values.shape}")
         object.__setattr__(table, name, values)
-
-
-@contextmanager
-def atomic_write(path: str | Path, mode: str = "w") -> Iterator[IO[Any]]:
-    """Open a file that appears under its name only when it is complete.
-
-    Parameters
-    ----------
-    path : path
-        Where the file is to be; folders are made.
-    mode : {"w", "wb"}
-
-    Yields
-    ------
-    file
-        A sibling of `path`; renamed to `path` on success, removed when the block raises.
-    """
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
-    text: dict[str, Any] = {} if "b" in mode else {"encoding": "utf-8", "newline": ""}
-    try:
-        with open(temporary, mode, **text) as file:
-            yield file
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def read_joints(path: str | Path) -> PoseTable:
@@ -394,66 +364,3 @@ def read_run(path: str | Path) -> dict[str, Any]:
         raise InputError(f"{path}: cannot read it ({error.strerror})") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: not a TOML file ({error})") from error
-
-
-def write_toml(path: str | Path, values: Mapping[str, Any]) -> None:
-    """Write nested plain values as TOML, atomically."""
-    text = to_toml(values)
-    with atomic_write(path) as file:
-        file.write(text)
-
-
-def to_toml(values: Mapping[str, Any]) -> str:
-    """Nested plain values as TOML text: plain keys of a table first, then its sub-tables. What is None is left out.
-
-    Raises
-    ------
-    TypeError
-        When a value has no form in TOML.
-    """
-    lines: list[str] = []
-    _toml_table(_plain(values), "", lines)
-    return "\n".join(lines).strip("\n") + "\n"
-
-
-def _toml_table(table: Mapping[str, Any], prefix: str, lines: list[str]) -> None:
-    lines.extend(f"{_toml_key(key)} = {_toml_value(value)}" for key, value in table.items() if not isinstance(value, dict))
-    for key, value in table.items():
-        if isinstance(value, dict):
-            name = f"{prefix}.{_toml_key(key)}" if prefix else _toml_key(key)
-            lines.extend(["", f"[{name}]"])
-            _toml_table(value, name, lines)
-
-
-def _toml_key(key: str) -> str:
-    bare = key.isascii() and key.replace("-", "").replace("_", "").isalnum()
-    return key if bare else _toml_value(key)
-
-
-def _toml_value(value: Any) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, int | float):
-        return repr(value)  # Python writes nan, inf and exponents as TOML does
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    if isinstance(value, list):
-        return "[" + ", ".join(_toml_value(item) for item in value) + "]"
-    return "{ " + ", ".join(f"{_toml_key(key)} = {_toml_value(item)}" for key, item in value.items()) + " }"
-
-
-def _plain(value: Any) -> Any:
-    """Dataclasses, mappings, sequences, arrays and paths as nested dicts, lists, strings and numbers, without None."""
-    if is_dataclass(value) and not isinstance(value, type):
-        value = asdict(value)
-    if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items() if item is not None}
-    if isinstance(value, np.ndarray | np.generic):
-        value = value.tolist()
-    if isinstance(value, list | tuple | set | frozenset):
-        return [_plain(item) for item in value if item is not None]
-    if isinstance(value, os.PathLike):
-        return os.fspath(value)
-    if isinstance(value, str | bool | int | float):
-        return value
-    raise TypeError(f"{type(value).__name__} has no form in TOML")

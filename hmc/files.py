@@ -1,0 +1,105 @@
+"""Writing files so that a reader never sees half of one, and plain values as TOML."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict, is_dataclass
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+
+__all__ = ["atomic_write", "to_toml", "write_toml"]
+
+
+@contextmanager
+def atomic_write(path: str | Path, mode: str = "w") -> Iterator[IO[Any]]:
+    """Open a file that appears under its name only when it is complete.
+
+    Parameters
+    ----------
+    path : path
+        Where the file is to be; folders are made.
+    mode : {"w", "wb"}
+
+    Yields
+    ------
+    file
+        A sibling of `path`; renamed to `path` on success, removed when the block raises.
+    """
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
+    text: dict[str, Any] = {} if "b" in mode else {"encoding": "utf-8", "newline": ""}
+    try:
+        with open(temporary, mode, **text) as file:
+            yield file
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def write_toml(path: str | Path, values: Mapping[str, Any]) -> None:
+    """Write nested plain values as TOML, atomically."""
+    text = to_toml(values)
+    with atomic_write(path) as file:
+        file.write(text)
+
+
+def to_toml(values: Mapping[str, Any]) -> str:
+    """Nested plain values as TOML text: plain keys of a table first, then its sub-tables. What is None is left out.
+
+    Raises
+    ------
+    TypeError
+        When a value has no form in TOML.
+    """
+    lines: list[str] = []
+    _toml_table(_plain(values), "", lines)
+    return "\n".join(lines).strip("\n") + "\n"
+
+
+def _toml_table(table: Mapping[str, Any], prefix: str, lines: list[str]) -> None:
+    lines.extend(f"{_toml_key(key)} = {_toml_value(value)}" for key, value in table.items() if not isinstance(value, dict))
+    for key, value in table.items():
+        if isinstance(value, dict):
+            name = f"{prefix}.{_toml_key(key)}" if prefix else _toml_key(key)
+            lines.extend(["", f"[{name}]"])
+            _toml_table(value, name, lines)
+
+
+def _toml_key(key: str) -> str:
+    bare = key.isascii() and key.replace("-", "").replace("_", "").isalnum()
+    return key if bare else _toml_value(key)
+
+
+def _toml_value(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int | float):
+        return repr(value)  # Python writes nan, inf and exponents as TOML does
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, list):
+        return "[" + ", ".join(_toml_value(item) for item in value) + "]"
+    return "{ " + ", ".join(f"{_toml_key(key)} = {_toml_value(item)}" for key, item in value.items()) + " }"
+
+
+def _plain(value: Any) -> Any:
+    """Dataclasses, mappings, sequences, arrays and paths as nested dicts, lists, strings and numbers, without None."""
+    if is_dataclass(value) and not isinstance(value, type):
+        value = asdict(value)
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items() if item is not None}
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if isinstance(value, list | tuple | set | frozenset):
+        return [_plain(item) for item in value if item is not None]
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    if isinstance(value, str | bool | int | float):
+        return value
+    raise TypeError(f"{type(value).__name__} has no form in TOML")
