@@ -1,0 +1,299 @@
+"""Shape from silhouette: which voxels lie inside the silhouettes of all cameras, or of nearly all.
+
+Each voxel's centre is projected once into every camera (voxel-to-pixel tables); a frame is then gathers only. Source: Canton
+(2009), section 2.2.4 (centre test, tolerance in the number of cameras), Hsiao (2008), section 3.1.3, Kehl (2006), section 4.1.
+
+How a camera votes on a voxel:
+
+- the voxel's centre falls on a foreground pixel: for it; on a background pixel: against it (a miss);
+- the centre is behind the camera, beyond its lens or outside its image: `outside` says, "ignore" (no vote; the default), "carve"
+  (a miss) or "keep" (a vote for it);
+- the camera has no mask in this frame (``None``): no vote on any voxel.
+
+A voxel is occupied when at most `tolerance` cameras miss it and at least `min_views` cameras voted on it. Tolerance 0 is the
+strict visual hull, 1 the tolerant one, which keeps limbs that one silhouette lost and is fatter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from hmc.camera.model import Camera, Rig, project
+from hmc.errors import InputError
+from hmc.voxels.grid import VoxelGrid, check_memory
+
+__all__ = ["CarvingTables", "carve", "carve_levels", "make_tables", "pixel_of_voxel"]
+
+#: Side of a block of voxels, which is judged as a whole where it can be.
+BLOCK = 8
+BLOCK_VOXELS = BLOCK**3
+#: A voxel must be voted on by this many cameras unless fewer have a mask.
+DEFAULT_MIN_VIEWS = 3
+OUTSIDE_RULES = ("ignore", "carve", "keep")
+
+
+@dataclass(frozen=True)
+class CarvingTables:
+    """Where each voxel falls in each image; made once for a grid and a rig by `make_tables`.
+
+    Attributes
+    ----------
+    grid : VoxelGrid
+    rig : Rig
+    blocks : tuple of int
+        Number of blocks of 8 x 8 x 8 voxels along x, y, z; the last ones may stand out beyond the grid.
+    pixels : ndarray of int32, shape (n_cameras, n_blocks, 512)
+        Flat pixel ``row * width + column`` of each voxel's centre, in block order; ``width * height`` where the camera does not see it.
+    corners : ndarray of int32, shape (n_cameras, 4, n_blocks)
+        Flat places, in the mask's integral image, of the corners of the rectangle that holds all pixels of a block.
+    areas : ndarray of int32, shape (n_cameras, n_blocks)
+        Pixels in that rectangle; 0 where the camera sees no voxel of the block.
+    seen_whole : ndarray of bool, shape (n_cameras, n_blocks)
+        The camera sees every voxel of the block.
+    """
+
+    grid: VoxelGrid
+    rig: Rig
+    blocks: tuple[int, int, int]
+    pixels: np.ndarray
+    corners: np.ndarray
+    areas: np.ndarray
+    seen_whole: np.ndarray
+
+
+def make_tables(grid: VoxelGrid, rig: Rig) -> CarvingTables:
+    """Project every voxel's centre into every camera.
+
+    Parameters
+    ----------
+    grid : VoxelGrid
+    rig : Rig
+        Cameras may differ in image size.
+
+    Returns
+    -------
+    CarvingTables
+        4 bytes a voxel and camera.
+
+    Raises
+    ------
+    InputError
+        When the tables would not fit in the memory there is.
+    """
+    check_memory(np.array(grid.shape) * grid.voxel_size_m, grid.voxel_size_m, len(rig))
+    nx, ny, nz = (-(-n // BLOCK) for n in grid.shape)
+    n_blocks = nx * ny * nz
+    within = np.stack(np.unravel_index(np.arange(BLOCK_VOXELS), (BLOCK,) * 3), axis=-1)
+    starts = np.stack(np.unravel_index(np.arange(n_blocks), (nx, ny, nz)), axis=-1) * BLOCK
+    pixels = np.empty((len(rig), n_blocks, BLOCK_VOXELS), np.int32)
+    corners = np.zeros((len(rig), 4, n_blocks), np.int32)
+    areas = np.zeros((len(rig), n_blocks), np.int32)
+    seen_whole = np.zeros((len(rig), n_blocks), bool)
+    for start in range(0, n_blocks, 256):
+        part = slice(start, min(start + 256, n_blocks))
+        points = grid.centres(starts[part, None, :] + within)
+        for c, camera in enumerate(rig):
+            column, row, seen = pixel_of_voxel(camera, points)
+            width, height = camera.size
+            pixels[c, part] = np.where(seen, row * width + column, width * height)
+            seen_whole[c, part] = seen.all(axis=1)
+            left = np.where(seen, column, width).min(axis=1)
+            right = np.where(seen, column, -1).max(axis=1) + 1
+            top = np.where(seen, row, height).min(axis=1)
+            bottom = np.where(seen, row, -1).max(axis=1) + 1
+            some = seen.any(axis=1)
+            areas[c, part] = np.where(some, (right - left) * (bottom - top), 0)
+            stride = width + 1  # of the integral image
+            places = [bottom * stride + right, top * stride + left, top * stride + right, bottom * stride + left]
+            corners[c, :, part] = np.where(some, places, 0)
+    return CarvingTables(grid, rig, (nx, ny, nz), pixels, corners, areas, seen_whole)
+
+
+def pixel_of_voxel(camera: Camera, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The pixel on which each point falls (pixel centres on whole numbers, so it rounds).
+
+    Parameters
+    ----------
+    camera : Camera
+    points : ndarray, shape (..., 3)
+        World, metres.
+
+    Returns
+    -------
+    column, row : ndarray of int32, shape (...)
+        0 where not seen.
+    seen : ndarray of bool, shape (...)
+        In front of the camera, within its lens and its image.
+    """
+    uv, valid = project(camera, points)
+    width, height = camera.size
+    # Compared before the cast: a far-away point's pixel may not fit in an integer.
+    seen = valid & (uv[..., 0] >= -0.5) & (uv[..., 0] < width - 0.5) & (uv[..., 1] >= -0.5) & (uv[..., 1] < height - 0.5)
+    pixel = np.floor(np.where(seen[..., None], uv, 0.0) + 0.5).astype(np.int32)
+    return pixel[..., 0], pixel[..., 1], seen
+
+
+def carve(
+    tables: CarvingTables,
+    masks: Sequence[np.ndarray | None],
+    tolerance: int = 0,
+    *,
+    outside: str = "ignore",
+    min_views: int | None = None,
+    despeckle: bool = False,
+) -> np.ndarray:
+    """The visual hull of one frame's silhouettes.
+
+    Parameters
+    ----------
+    tables : CarvingTables
+    masks : sequence of ndarray of bool, shape (height, width), or None
+        One a camera; ``None`` where a camera does not vote in this frame.
+    tolerance : int
+        Number of voting cameras that may miss a voxel.
+    outside : {"ignore", "carve", "keep"}
+        What a camera says of a voxel that it does not see.
+    min_views : int, optional
+        Cameras that must have voted on a voxel. Where left out: 3, or all that have a mask if they are fewer.
+    despeckle : bool
+        Take a 3 x 3 median of each mask first. Single wrong pixels do not change the hull's shape but keep whole blocks from
+        being judged at once; use it on masks that were not cleaned.
+
+    Returns
+    -------
+    ndarray of bool, shape (nx, ny, nz)
+
+    Raises
+    ------
+    InputError
+        When the masks disagree with the rig in number or size, or an option has no meaning.
+    """
+    return carve_levels(tables, masks, (tolerance,), outside=outside, min_views=min_views, despeckle=despeckle)[0]
+
+
+def carve_levels(
+    tables: CarvingTables,
+    masks: Sequence[np.ndarray | None],
+    tolerances: Sequence[int] = (0, 1),
+    *,
+    outside: str = "ignore",
+    min_views: int | None = None,
+    despeckle: bool = False,
+) -> tuple[np.ndarray, ...]:
+    """Visual hulls of several tolerances in one pass, by default the strict and the tolerant one.
+
+    Parameters
+    ----------
+    tolerances : sequence of int
+        One hull for each.
+    tables, masks, outside, min_views, despeckle
+        As for `carve`.
+
+    Returns
+    -------
+    tuple of ndarray of bool, shape (nx, ny, nz)
+        In the order of `tolerances`; a smaller tolerance's hull lies inside a larger one's.
+    """
+    if outside not in OUTSIDE_RULES:
+        raise InputError(f"`outside` must be one of {', '.join(OUTSIDE_RULES)}; got {outside!r}")
+    if not tolerances or min(tolerances) < 0:
+        raise InputError(f"`tolerance` must be 0 or more cameras; got {tolerances}")
+    images = _check_masks(tables, masks, despeckle)
+    voting = [c for c, image in enumerate(images) if image is not None]
+    hulls = tuple(np.zeros([n * BLOCK for n in tables.blocks], bool) for _ in tolerances)
+    if voting:
+        views_needed = min(DEFAULT_MIN_VIEWS, len(voting)) if min_views is None else min_views
+        _carve_into(hulls, tables, images, voting, tolerances, outside, views_needed)
+    nx, ny, nz = tables.grid.shape
+    return tuple(np.ascontiguousarray(hull[:nx, :ny, :nz]) for hull in hulls)
+
+
+def _check_masks(tables: CarvingTables, masks: Sequence[np.ndarray | None], despeckle: bool) -> list[np.ndarray | None]:
+    """The masks as contiguous uint8 images of 0 and 1, checked against the rig."""
+    if len(masks) != len(tables.rig):
+        raise InputError(f"`masks` must hold one mask a camera: {len(tables.rig)}; got {len(masks)}")
+    images: list[np.ndarray | None] = []
+    for camera, mask in zip(tables.rig, masks, strict=True):
+        if mask is None:
+            images.append(None)
+            continue
+        width, height = camera.size
+        if mask.shape != (height, width):
+            raise InputError(f"camera '{camera.name}': the mask must be (height, width) = ({height}, {width}); got {mask.shape}")
+        image = np.ascontiguousarray(mask, bool).view(np.uint8)
+        images.append(cv2.medianBlur(image, 3) if despeckle else image)
+    return images
+
+
+def _carve_into(hulls, tables, images, voting, tolerances, outside, min_views) -> None:
+    """Fill the padded volumes `hulls` in place."""
+    blocks = _undecided_blocks(tables, images, voting, max(tolerances), outside, min_views)
+    n_whole, undecided = blocks
+    views = [hull.reshape(tables.blocks[0], BLOCK, tables.blocks[1], BLOCK, tables.blocks[2], BLOCK) for hull in hulls]
+    views = [view.transpose(0, 2, 4, 1, 3, 5) for view in views]
+    for view in views:
+        view[np.unravel_index(n_whole, tables.blocks)] = True
+    if undecided.size == 0:
+        return
+    misses = _gather_misses(tables, images, voting, undecided, max(tolerances), outside, min_views)
+    place = np.unravel_index(undecided, tables.blocks)
+    for view, tolerance in zip(views, tolerances, strict=True):
+        view[place] = (misses <= tolerance).reshape(-1, BLOCK, BLOCK, BLOCK)
+
+
+def _undecided_blocks(tables, images, voting, tolerance, outside, min_views) -> tuple[np.ndarray, np.ndarray]:
+    """Blocks that are occupied as a whole, and blocks whose voxels must be looked at; the others are empty."""
+    n_blocks = tables.areas.shape[1]
+    missing = np.zeros(n_blocks, np.int16)  # cameras that miss every voxel of the block
+    full = np.zeros(n_blocks, np.int16)  # cameras that have every voxel in their silhouette
+    reach = np.zeros(n_blocks, np.int16)  # cameras that vote on some voxel of the block
+    for c in voting:
+        integral = cv2.integral(images[c]).ravel()
+        a, b, d, e = (integral.take(corner) for corner in tables.corners[c])
+        inside = a + b - d - e
+        area, whole = tables.areas[c], tables.seen_whole[c]
+        some = area > 0
+        missing += (inside == 0) & (whole | (outside == "carve"))
+        full += (inside == area) & (whole | (outside == "keep"))
+        reach += some if outside == "ignore" else True
+    possible = (missing <= tolerance) & (reach >= min_views)
+    occupied = possible & (full == len(voting)) & (len(voting) >= min_views)
+    return np.flatnonzero(occupied), np.flatnonzero(possible & ~occupied)
+
+
+def _gather_misses(tables, images, voting, blocks, tolerance, outside, min_views) -> np.ndarray:
+    """Cameras that miss each voxel of the blocks, (n, 512) uint8; 255 where it is surely more than `tolerance` or too few voted."""
+    # One number a pixel: 16 for "voted", 1 for "missed"; summed over cameras, low part misses, high part votes.
+    vote = 16 if len(voting) < 16 else 256
+    dtype = np.uint8 if vote == 16 else np.uint32
+    beyond = {"ignore": 0, "carve": vote + 1, "keep": vote}[outside]
+    codes = {}
+    for c in voting:
+        code = np.empty(images[c].size + 1, dtype)
+        np.subtract(vote + 1, images[c].ravel(), out=code[:-1], casting="unsafe")
+        code[-1] = beyond
+        codes[c] = code
+    total = np.zeros(len(blocks) * BLOCK_VOXELS, dtype)
+    alive = None  # flat voxels among the blocks that can still be occupied; all of them at first
+    for done, c in enumerate(voting):
+        table = tables.pixels[c]
+        if alive is None:
+            total += codes[c].take(table[blocks].ravel())
+        else:
+            rows, columns = np.divmod(alive, BLOCK_VOXELS)
+            total[alive] += codes[c].take(table[blocks[rows], columns])
+        if done >= tolerance:
+            source = total if alive is None else total[alive]
+            good = (source & (vote - 1)) <= tolerance
+            alive = np.flatnonzero(good) if alive is None else alive[good]
+    misses = np.full(total.shape, 255, np.uint8)
+    if alive is None:  # more cameras may miss than there are
+        alive = np.arange(total.size)
+    last = total[alive]
+    enough = last // vote >= min_views
+    misses[alive[enough]] = (last & (vote - 1))[enough]
+    return misses.reshape(len(blocks), BLOCK_VOXELS)
