@@ -1,0 +1,1 @@
+"""The articulated body: joints and their limits, proportions, flesh, forward kinematics."""

@@ -1,0 +1,138 @@
+"""Forward kinematics over arrays of states, and the twists of its joints. Canton (2009), Eq. 6.1 and appendix A.
+
+A joint's transform is the product of the exponential maps of its axes, ordered from the root outwards; written in the
+parent's frame that is a rotation about the joint's centre, which is what is computed here (the test holds it against
+``scipy.linalg.expm`` of the twists).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hmc.pose.body.joints import N_DOF, SEGMENTS
+from hmc.pose.body.model import BodyModel
+from hmc.pose.body.proportions import landmark_segments
+
+__all__ = ["SEGMENT_DOFS", "dof_masks", "joint_twists", "landmarks", "segment_transforms"]
+
+_LANDMARK_SEGMENTS = landmark_segments()
+
+
+def _segment_dofs() -> tuple[tuple[int, ...], ...]:
+    out, place = [], 3
+    for segment in SEGMENTS:
+        out.append(tuple(range(place, place + len(segment.axes))))
+        place += len(segment.axes)
+    return tuple(out)
+
+
+#: Places in the state of each segment's angles.
+SEGMENT_DOFS = _segment_dofs()
+
+
+def segment_transforms(body: BodyModel, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where every rigid segment is.
+
+    Parameters
+    ----------
+    body : BodyModel
+    states : ndarray, shape (..., 27)
+        Metres and radians, in the order of `hmc.pose.body.joints.DOF_NAMES`.
+
+    Returns
+    -------
+    rotations : ndarray, shape (..., 11, 3, 3)
+        World from segment.
+    positions : ndarray, shape (..., 11, 3)
+        The segments' joints in the world, metres.
+    """
+    states = np.asarray(states, float)
+    cos, sin = np.cos(states[..., 3:]), np.sin(states[..., 3:])
+    rotations = np.empty((*states.shape[:-1], len(SEGMENTS), 3, 3))
+    positions = np.empty((*states.shape[:-1], len(SEGMENTS), 3))
+    for index, segment in enumerate(SEGMENTS):
+        local = None
+        for axis, dof in zip(segment.axes, SEGMENT_DOFS[index], strict=True):
+            local = _turn(local, axis, cos[..., dof - 3], sin[..., dof - 3])
+        if segment.parent < 0:
+            rotations[..., index, :, :] = local
+            positions[..., index, :] = states[..., :3]
+        else:
+            parent = rotations[..., segment.parent, :, :]
+            rotations[..., index, :, :] = parent @ local
+            positions[..., index, :] = positions[..., segment.parent, :] + parent @ body.offsets[index]
+    return rotations, positions
+
+
+def landmarks(body: BodyModel, states: np.ndarray) -> np.ndarray:
+    """The fifteen landmarks of every state.
+
+    Parameters
+    ----------
+    body : BodyModel
+    states : ndarray, shape (..., 27)
+
+    Returns
+    -------
+    ndarray, shape (..., 15, 3)
+        World, metres, in the order of `hmc.landmarks.LANDMARKS`.
+    """
+    rotations, positions = segment_transforms(body, states)
+    tips = (rotations[..., _LANDMARK_SEGMENTS, :, :] @ body.tips[..., None])[..., 0]
+    return positions[..., _LANDMARK_SEGMENTS, :] + tips
+
+
+def joint_twists(body: BodyModel, state: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Axis and centre of every degree of freedom in the world: a point p of a moved segment has ``dp/dtheta = axis x (p - centre)``.
+
+    Source: Canton (2009), Eq. A.1.
+
+    Parameters
+    ----------
+    body : BodyModel
+    state : ndarray, shape (27,)
+
+    Returns
+    -------
+    axes : ndarray, shape (27, 3)
+        Unit axes; for the three translations the direction of motion.
+    centres : ndarray, shape (27, 3)
+        A point of each axis, metres.
+    rotations, positions : ndarray
+        As from `segment_transforms`, for this one state.
+    """
+    rotations, positions = segment_transforms(body, state)
+    axes, centres = np.zeros((N_DOF, 3)), np.zeros((N_DOF, 3))
+    axes[:3] = np.eye(3)
+    cos, sin = np.cos(state), np.sin(state)
+    for index, segment in enumerate(SEGMENTS):
+        frame = np.eye(3) if segment.parent < 0 else rotations[segment.parent]
+        for axis, dof in zip(segment.axes, SEGMENT_DOFS[index], strict=True):
+            axes[dof] = frame[:, "xyz".index(axis)]
+            centres[dof] = positions[index]
+            frame = _turn(frame, axis, cos[dof], sin[dof])
+    return axes, centres, rotations, positions
+
+
+def dof_masks() -> np.ndarray:
+    """Which degrees of freedom move which segments, shape (11, 27), bool."""
+    masks = np.zeros((len(SEGMENTS), N_DOF), bool)
+    masks[:, :3] = True
+    for index, segment in enumerate(SEGMENTS):
+        if segment.parent >= 0:
+            masks[index] = masks[segment.parent]
+        masks[index, list(SEGMENT_DOFS[index])] = True
+    return masks
+
+
+def _turn(frame: np.ndarray | None, axis: str, cos: np.ndarray, sin: np.ndarray) -> np.ndarray:
+    """``frame`` times the rotation about one of its own axes; only two columns change."""
+    first, second = {"x": (1, 2), "y": (2, 0), "z": (0, 1)}[axis]
+    if frame is None:
+        frame = np.broadcast_to(np.eye(3), (*np.shape(cos), 3, 3))
+    out = np.array(frame)
+    a, b = frame[..., :, first], frame[..., :, second]
+    cos, sin = np.asarray(cos)[..., None], np.asarray(sin)[..., None]
+    out[..., :, first] = cos * a + sin * b
+    out[..., :, second] = cos * b - sin * a
+    return out

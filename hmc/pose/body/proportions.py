@@ -1,0 +1,175 @@
+"""Dimensions of a body from the person's height, and the body made from them.
+
+Joint-centre lengths and flesh lengths are two things: the forearm ends at the wrist's centre while its flesh reaches to the
+finger tips, the shank ends at the ankle while its flesh has a foot. Canton's Table 6.1 has one length a part, and arms longer
+than people's; it is the preset `canton_body`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hmc.errors import InputError
+from hmc.landmarks import LANDMARKS
+from hmc.pose.body.joints import SEGMENTS, JointLimits, canton_limits, default_limits
+from hmc.pose.body.model import PARTS, BodyModel, Cones
+
+__all__ = ["CANTON_LENGTHS", "DEFAULT_LENGTHS", "GIRTHS", "canton_body", "default_body", "landmark_segments", "make_body"]
+
+#: Joint-centre lengths over stature. Trunk: hip centres' middle to the base of the neck. Sources: Winter (2009), figure 4.1
+#: (limbs), and the ranges that rendered and captured people show (trunk, head, shoulders).
+DEFAULT_LENGTHS: dict[str, float] = {
+    "trunk": 0.318, "head": 0.147, "shoulder_half_width": 0.098, "shoulder_drop": 0.060, "hip_half_width": 0.060,
+    "upper_arm": 0.157, "forearm": 0.150, "hand": 0.085, "thigh": 0.245, "shank": 0.250, "ankle_height": 0.058, "foot": 0.105,
+}  # fmt: skip
+
+#: Table 6.1 of Canton (2009), which gives no widths (ours are taken) and no hand or foot.
+CANTON_LENGTHS: dict[str, float] = DEFAULT_LENGTHS | {
+    "trunk": 0.33, "head": 0.16, "upper_arm": 0.20, "forearm": 0.20, "hand": 0.0, "thigh": 0.26, "shank": 0.25,
+    "ankle_height": 0.0, "foot": 0.0,
+}  # fmt: skip
+
+#: Factors on the radii of the flesh, one a group of parts.
+GIRTHS: tuple[str, ...] = ("torso", "depth", "head", "arms", "thighs", "shanks")
+
+_LANDMARK_SEGMENT = {
+    "pelvis": "pelvis", "neck": "head", "head_top": "head",
+    "l_shoulder": "l_upper_arm", "l_elbow": "l_forearm", "l_wrist": "l_forearm",
+    "r_shoulder": "r_upper_arm", "r_elbow": "r_forearm", "r_wrist": "r_forearm",
+    "l_hip": "l_thigh", "l_knee": "l_shank", "l_ankle": "l_shank",
+    "r_hip": "r_thigh", "r_knee": "r_shank", "r_ankle": "r_shank",
+}  # fmt: skip
+_SEGMENT_INDEX = {segment.name: index for index, segment in enumerate(SEGMENTS)}
+
+
+def landmark_segments() -> np.ndarray:
+    """Segment that carries each of the fifteen landmarks, shape (15,)."""
+    return np.array([_SEGMENT_INDEX[_LANDMARK_SEGMENT[name]] for name in LANDMARKS])
+
+
+def make_body(dimensions: dict[str, float], limits: JointLimits | None = None) -> BodyModel:
+    """The body of given dimensions.
+
+    Parameters
+    ----------
+    dimensions : dict
+        ``height`` (metres), the lengths of `DEFAULT_LENGTHS` (metres) and ``girth_<group>`` for each of `GIRTHS` (factors).
+    limits : JointLimits, optional
+        `default_limits` unless given.
+
+    Returns
+    -------
+    BodyModel
+
+    Raises
+    ------
+    InputError
+        When a dimension is missing, not finite or negative.
+    """
+    wanted = ["height", *DEFAULT_LENGTHS, *(f"girth_{group}" for group in GIRTHS)]
+    for name in wanted:
+        value = dimensions.get(name, np.nan)
+        if not np.isfinite(value) or value < 0:
+            raise InputError(f"body dimension '{name}' must be a number of at least 0; got {dimensions.get(name)}")
+    d = dimensions
+    offsets = np.zeros((len(SEGMENTS), 3))
+    tips = np.zeros((len(LANDMARKS), 3))
+
+    def put(name: str, offset) -> None:
+        offsets[_SEGMENT_INDEX[name]] = offset
+
+    put("head", (0, 0, d["trunk"]))
+    for side, sign in (("l", 1.0), ("r", -1.0)):
+        put(f"{side}_upper_arm", (0, sign * d["shoulder_half_width"], d["trunk"] - d["shoulder_drop"]))
+        put(f"{side}_forearm", (0, sign * d["upper_arm"], 0))
+        put(f"{side}_thigh", (0, sign * d["hip_half_width"], 0))
+        put(f"{side}_shank", (0, 0, -d["thigh"]))
+        tips[LANDMARKS.index(f"{side}_wrist")] = (0, sign * d["forearm"], 0)
+        tips[LANDMARKS.index(f"{side}_ankle")] = (0, 0, -d["shank"])
+    tips[LANDMARKS.index("head_top")] = (0, 0, d["head"])
+    return BodyModel(float(d["height"]), offsets, tips, _flesh(d), limits or default_limits(), {name: float(d[name]) for name in wanted})
+
+
+def default_body(height_m: float) -> BodyModel:
+    """A person of average proportions and joint-centre lengths.
+
+    Parameters
+    ----------
+    height_m : float
+        Stature, metres.
+    """
+    return make_body(_scaled(height_m, DEFAULT_LENGTHS), default_limits())
+
+
+def canton_body(height_m: float) -> BodyModel:
+    """The body of Canton (2009), Table 6.1: one length a part, the table's angular ranges.
+
+    Parameters
+    ----------
+    height_m : float
+        Stature, metres.
+    """
+    return make_body(_scaled(height_m, CANTON_LENGTHS), canton_limits())
+
+
+def _scaled(height_m: float, lengths: dict[str, float]) -> dict[str, float]:
+    if not 0.3 < height_m < 3.0:
+        raise InputError(f"a height of {height_m:g} m is no person's; give the stature in metres")
+    return {"height": height_m} | {name: value * height_m for name, value in lengths.items()} | {f"girth_{g}": 1.0 for g in GIRTHS}
+
+
+def _flesh(d: dict[str, float]) -> Cones:
+    """Truncated cones around the segments. Radii are fractions of the stature for an average adult, times the girth factors."""
+    h = d["height"]
+    rows: list[tuple] = []
+
+    def cone(segment: str, part: str, start, end, radius_start, radius_end, across, girth: tuple[float, float]) -> None:
+        if np.linalg.norm(np.subtract(end, start)) < 1e-3:
+            return
+        radii = h * np.array([radius_start, radius_end]) * np.array(girth)
+        rows.append(
+            (_SEGMENT_INDEX[segment], PARTS.index(part), np.asarray(start, float), np.asarray(end, float), radii, np.asarray(across, float))
+        )
+
+    wide, deep, trunk = d["girth_torso"], d["girth_torso"] * d["girth_depth"], d["trunk"]
+    y = (0, 1, 0)
+    # [lateral, front to back] at both ends
+    cone("pelvis", "torso", (0, 0, -0.035 * h), (0, 0, 0.15 * trunk), (0.090, 0.062), (0.086, 0.060), y, (wide, deep))
+    cone("torso", "torso", (0, 0, 0.12 * trunk), (0, 0, 0.48 * trunk), (0.084, 0.059), (0.082, 0.057), y, (wide, deep))
+    cone("torso", "torso", (0, 0, 0.48 * trunk), (0, 0, 0.82 * trunk), (0.084, 0.058), (0.096, 0.058), y, (wide, deep))
+    cone("torso", "torso", (0, 0, 0.82 * trunk), (0, 0, trunk), (0.096, 0.056), (0.042, 0.036), y, (wide, deep))
+    head, g = d["head"], (d["girth_head"], d["girth_head"])
+    cone("head", "head", (0, 0, -0.02 * h), (0.004 * h, 0, 0.28 * head), (0.034, 0.034), (0.034, 0.040), y, g)
+    cone("head", "head", (0.006 * h, 0, 0.22 * head), (0.01 * h, 0, 0.65 * head), (0.036, 0.046), (0.045, 0.057), y, g)
+    cone("head", "head", (0.01 * h, 0, 0.65 * head), (0.008 * h, 0, head), (0.045, 0.057), (0.026, 0.032), y, g)
+    x, arms = (1, 0, 0), (d["girth_arms"], d["girth_arms"])
+    thighs, shanks = (d["girth_thighs"],) * 2, (d["girth_shanks"],) * 2
+    for side, sign in (("r", -1.0), ("l", 1.0)):
+        upper, fore, hand = (sign * d[name] for name in ("upper_arm", "forearm", "hand"))
+        part = f"{side}_upper_arm"
+        cone(part, part, (0, -sign * 0.01 * h, 0), (0, upper, 0), (0.034, 0.034), (0.025, 0.025), x, arms)
+        part = f"{side}_forearm"
+        cone(part, part, (0, 0, 0), (0, fore, 0), (0.026, 0.026), (0.016, 0.016), x, arms)
+        cone(part, part, (0, fore, 0), (0, fore + hand, 0), (0.021, 0.015), (0.016, 0.010), x, arms)
+        part = f"{side}_thigh"
+        cone(part, part, (0, 0, 0.0), (0, 0, -d["thigh"]), (0.050, 0.050), (0.033, 0.033), x, thighs)
+        part, shank, ankle = f"{side}_shank", d["shank"], d["ankle_height"]
+        cone(part, part, (0, 0, 0), (-0.004 * h, 0, -0.4 * shank), (0.032, 0.030), (0.033, 0.031), x, shanks)
+        cone(part, part, (-0.004 * h, 0, -0.4 * shank), (0, 0, -shank - 0.3 * ankle), (0.033, 0.031), (0.021, 0.020), x, shanks)
+        sole = -shank - 0.55 * ankle
+        foot = d["foot"]
+        if foot > 0:
+            cone(
+                part,
+                part,
+                (-0.032 * h, 0, sole),
+                (-0.032 * h + 1.35 * foot, 0, sole - 0.012 * h),
+                (0.020, 0.024),
+                (0.028, 0.012),
+                y,
+                (1.0, 1.0),
+            )
+    columns = list(zip(*rows, strict=True))
+    return Cones(
+        np.array(columns[0]), np.array(columns[1]), np.array(columns[2]), np.array(columns[3]), np.array(columns[4]), np.array(columns[5])
+    )
