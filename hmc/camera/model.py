@@ -14,7 +14,7 @@ import numpy as np
 
 from hmc.errors import InputError
 
-__all__ = ["Camera", "Rig", "backproject", "project", "undistort", "look_at"]
+__all__ = ["Camera", "Rig", "backproject", "look_at", "project", "undistort"]
 
 #: Points nearer than this to the camera's plane (metres) count as behind it.
 NEAR_M = 1e-6
@@ -56,9 +56,9 @@ class Camera:
         def say(what: str) -> InputError:
             return InputError(f"camera '{self.name}': {what}")
 
-        size = tuple(int(n) for n in self.size)
-        if len(size) != 2 or min(size) < 1:
+        if len(self.size) != 2 or min(self.size) < 1:
             raise say(f"`size` must be [width, height] in pixels; got {list(self.size)}")
+        size = (int(self.size[0]), int(self.size[1]))
         matrix = np.array(self.matrix, float)
         if matrix.shape != (3, 3):
             raise say(f"`matrix` must be 3 x 3; got shape {matrix.shape}")
@@ -81,9 +81,9 @@ class Camera:
             raise say("`matrix` is no intrinsic matrix [[fx, s, cx], [0, fy, cy], [0, 0, 1]] with positive focal lengths")
         if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-3 or np.linalg.det(rotation) < 0:
             raise say("`rotation` is not a rotation (its rows must be orthonormal and right-handed)")
-        for label, value in (("size", size), ("matrix", matrix), ("distortions", distortions), ("rotation", rotation), ("translation", translation)):
-            if isinstance(value, np.ndarray):
-                value.setflags(write=False)
+        object.__setattr__(self, "size", size)
+        for label, value in (("matrix", matrix), ("distortions", distortions), ("rotation", rotation), ("translation", translation)):
+            value.setflags(write=False)
             object.__setattr__(self, label, value)
 
     @property
@@ -210,9 +210,7 @@ def distort(camera: Camera, xy: np.ndarray) -> np.ndarray:
     x, y = xy[..., 0], xy[..., 1]
     r2 = x * x + y * y
     radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
-    return np.stack(
-        [x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x), y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y], axis=-1
-    )
+    return np.stack([x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x), y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y], axis=-1)
 
 
 def undistort(camera: Camera, uv: np.ndarray, iterations: int = 30) -> np.ndarray:

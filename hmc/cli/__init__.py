@@ -1,0 +1,76 @@
+"""The command line: ``python -m hmc COMMAND ...``.
+
+Every command is a module of this package with ``add_parser(subparsers)`` and ``run(args) -> exit code``; a command's heavy imports
+belong inside its ``run``, so that ``--help`` is quick.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import importlib.util
+import os
+import sys
+from collections.abc import Sequence
+
+from hmc import __version__
+from hmc.errors import InputError
+
+__all__ = ["main"]
+
+COMMANDS = ("check", "synth", "track", "pose", "evaluate", "view")
+
+EXIT_INPUT = 2
+EXIT_INTERRUPTED = 130
+
+
+def make_parser(command: str | None = None) -> argparse.ArgumentParser:
+    """The argument parser; with ``command``, only that command's module is imported."""
+    parser = argparse.ArgumentParser(
+        prog="hmc",
+        description="Where people are and what pose they take, from calibrated videos and without markers.",
+        epilog="Each command explains itself: hmc COMMAND --help",
+    )
+    parser.add_argument("--version", action="version", version=f"hmc {__version__}")
+    subparsers = parser.add_subparsers(dest="command", metavar="COMMAND")
+    for name in COMMANDS if command not in COMMANDS else (command,):
+        if importlib.util.find_spec(f"hmc.cli.{name}") is not None:
+            module = importlib.import_module(f"hmc.cli.{name}")
+            module.add_parser(subparsers)
+            subparsers.choices[name].set_defaults(run=module.run)
+    return parser
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command.
+
+    Parameters
+    ----------
+    argv : sequence of str, optional
+        The arguments; by default those of the process.
+
+    Returns
+    -------
+    int
+        Exit code: 0 done, 2 the input was wrong (one line on stderr says what), 130 interrupted.
+    """
+    argv = list(sys.argv[1:] if argv is None else argv)
+    parser = make_parser(argv[0] if argv else None)
+    args = parser.parse_args(argv)
+    if args.command is None:
+        parser.print_help()
+        return 0
+    try:
+        code = args.run(args)
+        sys.stdout.flush()
+        return code or 0
+    except InputError as error:
+        print(f"hmc {args.command}: {error}", file=sys.stderr)
+        return EXIT_INPUT
+    except KeyboardInterrupt:
+        print(f"hmc {args.command}: interrupted", file=sys.stderr)
+        return EXIT_INTERRUPTED
+    except BrokenPipeError:
+        # The reader of a pipe went away (`| head`); point stdout elsewhere, or the interpreter complains when it closes.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0

@@ -1,0 +1,71 @@
+"""Options that several commands share, the progress bar and the list of problems at the end."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import TypeVar
+
+__all__ = ["add_selection_options", "camera_names", "open_selected", "positive_float", "print_problems", "progress", "whole_number"]
+
+T = TypeVar("T")
+
+
+def add_selection_options(parser: argparse.ArgumentParser) -> None:
+    """Add the recording itself, ``--start``, ``--frames``, ``--cameras`` and ``--quiet``."""
+    parser.add_argument("recording", type=Path, help="folder of the recording")
+    parser.add_argument("--start", type=whole_number, default=0, metavar="N", help="first frame (default: 0)")
+    parser.add_argument("--frames", type=whole_number, default=None, metavar="N", help="how many frames (default: all)")
+    parser.add_argument("--cameras", type=camera_names, default=None, metavar="A,B,...", help="use these cameras only (default: all)")
+    parser.add_argument("--quiet", action="store_true", help="no progress bar")
+
+
+def open_selected(args: argparse.Namespace):
+    """Open the recording that `add_selection_options` describes."""
+    from hmc.recording import open_recording
+
+    return open_recording(args.recording, cameras=args.cameras, start=args.start, frames=args.frames)
+
+
+def progress(iterable: Iterable[T], total: int | None = None, desc: str = "", quiet: bool = False) -> Iterator[T]:
+    """Pass an iterable on, with a bar on stderr that shows frames a second and the time left."""
+    if quiet:
+        return iter(iterable)
+    from tqdm import tqdm
+
+    return iter(tqdm(iterable, total=total, desc=desc, unit="frame", dynamic_ncols=True, file=sys.stderr))
+
+
+def print_problems(problems: Iterable[str]) -> None:
+    """Print what was survived, one line each on stderr; nothing when there is nothing."""
+    for problem in dict.fromkeys(problems):
+        print(f"note: {problem}", file=sys.stderr)
+
+
+def whole_number(text: str) -> int:
+    """argparse type: an integer of zero or more."""
+    value = int(text) if text.strip().isdigit() else -1
+    if value < 0:
+        raise argparse.ArgumentTypeError(f"must be a whole number, 0 or more; got {text!r}")
+    return value
+
+
+def positive_float(text: str) -> float:
+    """argparse type: a finite number above zero."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not 0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"must be a number above 0; got {text!r}")
+    return value
+
+
+def camera_names(text: str) -> list[str]:
+    """argparse type: names separated by commas."""
+    names = [name.strip() for name in text.split(",") if name.strip()]
+    if not names:
+        raise argparse.ArgumentTypeError("give camera names separated by commas")
+    return names

@@ -1,0 +1,212 @@
+"""Videos and folders of numbered images behind one interface: how many frames, how large, and the frames in order.
+
+Frames stream: a reader holds one decoder and one image. A frame that cannot be read is None, never an exception.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from hmc.camera.calibration import natural_key
+from hmc.errors import InputError
+
+__all__ = ["IMAGE_SUFFIXES", "VIDEO_SUFFIXES", "Footage", "find_footage", "open_images", "open_video", "read_footage"]
+
+VIDEO_SUFFIXES = frozenset({".mp4", ".avi", ".mov", ".mkv", ".m4v", ".mpg", ".mpeg", ".webm", ".wmv", ".mts", ".ts", ".h264"})
+IMAGE_SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp", ".pgm", ".ppm"})
+
+
+@dataclass(frozen=True)
+class Footage:
+    """The frames of one camera.
+
+    Parameters
+    ----------
+    path : Path
+        The video, or the folder (or single file) of images.
+    n_frames : int
+        One past the last frame.
+    size : tuple of int
+        (width, height) in pixels.
+    images : dict from frame to Path, or None
+        None for a video. Frames may be missing.
+    fps : float or None
+        As the video's header says.
+    notes : tuple of str
+        What was odd when it was opened.
+    """
+
+    path: Path
+    n_frames: int
+    size: tuple[int, int]
+    images: dict[int, Path] | None = None
+    fps: float | None = None
+    notes: tuple[str, ...] = ()
+
+
+def find_footage(folder: Path, name: str, first_number: int | None = None) -> Footage | None:
+    """The footage of camera ``name`` in a folder: ``name.mp4`` (any common suffix), ``name/*.png`` or a single ``name.png``.
+
+    Parameters
+    ----------
+    folder : Path
+    name : str
+    first_number : int, optional
+        See `open_images`.
+
+    Returns
+    -------
+    Footage or None
+        None when there is none.
+
+    Raises
+    ------
+    InputError
+        When it is there but cannot be read.
+    """
+    if not folder.is_dir():
+        return None
+    if (folder / name).is_dir():
+        return open_images(folder / name, first_number)
+    for path in sorted(folder.iterdir()):
+        if path.stem == name and path.suffix.lower() in VIDEO_SUFFIXES:
+            return open_video(path)
+        if path.stem == name and path.suffix.lower() in IMAGE_SUFFIXES:
+            return _footage_of_images(path, {0: path})
+    return None
+
+
+def open_video(path: Path) -> Footage:
+    """Look a video over: size, rate and a frame count that can be believed.
+
+    The header's count is taken when the last frame it promises is there and none follows; otherwise the frames are counted one by one.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be opened or holds no frame.
+    """
+    capture = cv2.VideoCapture(str(path))
+    try:
+        image = capture.read()[1] if capture.isOpened() else None
+        if image is None:
+            raise InputError(f"{path}: this video cannot be read (empty, cut off or of an unknown codec); copy or convert it again")
+        stated = int(capture.get(cv2.CAP_PROP_FRAME_COUNT))
+        fps = capture.get(cv2.CAP_PROP_FPS)
+        if stated == 1:
+            believed = not capture.grab()
+        else:
+            believed = stated > 1 and capture.set(cv2.CAP_PROP_POS_FRAMES, stated - 1) and capture.grab() and not capture.grab()
+    finally:
+        capture.release()
+    n_frames = stated if believed else _count(path)
+    notes = (f"{path.name}: its header promises {stated} frames, {n_frames} can be read (cut off?)",) if stated > n_frames else ()
+    return Footage(path, n_frames, (image.shape[1], image.shape[0]), fps=fps if 0 < fps < 1e4 else None, notes=notes)
+
+
+def _count(path: Path) -> int:
+    capture = cv2.VideoCapture(str(path))
+    try:
+        n = 0
+        while capture.grab():
+            n += 1
+        return n
+    finally:
+        capture.release()
+
+
+def open_images(folder: Path, first_number: int | None = None) -> Footage:
+    """Look a folder of images over. The last number in a file's name is its frame; without numbers, the natural order counts.
+
+    Parameters
+    ----------
+    folder : Path
+    first_number : int, optional
+        The number that frame 0 bears; by default 0. The recording's smallest over all cameras is meant.
+
+    Raises
+    ------
+    InputError
+        When the folder has no image or the first one cannot be read.
+    """
+    return _footage_of_images(folder, number_images(folder), first_number or 0)
+
+
+def number_images(folder: Path) -> dict[int, Path]:
+    """The images of a folder by the number in their names (or their place in the natural order), before any shift."""
+    files = sorted((path for path in folder.iterdir() if path.suffix.lower() in IMAGE_SUFFIXES), key=lambda path: natural_key(path.name))
+    numbers = [re.findall(r"\d+", path.stem) for path in files]
+    by_number = {int(found[-1]): path for found, path in zip(numbers, files, strict=True) if found}
+    return by_number if len(by_number) == len(files) else dict(enumerate(files))
+
+
+def _footage_of_images(path: Path, images: dict[int, Path], first_number: int = 0) -> Footage:
+    images = {number - first_number: file for number, file in images.items() if number >= first_number}
+    if not images:
+        raise InputError(f"{path}: no image in this folder ({', '.join(sorted(IMAGE_SUFFIXES))}); fill or remove it")
+    for file in images.values():
+        image = cv2.imread(str(file), cv2.IMREAD_COLOR)
+        if image is not None:
+            return Footage(path, max(images) + 1, (image.shape[1], image.shape[0]), images)
+    raise InputError(f"{path}: none of its {len(images)} images can be read; copy or convert them again")
+
+
+def read_footage(footage: Footage, first: int, last: int, on_problem: Callable[[str], None], label: str) -> Iterator[np.ndarray | None]:
+    """Frames ``first`` to ``last`` (not included) of one camera, in order.
+
+    Parameters
+    ----------
+    footage : Footage
+    first, last : int
+    on_problem : callable
+        Called with one line for each thing that went wrong.
+    label : str
+        What the lines call this footage.
+
+    Yields
+    ------
+    ndarray, shape (h, w, 3), uint8 BGR, or None
+        None where the frame is missing, unreadable or of another size.
+    """
+    reader = _read_video(footage, first, last) if footage.images is None else _read_images(footage, first, last)
+    for index, image in enumerate(reader, first):
+        if image is not None and image.shape[1::-1] != footage.size:
+            on_problem(
+                f"{label}: frame {index} is {image.shape[1]} x {image.shape[0]} and not {footage.size[0]} x {footage.size[1]}; left out"
+            )
+            image = None
+        elif image is None and footage.images is None and index < footage.n_frames:
+            on_problem(f"{label}: the video stops at frame {index} of {footage.n_frames}; the rest goes without this camera")
+            break
+        elif image is None and footage.images is not None and index in footage.images:
+            on_problem(f"{label}: frame {index} ({footage.images[index].name}) cannot be read; left out")
+        yield image
+    else:
+        return
+    for _ in range(index, last):
+        yield None
+
+
+def _read_video(footage: Footage, first: int, last: int) -> Iterator[np.ndarray | None]:
+    capture = cv2.VideoCapture(str(footage.path))
+    try:
+        # Grabbing up to the first frame is slower than seeking, but exact for every codec and container.
+        alive = all(capture.grab() for _ in range(first))
+        for _ in range(first, last):
+            image = capture.read()[1] if alive else None
+            alive = image is not None
+            yield image
+    finally:
+        capture.release()
+
+
+def _read_images(footage: Footage, first: int, last: int) -> Iterator[np.ndarray | None]:
+    images = footage.images or {}
+    for index in range(first, last):
+        yield cv2.imread(str(images[index]), cv2.IMREAD_COLOR) if index in images else None

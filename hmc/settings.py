@@ -1,0 +1,76 @@
+"""The optional ``recording.toml`` of a recording: name, rate, room, persons."""
+
+from __future__ import annotations
+
+import difflib
+import math
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hmc.errors import InputError
+
+__all__ = ["read_settings"]
+
+SETTINGS = ("name", "fps", "frames", "units", "up", "room", "persons", "subject_height_m")
+#: No room is wider (metres): beyond, it is in millimetres.
+MAX_ROOM_M = 300.0
+
+
+def read_settings(path: Path) -> dict[str, Any]:
+    """Read ``recording.toml`` of a folder, checked; empty when there is none.
+
+    Raises
+    ------
+    InputError
+        When a key is unknown or its value is not what it must be.
+    """
+    file = path / "recording.toml"
+    if not file.is_file():
+        return {}
+    try:
+        settings = tomllib.loads(file.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"{file}: not a TOML file ({error})") from None
+    for key in settings:
+        if key not in SETTINGS:
+            near = difflib.get_close_matches(key, SETTINGS, 1, 0.0)
+            raise InputError(f"{file}: unknown key `{key}`; did you mean `{near[0]}`? (known: {', '.join(SETTINGS)})")
+    return _checked(settings, file)
+
+
+def _checked(settings: Mapping[str, Any], file: Path) -> dict[str, Any]:
+    def is_number(value: Any) -> bool:
+        return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+    def demand(key: str, fine: bool, what: str) -> None:
+        if key in settings and not fine:
+            raise InputError(f"{file}: `{key}` must be {what}; got {settings[key]!r}")
+
+    checked = dict(settings)
+    fps: Any = settings.get("fps")
+    demand("name", isinstance(settings.get("name"), str), "a text")
+    demand("units", settings.get("units") == "m", 'in metres, units = "m": convert the calibration and the room')
+    demand("up", settings.get("up") == "z", 'the z axis, up = "z": turn the calibration')
+    demand("fps", is_number(fps) and fps > 0, "a number above 0")
+    for key, least in (("frames", 1), ("persons", 0)):
+        value = settings.get(key)
+        demand(key, isinstance(value, int) and not isinstance(value, bool) and value >= least, f"a whole number, {least} or more")
+    if "subject_height_m" in settings:
+        heights = settings["subject_height_m"] if isinstance(settings["subject_height_m"], list) else [settings["subject_height_m"]]
+        demand("subject_height_m", all(is_number(height) and 0.3 < height < 3 for height in heights), "statures in metres, such as [1.77]")
+        checked["subject_height_m"] = tuple(float(height) for height in heights)
+    if "room" in settings:
+        try:
+            room = np.array(settings["room"], float)
+        except (ValueError, TypeError):
+            room = np.zeros(0)
+        fine = room.shape == (2, 3) and bool(np.all(np.isfinite(room))) and bool(np.all(room[1] > room[0]))
+        demand("room", fine, "[[x0, y0, z0], [x1, y1, z1]] in metres, lower corner first")
+        demand("room", float(np.ptp(room, axis=0).max()) < MAX_ROOM_M, "in metres; this looks like millimetres: divide by 1000")
+        room.setflags(write=False)
+        checked["room"] = room
+    return checked
