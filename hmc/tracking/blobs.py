@@ -1,0 +1,143 @@
+"""What the tracker sees of one frame: the occupied voxels, their connected components and the components' features.
+
+Source: Canton (2009), section 4.2.3, Eq. 4.1 and Table 4.1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hmc.voxels.components import label_voxels
+from hmc.voxels.grid import VoxelGrid
+
+__all__ = ["Blobs", "Observation", "blob_features", "observe"]
+
+#: Density of a body, kilograms a cubic metre (Table 4.1: 1.1 g / cm^3).
+DENSITY = 1100.0
+
+
+@dataclass(frozen=True)
+class Blobs:
+    """Features of n sets of voxels, one row a set; an empty set's are zero.
+
+    Attributes
+    ----------
+    counts : ndarray of int, shape (n,)
+        Voxels.
+    volume_m3, weight_kg : ndarray, shape (n,)
+    centroid : ndarray, shape (n, 3)
+        World, metres.
+    lowest, highest : ndarray, shape (n, 3)
+        Corners of the bounding box, outer faces of the voxels, metres. ``highest[:, 2]`` is Table 4.1's "top".
+    footprint_m2 : ndarray, shape (n,)
+        Area of the shadow on the floor.
+    """
+
+    counts: np.ndarray
+    volume_m3: np.ndarray
+    weight_kg: np.ndarray
+    centroid: np.ndarray
+    lowest: np.ndarray
+    highest: np.ndarray
+    footprint_m2: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.counts)
+
+    @property
+    def top_m(self) -> np.ndarray:
+        """Height of the highest point above the floor, shape (n,)."""
+        return self.highest[:, 2]
+
+    @property
+    def height_m(self) -> np.ndarray:
+        """From the lowest to the highest point, shape (n,)."""
+        return self.highest[:, 2] - self.lowest[:, 2]
+
+    @property
+    def sides_m(self) -> np.ndarray:
+        """Longer and shorter horizontal side of the bounding box, shape (n, 2)."""
+        sides = (self.highest - self.lowest)[:, :2]
+        return np.stack([sides.max(axis=1), sides.min(axis=1)], axis=1)
+
+
+@dataclass(frozen=True)
+class Observation:
+    """The occupied voxels of one frame.
+
+    Attributes
+    ----------
+    voxel_size_m : float
+    indices : ndarray of int, shape (n, 3)
+        Occupied voxels of the grid, in C order.
+    points : ndarray, shape (n, 3)
+        Their centres, world, metres.
+    labels : ndarray of int, shape (n,)
+        Connected component (26 neighbours) of each, from 0.
+    blobs : Blobs
+        Features of the components, in the order of their labels.
+    """
+
+    voxel_size_m: float
+    indices: np.ndarray
+    points: np.ndarray
+    labels: np.ndarray
+    blobs: Blobs
+
+
+def observe(grid: VoxelGrid, occupied: np.ndarray) -> Observation:
+    """Components and features of one frame's occupied voxels.
+
+    Parameters
+    ----------
+    grid : VoxelGrid
+    occupied : ndarray of bool, shape (nx, ny, nz)
+
+    Returns
+    -------
+    Observation
+    """
+    indices, labels = label_voxels(occupied)
+    points = grid.centres(indices)
+    n_blobs = int(labels.max(initial=-1)) + 1
+    return Observation(grid.voxel_size_m, indices, points, labels, blob_features(points, labels, n_blobs, grid.voxel_size_m))
+
+
+def blob_features(points: np.ndarray, labels: np.ndarray, n_blobs: int, voxel_size_m: float) -> Blobs:
+    """Features of labelled voxels.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3)
+        Centres of voxels, world, metres.
+    labels : ndarray of int, shape (n,)
+        Set of each voxel, 0 to ``n_blobs - 1``; negative ones belong to none.
+    n_blobs : int
+    voxel_size_m : float
+
+    Returns
+    -------
+    Blobs
+    """
+    points, labels = points[labels >= 0], labels[labels >= 0]
+    counts = np.bincount(labels, minlength=n_blobs)
+    sums = np.stack([np.bincount(labels, points[:, axis], n_blobs) for axis in range(3)], axis=1)
+    lowest = np.full((n_blobs, 3), np.inf)
+    highest = np.full((n_blobs, 3), -np.inf)
+    np.minimum.at(lowest, labels, points)
+    np.maximum.at(highest, labels, points)
+    some = counts[:, None] > 0
+    columns = np.round((points[:, :2] - points[:1, :2]) / voxel_size_m).astype(np.int64)
+    shadows = np.unique(np.column_stack([labels, columns]), axis=0)[:, 0]
+    volume = counts * voxel_size_m**3
+    return Blobs(
+        counts=counts,
+        volume_m3=volume,
+        weight_kg=volume * DENSITY,
+        centroid=sums / np.maximum(counts, 1)[:, None],
+        lowest=np.where(some, lowest - voxel_size_m / 2, 0.0),
+        highest=np.where(some, highest + voxel_size_m / 2, 0.0),
+        footprint_m2=np.bincount(shadows, minlength=n_blobs) * voxel_size_m**2,
+    )

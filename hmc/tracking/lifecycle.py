@@ -1,0 +1,279 @@
+"""Creation and deletion of tracks, whatever filter follows the tracks in between.
+
+A person-like set of voxels that no track owns becomes a candidate. A candidate that was seen in enough frames becomes a person,
+from the first frame in which it was seen. A track whose voxels have not looked like a person for a while is deleted, and so is
+the younger of two tracks that stand in one place. Source: Canton (2009), Figure 4.1 and section 4.2.3; the person rules stand in
+place of its trained classifier (Table 4.1, Figure 4.4).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from hmc.tracking.blobs import Blobs, Observation, blob_features
+
+__all__ = ["Candidate", "LifecycleSettings", "Row", "Track", "confirm", "delete", "looks_like_person", "propose", "unowned_blobs"]
+
+
+@dataclass(frozen=True)
+class LifecycleSettings:
+    """When a set of voxels is a person, and how long it takes to come and go.
+
+    Attributes
+    ----------
+    least_top_m, most_top_m : float
+        Height of the highest point of a person who appears: bent down or on the knees, and with a hand up.
+    least_height_m : float
+        Least extent from lowest to highest point: no table top, no shadow.
+    most_bottom_m : float
+        Furniture may hide the legs, but nobody floats higher than this.
+    least_volume_m3, most_volume_m3 : float
+        A hull is fatter than its person; the most leaves room for two who come in arm in arm.
+    most_side_m, least_side_m : float
+        Longest horizontal side (arms stretched out) and least value of the longer side (a ghost is a thin column).
+    keep_volume_m3, keep_top_m : float
+        What is enough for a person who is tracked already.
+    confirm_s, confirm_frames : float, int
+        A candidate becomes a person after this time and at least this many frames.
+    patience_s : float
+        A track is deleted after this time without support.
+    least_distance_m : float
+        No candidate nearer to a track than this, horizontally.
+    same_place_m, same_place_s : float
+        Two tracks nearer than this for so long follow one person.
+    fragment_gap_m : float
+        Unowned pieces that stand nearer than this, seen from above, are judged together.
+    """
+
+    least_top_m: float = 0.9
+    most_top_m: float = 2.6
+    least_height_m: float = 0.6
+    most_bottom_m: float = 0.9
+    least_volume_m3: float = 0.025
+    most_volume_m3: float = 0.7
+    most_side_m: float = 2.2
+    least_side_m: float = 0.25
+    keep_volume_m3: float = 0.012
+    keep_top_m: float = 0.4
+    confirm_s: float = 0.3
+    confirm_frames: int = 4
+    patience_s: float = 1.0
+    least_distance_m: float = 0.45
+    same_place_m: float = 0.2
+    same_place_s: float = 0.5
+    fragment_gap_m: float = 0.2
+
+
+@dataclass(frozen=True)
+class Row:
+    """Where a person is in a frame: one line of the table of tracks. Positions are world, metres."""
+
+    frame: int
+    person: int
+    position: np.ndarray
+    head: np.ndarray
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A person-like set of voxels that may become a track.
+
+    Attributes
+    ----------
+    rows : tuple of Row
+        Every frame in which it was seen; their person number has no meaning yet.
+    missed : int
+        Frames in which it was not.
+    """
+
+    rows: tuple[Row, ...]
+    missed: int = 0
+
+    @property
+    def velocity(self) -> np.ndarray:
+        """Mean velocity over the frames seen, metres a frame, shape (3,)."""
+        first, last = self.rows[0], self.rows[-1]
+        return (last.position - first.position) / max(last.frame - first.frame, 1)
+
+
+@dataclass(frozen=True)
+class Track:
+    """A person who is followed.
+
+    Attributes
+    ----------
+    person : int
+        Number, never used again.
+    position, head : ndarray, shape (3,)
+        Centroid and centre of the head, world, metres.
+    velocity : ndarray, shape (3,)
+        Smoothed, metres a second.
+    volume_m3 : float
+        Smoothed volume of the voxels owned while standing apart.
+    first_frame, last_frame : int
+        First frame seen and last frame with support.
+    crowded : int
+        Frames in a row in which another, older track stood in the same place.
+    """
+
+    person: int
+    position: np.ndarray
+    head: np.ndarray
+    velocity: np.ndarray
+    volume_m3: float
+    first_frame: int
+    last_frame: int
+    crowded: int = 0
+
+
+def looks_like_person(blobs: Blobs, settings: LifecycleSettings) -> np.ndarray:
+    """Which sets of voxels may be a person who appears; shape (n,) bool. For people who stand, bend, kneel or sit."""
+    longer = blobs.sides_m[:, 0]
+    top, bottom = blobs.top_m, blobs.lowest[:, 2]
+    return (
+        (top >= settings.least_top_m)
+        & (top <= settings.most_top_m)
+        & (blobs.height_m >= settings.least_height_m)
+        & (bottom <= settings.most_bottom_m)
+        & (blobs.volume_m3 >= settings.least_volume_m3)
+        & (blobs.volume_m3 <= settings.most_volume_m3)
+        & (longer >= settings.least_side_m)
+        & (longer <= settings.most_side_m)
+    )
+
+
+def still_a_person(blobs: Blobs, settings: LifecycleSettings) -> np.ndarray:
+    """Which sets of voxels, owned by tracks, are enough to keep the track; shape (n,) bool."""
+    return (blobs.volume_m3 >= settings.keep_volume_m3) & (blobs.top_m >= settings.keep_top_m)
+
+
+def unowned_blobs(observation: Observation, owners: np.ndarray, settings: LifecycleSettings) -> tuple[np.ndarray, Blobs]:
+    """Sets of voxels that no track owns, ready to be judged.
+
+    A component that looks like a person stands for itself; the other pieces are put together with those that stand close, seen
+    from above, because a person may come in pieces.
+
+    Parameters
+    ----------
+    observation : Observation
+    owners : ndarray of int, shape (n,)
+        Row of the track that owns each voxel, or -1.
+    settings : LifecycleSettings
+
+    Returns
+    -------
+    labels : ndarray of int, shape (n,)
+        Set of each voxel, -1 for owned ones.
+    blobs : Blobs
+    """
+    size = observation.voxel_size_m
+    labels = np.full(len(owners), -1)
+    free = owners < 0
+    if not free.any():
+        return labels, blob_features(observation.points, labels, 0, size)
+    _, labels[free] = np.unique(observation.labels[free], return_inverse=True)
+    n_pieces = labels.max() + 1
+    whole = looks_like_person(blob_features(observation.points, labels, n_pieces, size), settings)
+    in_pieces = free & ~whole[labels]
+    columns = np.unique(np.column_stack([labels, observation.indices[:, :2]])[in_pieces], axis=0)
+    near = np.zeros((0, 2), int)
+    if len(columns):
+        near = cKDTree(columns[:, 1:]).query_pairs(settings.fragment_gap_m / size, output_type="ndarray")
+    a, b = columns[near[:, 0], 0], columns[near[:, 1], 0]
+    links = coo_array((np.ones(len(a)), (a, b)), shape=(n_pieces, n_pieces))
+    n_groups, group = connected_components(links, directed=False)
+    labels[free] = group[labels[free]]
+    return labels, blob_features(observation.points, labels, n_groups, size)
+
+
+def propose(
+    candidates: tuple[Candidate, ...], seen: list[Row], tracks: tuple[Track, ...], settings: LifecycleSettings
+) -> tuple[Candidate, ...]:
+    """Carry the candidates on with what was seen in this frame, nearest pairs first, and start new ones.
+
+    Parameters
+    ----------
+    candidates : tuple of Candidate
+    seen : list of Row
+        Person-like sets of voxels of this frame that no track owns.
+    tracks : tuple of Track
+        Nothing nearer to one of these than `least_distance_m` is a candidate.
+    settings : LifecycleSettings
+
+    Returns
+    -------
+    tuple of Candidate
+        Those missed more often than seen are gone.
+    """
+    apart = [row for row in seen if all(_gap(row.position, track.position) >= settings.least_distance_m for track in tracks)]
+    pairs = sorted(
+        (distance, c, s)
+        for c, candidate in enumerate(candidates)
+        for s, row in enumerate(apart)
+        if (distance := _gap(row.position, _expected(candidate, row.frame))) <= 2 * settings.least_distance_m
+    )
+    match: dict[int, int] = {}
+    for _, c, s in pairs:
+        if c not in match and s not in match.values():
+            match[c] = s
+    kept = [
+        replace(candidate, rows=(*candidate.rows, apart[match[c]])) if c in match else replace(candidate, missed=candidate.missed + 1)
+        for c, candidate in enumerate(candidates)
+    ]
+    fresh = [Candidate((row,)) for s, row in enumerate(apart) if s not in match.values()]
+    return tuple(candidate for candidate in kept if candidate.missed <= len(candidate.rows)) + tuple(fresh)
+
+
+def confirm(
+    candidates: tuple[Candidate, ...], next_person: int, fps: float, settings: LifecycleSettings
+) -> tuple[tuple[Candidate, ...], tuple[Track, ...], list[Row]]:
+    """Make persons of the candidates that were seen in enough frames.
+
+    Returns
+    -------
+    candidates : tuple of Candidate
+        The others.
+    tracks : tuple of Track
+        New ones, numbered from `next_person`.
+    rows : list of Row
+        Their positions from the first frame in which each was seen.
+    """
+    needed = max(settings.confirm_frames, round(settings.confirm_s * fps))
+    left, tracks, rows = [], [], []
+    for candidate in candidates:
+        if len(candidate.rows) < needed:
+            left.append(candidate)
+            continue
+        person = next_person + len(tracks)
+        first, last = candidate.rows[0], candidate.rows[-1]
+        tracks.append(Track(person, last.position, last.head, candidate.velocity * fps, 0.0, first.frame, last.frame))
+        rows += [replace(row, person=person) for row in candidate.rows]
+    return tuple(left), tuple(tracks), rows
+
+
+def delete(tracks: tuple[Track, ...], frame: int, fps: float, settings: LifecycleSettings) -> tuple[Track, ...]:
+    """The tracks that stay: supported lately, and not standing where an older one stands."""
+    kept: list[Track] = []
+    for track in sorted(tracks, key=lambda track: track.person):
+        if frame - track.last_frame > settings.patience_s * fps:
+            continue
+        near = any(_gap(track.position, older.position) < settings.same_place_m for older in kept)
+        crowded = track.crowded + 1 if near else 0
+        if crowded <= settings.same_place_s * fps:
+            kept.append(replace(track, crowded=crowded))
+    return tuple(kept)
+
+
+def _expected(candidate: Candidate, frame: int) -> np.ndarray:
+    last = candidate.rows[-1]
+    return last.position + candidate.velocity * (frame - last.frame)
+
+
+def _gap(a: np.ndarray, b: np.ndarray) -> float:
+    """Horizontal distance, metres."""
+    return float(np.hypot(*(a - b)[:2]))

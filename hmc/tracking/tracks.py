@@ -1,0 +1,151 @@
+"""From the rows of a tracker to the table of tracks, and what belongs to each person in a frame of that table."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+
+from hmc.results import TrackTable
+from hmc.tracking.blobs import Observation
+from hmc.tracking.lifecycle import Row
+from hmc.tracking.naive import NaiveInfo, NaiveSettings, NaiveState, assign_voxels, finish, init, step
+
+__all__ = ["fill_gaps", "from_rows", "person_voxels", "run", "velocities"]
+
+
+def run(
+    observations: Iterable[tuple[int, Observation | None]], fps: float, settings: NaiveSettings | None = None, gap_s: float = 1.0
+) -> TrackTable:
+    """Follow everybody through a recording with the naive tracker.
+
+    Parameters
+    ----------
+    observations : iterable of (int, Observation or None)
+        Frame number and what was seen (`hmc.tracking.blobs.observe`); None where the frame tells nothing.
+    fps : float
+    settings : NaiveSettings, optional
+    gap_s : float
+        Gaps of a track up to this long are filled in.
+
+    Returns
+    -------
+    TrackTable
+        With heads; persons numbered from 0 in the order in which they were first seen.
+    """
+    state, rows, n_frames = init(fps), [], 0
+    for state, info in steps(state, observations, settings):
+        rows += info.rows
+        n_frames += 1
+    rows += finish(state, n_frames, settings)
+    return renumber(fill_gaps(from_rows(rows), round(gap_s * fps)))
+
+
+def steps(
+    state: NaiveState, observations: Iterable[tuple[int, Observation | None]], settings: NaiveSettings | None = None
+) -> Iterator[tuple[NaiveState, NaiveInfo]]:
+    """The naive tracker's states and infos, a frame at a time."""
+    for frame, observation in observations:
+        state, info = step(state, frame, observation, settings)
+        yield state, info
+
+
+def from_rows(rows: Iterable[Row]) -> TrackTable:
+    """The table of these rows, sorted by frame, then person."""
+    rows = sorted(rows, key=lambda row: (row.frame, row.person))
+    return TrackTable(
+        np.array([row.frame for row in rows], int),
+        np.array([row.person for row in rows], int),
+        np.array([row.position for row in rows], float).reshape(-1, 3),
+        np.array([row.head for row in rows], float).reshape(-1, 3),
+    )
+
+
+def fill_gaps(table: TrackTable, longest: int) -> TrackTable:
+    """Fill gaps of at most `longest` frames in each person's track, on a straight line.
+
+    Parameters
+    ----------
+    table : TrackTable
+    longest : int
+        Frames.
+
+    Returns
+    -------
+    TrackTable
+        Sorted by frame, then person.
+    """
+    values = table.positions if table.heads is None else np.hstack([table.positions, table.heads])
+    frames, persons, filled = [table.frames], [table.persons], [values]
+    for person in np.unique(table.persons):
+        rows = np.flatnonzero(table.persons == person)
+        rows = rows[np.argsort(table.frames[rows])]
+        known = table.frames[rows]
+        for before, after in zip(rows[:-1], rows[1:], strict=True):
+            a, b = table.frames[before], table.frames[after]
+            if 1 < b - a <= longest + 1:
+                frames.append(np.arange(a + 1, b))
+                persons.append(np.full(b - a - 1, person))
+                filled.append(np.stack([np.interp(frames[-1], known, column) for column in values[rows].T], axis=1))
+    frame, number, value = np.concatenate(frames), np.concatenate(persons), np.concatenate(filled)
+    order = np.lexsort([number, frame])
+    heads = None if table.heads is None else value[order, 3:]
+    return TrackTable(frame[order], number[order], value[order, :3], heads)
+
+
+def renumber(table: TrackTable) -> TrackTable:
+    """Persons numbered from 0 in the order in which they appear."""
+    numbers, first = np.unique(table.persons, return_index=True)
+    new = np.empty(len(numbers), int)
+    new[np.argsort(table.frames[first], kind="stable")] = np.arange(len(numbers))
+    persons = new[np.searchsorted(numbers, table.persons)]
+    order = np.lexsort([persons, table.frames])
+    heads = None if table.heads is None else table.heads[order]
+    return TrackTable(table.frames[order], persons[order], table.positions[order], heads)
+
+
+def velocities(table: TrackTable, fps: float, window_s: float = 0.4) -> np.ndarray:
+    """Smooth velocity of each row's person: the slope of a line through the positions within half a window to either side.
+
+    Parameters
+    ----------
+    table : TrackTable
+    fps : float
+    window_s : float
+        Length of the window, seconds.
+
+    Returns
+    -------
+    ndarray, shape (n, 3)
+        Metres a second; zero for a person seen in one frame only.
+    """
+    result = np.zeros((len(table.frames), 3))
+    half = max(1.0, window_s * fps / 2)
+    for person in np.unique(table.persons):
+        rows = np.flatnonzero(table.persons == person)
+        frames = table.frames[rows].astype(float)
+        for row, frame in zip(rows, frames, strict=True):
+            near = np.abs(frames - frame) <= half
+            if near.sum() > 1:
+                t = frames[near] - frames[near].mean()
+                result[row] = t @ table.positions[rows[near]] / (t @ t) * fps
+    return result
+
+
+def person_voxels(observation: Observation, positions: np.ndarray, settings: NaiveSettings | None = None) -> list[np.ndarray]:
+    """The occupied voxels of each person in a frame.
+
+    Parameters
+    ----------
+    observation : Observation
+    positions : ndarray, shape (k, 3)
+        The persons' centroids in this frame, as in the table of tracks.
+    settings : NaiveSettings, optional
+
+    Returns
+    -------
+    list of ndarray of int, shape (n_k, 3)
+        Indices into the grid, one array a position.
+    """
+    owners, _ = assign_voxels(observation, np.asarray(positions, float).reshape(-1, 3), settings)
+    return [observation.indices[owners == k] for k in range(len(positions))]
