@@ -133,13 +133,15 @@ def clear_mot_distances(
     objects, estimates = truth_ids[truth_rows].tolist(), ids[rows].tolist()
     ends = np.flatnonzero(np.diff(truth_frames[truth_rows])) + 1
     for first, last in zip([0, *ends.tolist()], [*ends.tolist(), len(values)], strict=True):
-        used_objects, used_estimates = set(), set()
+        used: dict[int, int] = {}  # estimate to the object that keeps it
         for k in range(first, last):
-            if remembered.get(objects[k]) == estimates[k] and estimates[k] not in used_estimates:
+            if remembered.get(objects[k]) == estimates[k] and estimates[k] not in used:
                 kept.append(k)
-                used_objects.add(objects[k])
-                used_estimates.add(estimates[k])
-        free = [k for k in range(first, last) if objects[k] not in used_objects and estimates[k] not in used_estimates]
+                used[estimates[k]] = objects[k]
+        if len(used) == last - first:
+            continue  # every pair of this frame is kept
+        taken = set(used.values())
+        free = [k for k in range(first, last) if objects[k] not in taken and estimates[k] not in used]
         for k in _assign(free, objects, estimates, values):
             mismatches += remembered.get(objects[k], estimates[k]) != estimates[k]
             remembered[objects[k]] = estimates[k]
