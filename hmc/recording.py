@@ -33,7 +33,7 @@ MAX_CAMERA_DISTANCE_M = 150.0
 LOSSY_SUFFIXES = frozenset({".jpg", ".jpeg", ".webp"})
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Frame:
     """One moment of a recording, one entry a camera; None where that camera has no image.
 
@@ -46,7 +46,7 @@ class Frame:
     silhouettes: tuple[np.ndarray | None, ...] | None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Recording:
     """A recording that has been opened and checked; `iterate_frames` reads it.
 

@@ -20,7 +20,7 @@ __all__ = ["Camera", "Rig", "backproject", "look_at", "project", "undistort"]
 NEAR_M = 1e-6
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Camera:
     """One calibrated camera.
 
@@ -102,7 +102,8 @@ class Camera:
 
         A strong negative k1 folds far-away rays back into the image; points beyond this radius are never in view.
         """
-        k1, k2, _, _, k3 = self.distortions
+        # What is too small to matter anywhere in an image would only upset the solver.
+        k1, k2, _, _, k3 = np.where(np.abs(self.distortions) < 1e-9, 0.0, self.distortions)
         roots = np.roots([7 * k3, 5 * k2, 3 * k1, 1.0])  # of d/dr (r + k1 r^3 + k2 r^5 + k3 r^7), in r^2
         real = roots[np.abs(roots.imag) < 1e-9].real if roots.size else roots
         real = real[real > 0]
@@ -124,7 +125,7 @@ class Camera:
         return replace(self, size=(max(1, round(width * factor)), max(1, round(height * factor))), matrix=matrix)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Rig:
     """Calibrated cameras that look at one room, in order. Behaves as a sequence of `Camera`."""
 
