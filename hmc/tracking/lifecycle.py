@@ -244,7 +244,9 @@ def confirm(
         Their positions from the first frame in which each was seen.
     """
     needed = max(settings.confirm_frames, round(settings.confirm_s * fps))
-    left, tracks, rows = [], [], []
+    left: list[Candidate] = []
+    tracks: list[Track] = []
+    rows: list[Row] = []
     for candidate in candidates:
         if len(candidate.rows) < needed:
             left.append(candidate)

@@ -15,8 +15,17 @@ import numpy as np
 from hmc.errors import InputError
 from hmc.tracking.blobs import Blobs, Observation, blob_features
 from hmc.tracking.lifecycle import (
-    Candidate, LifecycleSettings, Row, Track, confirm, delete, looks_like_person, propose, still_a_person, unowned_blobs,
-)  # fmt: skip
+    Candidate,
+    LifecycleSettings,
+    Row,
+    Track,
+    confirm,
+    delete,
+    looks_like_person,
+    propose,
+    still_a_person,
+    unowned_blobs,
+)
 from hmc.tracking.region import person_radii, region_distance
 
 __all__ = ["NaiveInfo", "NaiveSettings", "NaiveState", "assign_voxels", "finish", "head_centre", "init", "step"]

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
+from itertools import pairwise
 
 import numpy as np
 
 from hmc.results import TrackTable
 from hmc.tracking.blobs import Observation
 from hmc.tracking.lifecycle import Row
-from hmc.tracking.naive import NaiveInfo, NaiveSettings, NaiveState, assign_voxels, finish, init, step
+from hmc.tracking.naive import NaiveSettings, assign_voxels, finish, init, step
 
 __all__ = ["fill_gaps", "from_rows", "person_voxels", "run", "velocities"]
 
@@ -33,21 +34,14 @@ def run(
     TrackTable
         With heads; persons numbered from 0 in the order in which they were first seen.
     """
-    state, rows, n_frames = init(fps), [], 0
-    for state, info in steps(state, observations, settings):
+    state, n_frames = init(fps), 0
+    rows: list[Row] = []
+    for frame, observation in observations:
+        state, info = step(state, frame, observation, settings)
         rows += info.rows
         n_frames += 1
     rows += finish(state, n_frames, settings)
     return renumber(fill_gaps(from_rows(rows), round(gap_s * fps)))
-
-
-def steps(
-    state: NaiveState, observations: Iterable[tuple[int, Observation | None]], settings: NaiveSettings | None = None
-) -> Iterator[tuple[NaiveState, NaiveInfo]]:
-    """The naive tracker's states and infos, a frame at a time."""
-    for frame, observation in observations:
-        state, info = step(state, frame, observation, settings)
-        yield state, info
 
 
 def from_rows(rows: Iterable[Row]) -> TrackTable:
@@ -81,7 +75,7 @@ def fill_gaps(table: TrackTable, longest: int) -> TrackTable:
         rows = np.flatnonzero(table.persons == person)
         rows = rows[np.argsort(table.frames[rows])]
         known = table.frames[rows]
-        for before, after in zip(rows[:-1], rows[1:], strict=True):
+        for before, after in pairwise(rows):
             a, b = table.frames[before], table.frames[after]
             if 1 < b - a <= longest + 1:
                 frames.append(np.arange(a + 1, b))
