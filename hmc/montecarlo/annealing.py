@@ -16,6 +16,8 @@ __all__ = ["BetaInfo", "find_beta", "temper"]
 TOLERANCE = 1e-6
 #: Most cuts of the bracket; some ten suffice, and each but the first few at least halves it in the end.
 MOST_CUTS = 200
+#: The bracket goes no farther than this; the exponential of it is still finite.
+FARTHEST = 700.0
 #: Differences of log likelihood below this are no differences: their scale could not be inverted.
 SMALLEST_RANGE = 1e-200
 
@@ -93,7 +95,7 @@ def find_beta(log_likelihood: np.ndarray, target_survival: float) -> tuple[float
         return 0.0, BetaInfo("few", possible.size / n, 0)
 
     possible /= scale
-    best = possible == 0
+    best = possible > -SMALLEST_RANGE
     if np.count_nonzero(best) >= target_survival * n:
         vanishing = 40 / -possible[~best].max()  # all others at e^-40 of the best or less
         return _rescale(vanishing, scale), BetaInfo("ties", float(np.count_nonzero(best) / n), 0)
@@ -122,22 +124,22 @@ def _regula_falsi(function: Callable[[float], float], start: float) -> tuple[flo
     low = high = start
     at_low = at_high = function(start)
     evaluations, step = 1, 1.0
-    while at_low < 0 or at_high > 0:
-        if at_low < 0:
-            high, at_high = low, at_low
-            low -= step
-            at_low = function(low)
-        else:
-            low, at_low = high, at_high
-            high += step
-            at_high = function(high)
+    while at_low < 0 and low > -FARTHEST:
+        high, at_high = low, at_low
+        low = max(low - step, -FARTHEST)
+        at_low = function(low)
+        evaluations, step = evaluations + 1, 2 * step
+    while at_high > 0 and high < FARTHEST:
+        low, at_low = high, at_high
+        high = min(high + step, FARTHEST)
+        at_high = function(high)
         evaluations, step = evaluations + 1, 2 * step
 
     kept = 0
     middle = start
     for _ in range(MOST_CUTS):
         if at_low == at_high:
-            return low, evaluations  # both zero
+            return low, evaluations  # both zero, to rounding
         middle = (low * at_high - high * at_low) / (at_high - at_low)
         at_middle = function(middle)
         evaluations += 1

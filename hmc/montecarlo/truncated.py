@@ -48,21 +48,19 @@ def truncated_normal(
     if not np.all(np.isfinite(mean)):
         raise ValueError("`mean` must be finite")
     shape = np.broadcast_shapes(mean.shape, sd.shape, low.shape, high.shape)
-    draws = rng.standard_normal(shape)
-    draws *= sd
-    draws += mean
-    outside = np.nonzero((draws < low) | (draws > high))
-    if outside[0].size == 0:
+    draws = np.asarray(rng.standard_normal(shape) * sd + mean)
+    outside = np.flatnonzero((draws < low) | (draws > high))
+    if outside.size == 0:
         return draws
 
-    mean, sd, low, high = (np.broadcast_to(value, shape)[outside] for value in (mean, sd, low, high))
+    mean, sd, low, high = (np.broadcast_to(value, shape).ravel()[outside] for value in (mean, sd, low, high))
     redrawn = np.empty(mean.shape)
     left = np.arange(mean.size)
     for _ in range(REJECTION_ROUNDS):
         redrawn[left] = mean[left] + sd[left] * rng.standard_normal(left.size)
         left = left[(redrawn[left] < low[left]) | (redrawn[left] > high[left])]
     redrawn[left] = _through_inverse(rng, mean[left], sd[left], low[left], high[left])
-    draws[outside] = redrawn
+    draws.ravel()[outside] = redrawn
     return draws
 
 
