@@ -10,6 +10,7 @@ import csv
 import platform
 import tomllib
 import zipfile
+import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
@@ -58,10 +59,13 @@ class PoseTable:
     def __post_init__(self) -> None:
         _set_rows(self, positions=(len(LANDMARKS), 3))
 
+    def where(self, chosen: np.ndarray) -> PoseTable:
+        """The chosen rows: a mask, shape (n,), or row numbers."""
+        return PoseTable(self.frames[chosen], self.persons[chosen], self.positions[chosen])
+
     def of(self, person: int) -> PoseTable:
         """The rows of one person."""
-        rows = self.persons == person
-        return PoseTable(self.frames[rows], self.persons[rows], self.positions[rows])
+        return self.where(self.persons == person)
 
 
 @dataclass(frozen=True)
@@ -92,6 +96,15 @@ class TrackTable:
 
     def __post_init__(self) -> None:
         _set_rows(self, positions=(3,), **({} if self.heads is None else {"heads": (3,)}))
+
+    def where(self, chosen: np.ndarray) -> TrackTable:
+        """The chosen rows: a mask, shape (n,), or row numbers."""
+        heads = None if self.heads is None else self.heads[chosen]
+        return TrackTable(self.frames[chosen], self.persons[chosen], self.positions[chosen], heads)
+
+    def of(self, person: int) -> TrackTable:
+        """The rows of one person."""
+        return self.where(self.persons == person)
 
 
 @dataclass(frozen=True)
@@ -306,7 +319,7 @@ def read_pose(path: str | Path) -> PoseStates:
         When the file is missing, damaged, or not such a file.
     """
     try:
-        with np.load(path, allow_pickle=False) as data:
+        with open(path, "rb") as file, np.load(file, allow_pickle=False) as data:
             bodies: dict[int, dict[str, np.ndarray]] = {}
             for key in data.files:
                 if key.startswith("body/"):
@@ -316,7 +329,7 @@ def read_pose(path: str | Path) -> PoseStates:
             return PoseStates(data["frames"], data["persons"], data["states"], names, bodies)
     except OSError as error:
         raise InputError(f"{path}: cannot read the poses ({error.strerror or error})") from error
-    except (ValueError, KeyError, EOFError, TypeError, AttributeError, zipfile.BadZipFile) as error:
+    except (ValueError, KeyError, EOFError, TypeError, AttributeError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
         raise InputError(f"{path}: not a pose file of this program ({error})") from error
 
 

@@ -106,7 +106,7 @@ def clear_mot_distances(
     ----------
     truth_frames, truth_ids : ndarray of int, shape (n,)
     frames, ids : ndarray of int, shape (m,)
-        The estimate. Rows need no order by frame; within a frame, the truth's order decides which object keeps an estimate that two remember.
+        The estimate. Rows need no order by frame; within a frame, the first in the truth keeps an estimate that two objects remember.
     distance : callable
         Called once with (k,) rows of truth and (k,) rows of estimate, all pairs of equal frame; returns their (k,) distances, NaN for a
         pair that may not match.
