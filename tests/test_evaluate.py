@@ -28,7 +28,7 @@ def truth() -> PoseTable:
 
 def centroids(poses: PoseTable) -> TrackTable:
     points = poses.positions.mean(axis=1)
-    return TrackTable(poses.frames, poses.persons, points, points + [0, 0, 0.7])
+    return TrackTable(poses.frames, poses.persons, points, points + np.array([0, 0, 0.7]))
 
 
 @pytest.fixture
@@ -42,13 +42,13 @@ def recording(tmp_path, truth):
 @pytest.fixture
 def result(tmp_path, truth):
     """Every landmark 30 mm off, the left wrist of the second person 80 mm; other person numbers."""
-    positions = truth.positions + [0.03, 0, 0]
+    positions = truth.positions + np.array([0.03, 0, 0])
     positions[truth.persons == 1, landmark_index("l_wrist"), 0] += 0.05
     folder = tmp_path / "result"
     names = np.array([7, 4])[truth.persons]
     write_joints(folder / "joints.csv", PoseTable(truth.frames, names, positions))
     tracks = centroids(truth)
-    write_tracks(folder / "tracks.csv", TrackTable(tracks.frames, names, tracks.positions + [0, 0.06, 0.4]))
+    write_tracks(folder / "tracks.csv", TrackTable(tracks.frames, names, tracks.positions + np.array([0, 0.06, 0.4])))
     return folder
 
 

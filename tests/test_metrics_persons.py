@@ -43,7 +43,7 @@ def test_the_assignment_has_the_greatest_worth_of_all():
     )
     worth = np.maximum(1 - error, 0).sum(axis=-1)
     best = max(itertools.permutations(range(3)), key=lambda order: sum(worth[i, order[i]] for i in range(3)))
-    assert {name: person for name, person in found.items()} == {best[i]: i for i in range(3) if worth[i, best[i]] > 0}
+    assert found == {best[i]: i for i in range(3) if worth[i, best[i]] > 0}
 
 
 def test_a_track_begun_anew_joins_its_person_and_a_double_does_not():
@@ -56,7 +56,7 @@ def test_a_track_begun_anew_joins_its_person_and_a_double_does_not():
 
 def test_who_is_far_away_matches_nobody():
     frames, persons, points = crowd(2)
-    assert match_persons(frames, persons, points, frames, persons, points + [0, 3.0, 0]) == {}
+    assert match_persons(frames, persons, points, frames, persons, points + np.array([0, 3.0, 0])) == {}
     nothing = np.zeros(0, int), np.zeros(0, int), np.zeros((0, 15, 3))
     assert match_persons(frames, persons, points, *nothing) == {}
     assert match_persons(*nothing, frames, persons, points) == {}

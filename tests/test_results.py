@@ -76,7 +76,7 @@ def test_a_landmark_without_a_row_is_missing(tmp_path):
 def test_tracks_come_back(tmp_path, heads):
     rng = np.random.default_rng(0)
     points = rng.normal(size=(4, 3))
-    table = TrackTable(np.array([1, 1, 2, 2]), np.array([0, 1, 0, 1]), points, points + [0, 0, 0.7] if heads else None)
+    table = TrackTable(np.array([1, 1, 2, 2]), np.array([0, 1, 0, 1]), points, points + np.array([0, 0, 0.7]) if heads else None)
     write_tracks(tmp_path / "tracks.csv", table.where(np.array([2, 0, 3, 1])))
     back = read_tracks(tmp_path / "tracks.csv")
     np.testing.assert_array_equal(back.persons, table.persons)

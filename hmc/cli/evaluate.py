@@ -115,8 +115,8 @@ def print_pose(poses, quiet: bool) -> None:
     """The table of landmarks over all persons, then a line a person."""
     summary = poses.summary
     print(
-        f"poses: {summary['true_persons']} true person{'' if len(poses.persons) == 1 else 's'}, {summary['person_frames']} person-frames, {summary['person_frames_estimated']} "
-        f"with an estimate ({summary['coverage']:.1%})"
+        f"poses: {summary['true_persons']} true person{'' if len(poses.persons) == 1 else 's'}, {summary['person_frames']} person-frames, "
+        f"{summary['person_frames_estimated']} with an estimate ({summary['coverage']:.1%})"
     )
     several = len(poses.persons) > 1
     whole = [row for row in poses.rows if row["person"] == "all" and (not quiet or row["landmark"] == "overall")]
