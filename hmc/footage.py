@@ -50,7 +50,7 @@ class Footage:
     notes: tuple[str, ...] = ()
 
 
-def find_footage(folder: Path, name: str, first_number: int | None = None) -> Footage | None:
+def find_footage(folder: Path, name: str, first_number: int | None = None, count: bool = True) -> Footage | None:
     """The footage of camera ``name`` in a folder: ``name.mp4`` (any common suffix), ``name/*.png`` or a single ``name.png``.
 
     Parameters
@@ -59,6 +59,8 @@ def find_footage(folder: Path, name: str, first_number: int | None = None) -> Fo
     name : str
     first_number : int, optional
         See `open_images`.
+    count : bool
+        See `open_video`.
 
     Returns
     -------
@@ -76,16 +78,22 @@ def find_footage(folder: Path, name: str, first_number: int | None = None) -> Fo
         return open_images(folder / name, first_number)
     for path in sorted(folder.iterdir()):
         if path.stem == name and path.suffix.lower() in VIDEO_SUFFIXES:
-            return open_video(path)
+            return open_video(path, count)
         if path.stem == name and path.suffix.lower() in IMAGE_SUFFIXES:
             return _footage_of_images(path, {0: path})
     return None
 
 
-def open_video(path: Path) -> Footage:
+def open_video(path: Path, count: bool = True) -> Footage:
     """Look a video over: size, rate and a frame count that can be believed.
 
     The header's count is taken when the last frame it promises is there and none follows; otherwise the frames are counted one by one.
+
+    Parameters
+    ----------
+    path : Path
+    count : bool
+        If False, believe the header, which is quicker.
 
     Raises
     ------
@@ -99,8 +107,8 @@ def open_video(path: Path) -> Footage:
             raise InputError(f"{path}: this video cannot be read (empty, cut off or of an unknown codec); copy or convert it again")
         stated = int(capture.get(cv2.CAP_PROP_FRAME_COUNT))
         fps = capture.get(cv2.CAP_PROP_FPS)
-        if stated == 1:
-            believed = not capture.grab()
+        if stated == 1 or not count:
+            believed = stated > 0 and (not count or not capture.grab())
         else:
             believed = stated > 1 and capture.set(cv2.CAP_PROP_POS_FRAMES, stated - 1) and capture.grab() and not capture.grab()
     finally:

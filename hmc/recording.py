@@ -171,7 +171,7 @@ def open_recording(path: str | Path, cameras: Sequence[str] | None = None, start
     background = []
     for camera in rig:
         try:
-            found = find_footage(path / "background", camera.name)
+            found = find_footage(path / "background", camera.name, count=False)
         except InputError as error:
             found = None
             problems.append(f"{error}; going on without this background")

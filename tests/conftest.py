@@ -3,9 +3,11 @@
 import os
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
+from hmc.camera.calibration import write_calibration
 from hmc.camera.model import Rig, look_at
 
 
@@ -35,3 +37,33 @@ def ring() -> Rig:
             for i, a in enumerate(angles)
         )
     )
+
+
+def write_video(path: Path, frames: int, size: tuple[int, int], level=lambda index: 40 + 5 * index, fps: float = 25) -> Path:
+    """A video whose frame ``index`` is grey of brightness ``level(index)``; Motion JPEG, so every frame can be read alone."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"MJPG"), fps, size)
+    for index in range(frames):
+        writer.write(np.full((size[1], size[0], 3), level(index), np.uint8))
+    writer.release()
+    return path
+
+
+def write_images(folder: Path, numbers, size: tuple[int, int], level=lambda index: 40 + 5 * index, name: str = "{:06d}.png") -> Path:
+    """Grey images, named by number."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for number in numbers:
+        cv2.imwrite(str(folder / name.format(number)), np.full((size[1], size[0], 3), level(number), np.uint8))
+    return folder
+
+
+@pytest.fixture
+def recording_folder(tmp_path, ring) -> Path:
+    """A good recording on disk: the ring's five cameras, 12 frames of video, 4 of the empty scene; frame i has brightness 40 + 5 i."""
+    folder = tmp_path / "take_1"
+    folder.mkdir()
+    write_calibration(folder / "calibration.toml", ring)
+    for camera in ring:
+        write_video(folder / "videos" / f"{camera.name}.avi", 12, camera.size)
+        write_video(folder / "background" / f"{camera.name}.avi", 4, camera.size, lambda index: 20)
+    return folder
