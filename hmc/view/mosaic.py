@@ -1,0 +1,313 @@
+"""One picture a frame: every camera's image with the people drawn in, and the room in 3-D, side by side."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+from hmc.camera.model import Camera
+from hmc.errors import InputError
+from hmc.frontend import HullStep, stream_hulls
+from hmc.landmarks import landmark_index
+from hmc.pose.body.joints import DOF_NAMES
+from hmc.pose.body.model import BodyModel
+from hmc.pose.body.proportions import make_body
+from hmc.recording import Frame, Recording, iterate_frames
+from hmc.results import PoseStates, PoseTable, TrackTable, read_joints, read_pose, read_tracks
+from hmc.view.overlay import LEFT, RIGHT, draw_label, draw_outline, draw_path, draw_sticks, draw_track, person_colour
+from hmc.view.scene import BACKGROUND, draw_floor, draw_rig, draw_voxels, viewpoint
+from hmc.voxels.grid import VoxelGrid
+
+__all__ = ["Layout", "Person", "Result", "make_layout", "people_in", "read_result", "render", "stream_mosaics"]
+
+#: Largest picture, (width, height) in pixels.
+MAX_SIZE = (1920, 1080)
+#: How far around the people the 3-D panel looks, metres.
+PANEL_MARGIN_M = 0.2
+PANEL_HEIGHT_M = 1.9
+#: Frames on either side over which the panel's movement is smoothed.
+FOLLOW_FRAMES = 20
+#: Frames of a person's way that the 3-D panel shows on the floor.
+TRAIL_FRAMES = 60
+
+
+@dataclass(frozen=True)
+class Person:
+    """What is known of a person in one frame; None where it is not."""
+
+    number: int
+    landmarks: np.ndarray | None = None
+    position: np.ndarray | None = None
+    state: np.ndarray | None = None
+    body: BodyModel | None = None
+
+
+@dataclass(frozen=True)
+class Result:
+    """A result as far as it was written: poses, tracks, state vectors with the persons' bodies."""
+
+    poses: PoseTable | None = None
+    tracks: TrackTable | None = None
+    states: PoseStates | None = None
+    bodies: Mapping[int, BodyModel] | None = None
+
+    @property
+    def frames(self) -> np.ndarray:
+        """Frame numbers in which there is anybody, in order."""
+        return np.unique(np.concatenate([table.frames for table in (self.poses, self.tracks) if table is not None]))
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where the pictures go: cells of one size, row by row, the panel in what is left of the last row."""
+
+    columns: int
+    rows: int
+    cell: tuple[int, int]
+    panel: tuple[int, int, int, int]
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of the whole, even numbers, as video wants them."""
+        width, height = self.columns * self.cell[0], self.rows * self.cell[1]
+        return width + width % 2, height + height % 2
+
+
+def read_result(directory: str | Path) -> Result:
+    """Read what there is of `joints.csv`, `tracks.csv` and `pose.npz`.
+
+    Raises
+    ------
+    InputError
+        When there is neither of the tables.
+    """
+    directory = Path(directory)
+    poses = read_joints(directory / "joints.csv") if (directory / "joints.csv").exists() else None
+    tracks = read_tracks(directory / "tracks.csv") if (directory / "tracks.csv").exists() else None
+    if poses is None and tracks is None:
+        raise InputError(f"{directory}: neither joints.csv nor tracks.csv; give the folder that `hmc pose` or `hmc track` wrote")
+    states = read_pose(directory / "pose.npz") if (directory / "pose.npz").exists() else None
+    if states is None or states.dof_names != tuple(DOF_NAMES):
+        return Result(poses, tracks)
+    bodies = {person: make_body({name: float(value) for name, value in body.items()}) for person, body in states.bodies.items()}
+    return Result(poses, tracks, states, bodies)
+
+
+def people_in(result: Result, frame: int) -> list[Person]:
+    """Everybody in a frame, by number."""
+    poses, tracks, states = (
+        {} if table is None else {int(table.persons[row]): row for row in np.flatnonzero(table.frames == frame)}
+        for table in (result.poses, result.tracks, result.states)
+    )
+    return [
+        Person(
+            number=number,
+            landmarks=result.poses.positions[poses[number]] if result.poses is not None and number in poses else None,
+            position=result.tracks.positions[tracks[number]] if result.tracks is not None and number in tracks else None,
+            state=result.states.states[states[number]] if result.states is not None and number in states else None,
+            body=(result.bodies or {}).get(number),
+        )
+        for number in sorted(set(poses) | set(tracks))
+    ]
+
+
+def make_layout(sizes: Iterable[tuple[int, int]], max_size: tuple[int, int] = MAX_SIZE) -> Layout:
+    """The grid in which cameras of given (width, height) and a panel come out largest."""
+    sizes = list(sizes)
+    width, height = max(w for w, _ in sizes), max(h for _, h in sizes)
+    n = len(sizes)
+
+    def scale(columns: int) -> float:
+        return min(1.0, max_size[0] / (columns * width), max_size[1] / (math.ceil((n + 1) / columns) * height))
+
+    columns = max(range(1, n + 2), key=lambda count: (round(scale(count), 6), -count * math.ceil((n + 1) / count)))
+    rows = math.ceil((n + 1) / columns)
+    cell = int(width * scale(columns)), int(height * scale(columns))
+    left, top = n % columns * cell[0], n // columns * cell[1]
+    return Layout(columns, rows, cell, (left, top, columns * cell[0] - left, rows * cell[1] - top))
+
+
+def render(
+    layout: Layout,
+    recording: Recording,
+    frame: Frame | HullStep,
+    people: list[Person],
+    panel: np.ndarray,
+    panel_camera: Camera,
+    outlines: bool = True,
+) -> np.ndarray:
+    """Draw one mosaic.
+
+    Parameters
+    ----------
+    layout : Layout
+    recording : Recording
+    frame : Frame or HullStep
+        Its images.
+    people : list of Person
+    panel : ndarray, shape (h, w, 3), uint8
+        The 3-D panel without people; they are drawn into a copy.
+    panel_camera : Camera
+        The panel's viewpoint.
+    outlines : bool
+        Draw the flesh too, where it is known.
+
+    Returns
+    -------
+    ndarray, shape (height, width, 3), uint8
+    """
+    width, height = layout.size
+    out = np.full((height, width, 3), BACKGROUND, np.uint8)
+    cell_width, cell_height = layout.cell
+    silhouettes = getattr(frame, "silhouettes", None) or getattr(frame, "masks", None) or (None,) * len(recording.rig)
+    for k, (camera, image, mask) in enumerate(zip(recording.rig, frame.images, silhouettes, strict=True)):
+        row, column = divmod(k, layout.columns)
+        factor = min(cell_width / camera.size[0], cell_height / camera.size[1])
+        small = camera.scaled(factor)
+        if image is None and mask is not None and not recording.has_images:
+            image = np.repeat(mask[..., None].astype(np.uint8) * 110, 3, axis=2)
+        known = image is not None
+        picture = (
+            cv2.resize(image, small.size, interpolation=cv2.INTER_AREA)
+            if image is not None
+            else np.full((*small.size[::-1], 3), 60, np.uint8)
+        )
+        draw_people(picture, small, people if known else [], outlines)
+        draw_label(picture, camera.name if known else f"{camera.name}: no image", (8, 18))
+        y, x = row * cell_height + (cell_height - small.size[1]) // 2, column * cell_width + (cell_width - small.size[0]) // 2
+        out[y : y + small.size[1], x : x + small.size[0]] = picture[: height - y, : width - x]
+    panel = panel.copy()
+    draw_people(panel, panel_camera, people, outlines=False)
+    draw_label(panel, f"{recording.name}, frame {frame.index}, {frame.index / recording.fps:.2f} s", (8, 18))
+    draw_label(panel, "left", (8, panel.shape[0] - 10), LEFT)
+    draw_label(panel, "right", (44, panel.shape[0] - 10), RIGHT)
+    left, top = layout.panel[:2]
+    out[top : top + panel.shape[0], left : left + panel.shape[1]] = panel
+    return out
+
+
+def draw_people(image: np.ndarray, camera: Camera, people: list[Person], outlines: bool) -> None:
+    """Draw everybody: outlines first, sticks over them; who has no pose as a mark on the floor."""
+    width = max(1.5, min(camera.size) / 160)
+    for person in people:
+        if outlines and person.body is not None and person.state is not None:
+            draw_outline(image, camera, person.body, person.state, person.number)
+    for person in people:
+        if person.landmarks is not None:
+            draw_sticks(image, camera, person.landmarks, person.number, width)
+        elif person.position is not None:
+            draw_track(image, camera, person.position, person.number, width)
+    for person in people:
+        _draw_number(image, camera, person)
+
+
+def stream_mosaics(
+    recording: Recording,
+    result: Result,
+    *,
+    first: int | None = None,
+    last: int | None = None,
+    voxel_size_m: float | None = 0.04,
+    outlines: bool = True,
+    on_problem: Callable[[str], None] | None = None,
+) -> Iterator[tuple[int, np.ndarray]]:
+    """A mosaic of every selected frame, in order; memory does not grow with their number.
+
+    Parameters
+    ----------
+    recording : Recording
+    result : Result
+    first, last : int, optional
+        Absolute frame numbers; `last` is not included.
+    voxel_size_m : float, optional
+        Of the voxels in the panel; None draws none, and then nothing is segmented.
+    outlines : bool
+        Draw the flesh too, where it is known.
+    on_problem : callable, optional
+        Called with one line for everything that was survived.
+
+    Yields
+    ------
+    frame : int
+    mosaic : ndarray, shape (height, width, 3), uint8
+    """
+    layout = make_layout(camera.size for camera in recording.rig)
+    frames: Iterator[Frame | HullStep]
+    if voxel_size_m is None:
+        grid = None
+        frames = iterate_frames(recording, first, last, on_problem)
+    else:
+        grid = VoxelGrid.from_room(recording.room, voxel_size_m, len(recording.rig))
+        frames = stream_hulls(recording, grid, first=first, last=last, on_problem=on_problem)
+    bounds_of = follow(result, recording.room)
+    for frame in frames:
+        camera = viewpoint(bounds_of(frame.index), layout.panel[2:])
+        panel = np.full((*camera.size[::-1], 3), BACKGROUND, np.uint8)
+        draw_floor(panel, camera, recording.room)
+        draw_rig(panel, camera, recording.rig)
+        draw_trails(panel, camera, result, frame.index)
+        if grid is not None and isinstance(frame, HullStep):
+            draw_voxels(panel, camera, grid, frame.strict)
+        yield frame.index, render(layout, recording, frame, people_in(result, frame.index), panel, camera, outlines)
+
+
+def follow(result: Result, room: np.ndarray) -> Callable[[int], np.ndarray]:
+    """A box that goes along with the people, of one size for the whole result, so that the panel neither jumps nor zooms.
+
+    Returns
+    -------
+    callable
+        Frame number to the box, shape (2, 3), metres; the whole room where there is nobody at all.
+    """
+    tables = [table for table in (result.poses, result.tracks) if table is not None]
+    frames = np.concatenate([np.repeat(table.frames, table.positions[0].size // 3 if len(table.frames) else 1) for table in tables])
+    points = np.concatenate([table.positions.reshape(-1, 3) for table in tables])
+    known = ~np.isnan(points).any(axis=1)
+    frames, points = frames[known], points[known, :2]
+    if not len(frames):
+        return lambda frame: room
+    numbers, place = np.unique(frames, return_inverse=True)
+    low, high = np.full((len(numbers), 2), np.inf), np.full((len(numbers), 2), -np.inf)
+    np.minimum.at(low, place, points)
+    np.maximum.at(high, place, points)
+    smooth = uniform_filter1d((low + high) / 2, 2 * FOLLOW_FRAMES + 1, axis=0, mode="nearest")
+    reach = np.maximum(high - smooth, smooth - low).max() + PANEL_MARGIN_M
+
+    def bounds(frame: int) -> np.ndarray:
+        centre = np.array([np.interp(frame, numbers, smooth[:, k]) for k in (0, 1)])
+        return np.array([[*(centre - reach), 0.0], [*(centre + reach), PANEL_HEIGHT_M]])
+
+    return bounds
+
+
+def draw_trails(image: np.ndarray, camera: Camera, result: Result, frame: int) -> None:
+    """Draw everybody's way through the last frames on the floor."""
+    table = result.tracks
+    if table is None and result.poses is not None:
+        table = TrackTable(result.poses.frames, result.poses.persons, result.poses.positions[:, landmark_index("pelvis")])
+    if table is None:
+        return
+    recent = table.where((table.frames <= frame) & (table.frames > frame - TRAIL_FRAMES))
+    for number in np.unique(recent.persons):
+        way = recent.of(number).positions * np.array([1, 1, 0])
+        draw_path(image, camera, way[~np.isnan(way).any(axis=1)], person_colour(int(number)), 1)
+
+
+def _draw_number(image: np.ndarray, camera: Camera, person: Person) -> None:
+    from hmc.camera.model import project
+
+    if person.landmarks is not None and not np.isnan(person.landmarks[landmark_index("head_top")]).any():
+        top = person.landmarks[landmark_index("head_top")] + np.array([0, 0, 0.08])
+    elif person.position is not None:
+        top = np.array([person.position[0], person.position[1], 1.8])
+    else:
+        return
+    uv, valid = project(camera, top)
+    if valid and (np.abs(uv) < 10_000).all():
+        draw_label(image, str(person.number), uv + np.array([4, -2]), person_colour(person.number), 0.5)

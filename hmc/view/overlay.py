@@ -1,0 +1,152 @@
+"""Drawing people into an image: stick figures, outlines of the flesh, tracks, labels. Every function draws into the image it is given.
+
+Left limbs are orange and right limbs blue, whoever's they are; trunk, head, outline and label have the person's colour. Colours are BGR.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+
+from hmc.camera.model import Camera, project
+from hmc.landmarks import BONES, landmark_index
+from hmc.pose.body.flesh import place_points, surface_samples
+from hmc.pose.body.kinematics import segment_transforms
+from hmc.pose.body.model import BodyModel
+
+__all__ = ["LEFT", "RIGHT", "draw_label", "draw_outline", "draw_path", "draw_sticks", "draw_track", "person_colour"]
+
+Colour = tuple[int, int, int]
+
+LEFT: Colour = (40, 140, 255)
+RIGHT: Colour = (255, 160, 60)
+PERSONS: tuple[Colour, ...] = ((120, 230, 110), (220, 110, 235), (70, 225, 250), (225, 225, 90), (150, 150, 255), (200, 200, 200))
+DARK: Colour = (25, 22, 20)
+
+#: Sub-pixel bits of OpenCV's drawing functions.
+SHIFT = 4
+#: Pieces into which a bone is cut, so that it bends as the lens bends it.
+PIECES = 8
+#: Points around each end of a cone.
+RING = 16
+#: Height and radius of the mark of a person of whom only the position is known, metres.
+TRACK_HEIGHT_M, TRACK_RADIUS_M = 1.7, 0.3
+
+
+def person_colour(person: int) -> Colour:
+    """The colour of a person's number; six of them, over and over."""
+    return PERSONS[person % len(PERSONS)]
+
+
+def draw_sticks(image: np.ndarray, camera: Camera, points: np.ndarray, person: int, width: float = 2.0) -> None:
+    """Draw a person's landmarks as a stick figure.
+
+    Parameters
+    ----------
+    image : ndarray, shape (h, w, 3), uint8
+        Drawn into; of the camera's size.
+    camera : Camera
+    points : ndarray, shape (15, 3)
+        Landmarks, world, metres; bones with a missing (NaN) end are left out.
+    person : int
+        Number that decides the colour.
+    width : float
+        Of a bone, pixels.
+    """
+    ends = np.array([[landmark_index(a), landmark_index(b)] for a, b in BONES])
+    t = np.linspace(0, 1, PIECES + 1)[:, None]
+    lines = points[ends[:, 0], None] * (1 - t) + points[ends[:, 1], None] * t
+    colours = [{"l_": LEFT, "r_": RIGHT}.get(b[:2], person_colour(person)) for _, b in BONES]
+    # Dark edges first, so that no edge covers a neighbour's colour.
+    for line in lines:
+        draw_path(image, camera, line, DARK, width + 2)
+    for line, colour in zip(lines, colours, strict=True):
+        draw_path(image, camera, line, colour, width)
+    uv, valid = project(camera, points)
+    for u, v in uv[valid & _near_image(uv, camera)]:
+        centre = round(u * 2**SHIFT), round(v * 2**SHIFT)
+        cv2.circle(image, centre, round((width * 0.5 + 1) * 2**SHIFT), DARK, -1, cv2.LINE_AA, SHIFT)
+        cv2.circle(image, centre, round((width * 0.5 + 0.25) * 2**SHIFT), (255, 255, 255), -1, cv2.LINE_AA, SHIFT)
+
+
+def draw_outline(image: np.ndarray, camera: Camera, body: BodyModel, state: np.ndarray, person: int, width: float = 1.0) -> None:
+    """Draw the outline of a body's flesh.
+
+    Parameters
+    ----------
+    image, camera, person, width
+        As for `draw_sticks`.
+    body : BodyModel
+    state : ndarray, shape (27,)
+    """
+    uv, valid = project(camera, cone_rings(body, state))
+    mask = np.zeros(image.shape[:2], np.uint8)
+    for ring, seen in zip(uv, valid & _near_image(uv, camera), strict=True):
+        if seen.all():
+            hull = cv2.convexHull(np.round(ring * 2**SHIFT).astype(np.int32))
+            cv2.fillConvexPoly(mask, hull, 255, cv2.LINE_8, SHIFT)
+    outlines, _ = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
+    cv2.polylines(image, outlines, True, DARK, round(width + 2), cv2.LINE_AA)
+    cv2.polylines(image, outlines, True, person_colour(person), max(1, round(width)), cv2.LINE_AA)
+
+
+def cone_rings(body: BodyModel, state: np.ndarray) -> np.ndarray:
+    """Points around both ends of every cone of the flesh: their convex hull in an image is the cone's silhouette.
+
+    Returns
+    -------
+    ndarray, shape (n_cones, 2 * RING, 3)
+        World, metres.
+    """
+    n = len(body.cones.segment)
+    along = np.tile(np.repeat([0.0, 1.0], RING), n)
+    angle = np.tile(np.arange(RING) * 2 * np.pi / RING, 2 * n)
+    samples = surface_samples(body, (np.repeat(np.arange(n), 2 * RING), along, angle))
+    return place_points(*segment_transforms(body, state), samples.points, samples.segment).reshape(n, 2 * RING, 3)
+
+
+def draw_track(image: np.ndarray, camera: Camera, position: np.ndarray, person: int, width: float = 2.0) -> None:
+    """Mark a person of whom only the position is known: a ring on the floor and an upright line.
+
+    Parameters
+    ----------
+    image, camera, person, width
+        As for `draw_sticks`.
+    position : ndarray, shape (3,)
+        Centroid, world, metres.
+    """
+    if np.isnan(position).any():
+        return
+    foot = np.array([position[0], position[1], 0.0])
+    turn = np.linspace(0, 2 * np.pi, 33)
+    ring = foot + TRACK_RADIUS_M * np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+    line = foot + np.linspace(0, TRACK_HEIGHT_M, 9)[:, None] * np.array([0, 0, 1.0])
+    for colour, extra in ((DARK, 2.0), (person_colour(person), 0.0)):
+        for path in (ring, line):
+            draw_path(image, camera, path, colour, width + extra)
+
+
+def draw_path(image: np.ndarray, camera: Camera, points: np.ndarray, colour: Colour, width: float) -> None:
+    """Draw a chain of world points, shape (n, 3); the parts of it that the camera cannot have in view are left out."""
+    uv, valid = project(camera, points)
+    seen = valid & _near_image(uv, camera)
+    pixels = np.round(np.where(seen[:, None], uv, 0) * 2**SHIFT).astype(np.int32)
+    pieces = np.split(pixels, np.flatnonzero(~seen))
+    chains = [piece if k == 0 and seen[:1].all() else piece[1:] for k, piece in enumerate(pieces)]
+    cv2.polylines(image, [chain for chain in chains if len(chain) > 1], False, colour, max(1, round(width)), cv2.LINE_AA, SHIFT)
+
+
+def draw_label(
+    image: np.ndarray, text: str, place: np.ndarray | Sequence[float], colour: Colour = (255, 255, 255), scale: float = 0.45
+) -> None:
+    """Write a line with a shadow; `place` is its lower left corner in pixels."""
+    x, y = round(float(place[0])), round(float(place[1]))
+    for corner, ink in (((x + 1, y + 1), DARK), ((x, y), colour)):
+        cv2.putText(image, text, corner, cv2.FONT_HERSHEY_SIMPLEX, scale, ink, 1, cv2.LINE_AA)
+
+
+def _near_image(uv: np.ndarray, camera: Camera) -> np.ndarray:
+    """Within three image widths of the image; what lies beyond is not worth drawing, and overflows OpenCV's integers."""
+    return (np.abs(uv) < 3 * max(camera.size)).all(axis=-1)
