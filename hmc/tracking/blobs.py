@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hmc.tracking.ghosts import Views
 from hmc.voxels.components import label_voxels
 from hmc.voxels.grid import VoxelGrid
 
@@ -78,6 +79,10 @@ class Observation:
         Connected component (26 neighbours) of each, from 0.
     blobs : Blobs
         Features of the components, in the order of their labels.
+    certain : ndarray of bool, shape (n,)
+        Voxels in which no camera is contradicted: those of the strict hull.
+    views : Views, optional
+        The silhouettes, by which ghosts are told from people.
     """
 
     voxel_size_m: float
@@ -85,15 +90,22 @@ class Observation:
     points: np.ndarray
     labels: np.ndarray
     blobs: Blobs
+    certain: np.ndarray
+    views: Views | None = None
 
 
-def observe(grid: VoxelGrid, occupied: np.ndarray) -> Observation:
+def observe(grid: VoxelGrid, occupied: np.ndarray, certain: np.ndarray | None = None, views: Views | None = None) -> Observation:
     """Components and features of one frame's occupied voxels.
 
     Parameters
     ----------
     grid : VoxelGrid
     occupied : ndarray of bool, shape (nx, ny, nz)
+        The hull; best the tolerant one, so that nobody is lost whom a camera does not see.
+    certain : ndarray of bool, shape (nx, ny, nz), optional
+        The strict hull, by which people are located where it has enough of them. All of `occupied` where left out.
+    views : Views, optional
+        The silhouettes and their cameras.
 
     Returns
     -------
@@ -102,7 +114,9 @@ def observe(grid: VoxelGrid, occupied: np.ndarray) -> Observation:
     indices, labels = label_voxels(occupied)
     points = grid.centres(indices)
     n_blobs = int(labels.max(initial=-1)) + 1
-    return Observation(grid.voxel_size_m, indices, points, labels, blob_features(points, labels, n_blobs, grid.voxel_size_m))
+    blobs = blob_features(points, labels, n_blobs, grid.voxel_size_m)
+    sure = np.ones(len(indices), bool) if certain is None else certain[tuple(indices.T)]
+    return Observation(grid.voxel_size_m, indices, points, labels, blobs, sure, views)
 
 
 def blob_features(points: np.ndarray, labels: np.ndarray, n_blobs: int, voxel_size_m: float) -> Blobs:

@@ -14,6 +14,7 @@ import numpy as np
 
 from hmc.errors import InputError
 from hmc.tracking.blobs import Blobs, Observation, blob_features
+from hmc.tracking.ghosts import real_people
 from hmc.tracking.lifecycle import (
     Candidate,
     LifecycleSettings,
@@ -49,6 +50,8 @@ class NaiveSettings:
         Nobody is faster.
     shared_gain : float
         Share of the measured correction that is believed while persons share one component.
+    least_certain_m3 : float
+        A person with so much of the strict hull is located by it; else by the tolerant one.
     lifecycle : LifecycleSettings
     """
 
@@ -59,6 +62,7 @@ class NaiveSettings:
     velocity_time_s: float = 0.3
     most_speed_m_s: float = 4.0
     shared_gain: float = 0.5
+    least_certain_m3: float = 0.03
     lifecycle: LifecycleSettings = field(default_factory=LifecycleSettings)
 
     def __post_init__(self) -> None:
@@ -150,21 +154,18 @@ def step(
     owners = _find_again(state.tracks, frame, state.fps, observation, owners, settings)
     owned = blob_features(observation.points, owners, len(predicted), observation.voxel_size_m)
     supported = still_a_person(owned, settings.lifecycle)
+    best = locating_voxels(observation, owners, len(predicted), settings)
+    located = blob_features(observation.points, np.where(best, owners, -1), len(predicted), observation.voxel_size_m)
     tracks, rows = [], []
     for k, track in enumerate(state.tracks):
         if supported[k]:
-            head = head_centre(observation.points[owners == k])
-            tracks.append(_update(track, frame, predicted[k], owned, k, head, bool(shared[k]), state.fps, settings))
-            rows.append(Row(frame, track.person, owned.centroid[k], head))
+            head = head_centre(observation.points[best & (owners == k)])
+            tracks.append(_update(track, frame, predicted[k], located, k, head, bool(shared[k]), state.fps, settings))
+            rows.append(Row(frame, track.person, located.centroid[k], head))
         else:
             tracks.append(replace(track, position=predicted[k], velocity=track.velocity * 0.8))
 
-    labels, blobs = unowned_blobs(observation, owners, settings.lifecycle)
-    seen = [
-        Row(frame, -1, blobs.centroid[b], head_centre(observation.points[labels == b]))
-        for b in np.flatnonzero(looks_like_person(blobs, settings.lifecycle))
-    ]
-    candidates = propose(state.candidates, seen, tuple(tracks), settings.lifecycle)
+    candidates = propose(state.candidates, _newcomers(observation, owners, frame, settings), tuple(tracks), settings.lifecycle)
     candidates, fresh, earlier = confirm(candidates, state.next_person, state.fps, settings.lifecycle)
     kept = delete((*tracks, *fresh), frame, state.fps, settings.lifecycle)
     numbers = np.array([*(track.person for track in state.tracks), -1])
@@ -236,6 +237,26 @@ def assign_voxels(observation: Observation, positions: np.ndarray, settings: Nai
     return owners, shared
 
 
+def locating_voxels(observation: Observation, owners: np.ndarray, n_persons: int, settings: NaiveSettings) -> np.ndarray:
+    """Voxels from which each person's position is taken: the certain ones, or all of a person who has too few of those.
+
+    Parameters
+    ----------
+    observation : Observation
+    owners : ndarray of int, shape (n,)
+        Person of each voxel, -1 for nobody.
+    n_persons : int
+    settings : NaiveSettings
+
+    Returns
+    -------
+    ndarray of bool, shape (n,)
+    """
+    held = np.bincount(owners[observation.certain & (owners >= 0)], minlength=n_persons) * observation.voxel_size_m**3
+    enough = np.append(held >= settings.least_certain_m3, False)
+    return np.where(enough[owners], observation.certain, owners >= 0)
+
+
 def head_centre(points: np.ndarray) -> np.ndarray:
     """Centre of a person's head: the voxels in the top 25 cm, near the axis on which the highest ones stand.
 
@@ -253,6 +274,21 @@ def head_centre(points: np.ndarray) -> np.ndarray:
     crown = points[points[:, 2] >= top - 0.1].mean(axis=0)
     near = (points[:, 2] >= top - 0.25) & (np.hypot(*(points - crown)[:, :2].T) <= 0.2)
     return points[near].mean(axis=0) if near.any() else crown
+
+
+def _newcomers(observation: Observation, owners: np.ndarray, frame: int, settings: NaiveSettings) -> list[Row]:
+    """Person-like sets of voxels that no track owns and that are no ghosts."""
+    labels, blobs = unowned_blobs(observation, owners, settings.lifecycle)
+    likely = np.flatnonzero(looks_like_person(blobs, settings.lifecycle))
+    if likely.size and observation.views is not None:
+        sets = [observation.points[labels == b] for b in likely]
+        likely = likely[real_people(observation.views, observation.points[owners >= 0], sets, observation.voxel_size_m)]
+    numbers = np.full(len(blobs) + 1, -1)
+    numbers[likely] = np.arange(likely.size)
+    newcomers = numbers[labels]
+    best = locating_voxels(observation, newcomers, likely.size, settings)
+    sets = [observation.points[best & (newcomers == j)] for j in range(likely.size)]
+    return [Row(frame, -1, points.mean(axis=0), head_centre(points)) for points in sets]
 
 
 def _predict(tracks: tuple[Track, ...], frame: int, fps: float) -> np.ndarray:
