@@ -1,0 +1,143 @@
+"""Walking and jogging: planted feet that roll from heel to toe, a pelvis that the legs carry, arms that swing against them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hmc.synthetic.motions import Feet, Motion, Upper, arms_by_angles, assemble, keyframes, pelvis_height
+from hmc.synthetic.skeleton import BONE_NAMES, Skeleton
+
+__all__ = ["jog", "walk"]
+
+
+def walk(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator, speed_m_s: float = 1.25, turn_radius_m: float = 0.0) -> Motion:
+    """Walk straight ahead, or on a circle.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    times : ndarray, shape (n,)
+        Seconds.
+    rng : Generator
+        Varies stride, swing and posture.
+    speed_m_s : float
+        0.4 to 2.2.
+    turn_radius_m : float
+        Radius of the circle, to the left if positive, to the right if negative; 0 walks straight.
+
+    Returns
+    -------
+    Motion
+        From the origin, facing X.
+    """
+    stride = skeleton.height_m * (0.52 + 0.24 * speed_m_s) * rng.normal(1, 0.02)
+    return _gait(skeleton, times, rng, speed_m_s, turn_radius_m, stride, stance=0.62, bounce=0.0)
+
+
+def jog(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator, speed_m_s: float = 2.2, turn_radius_m: float = 0.0) -> Motion:
+    """Jog, with a phase of flight; arguments as for `walk`."""
+    stride = skeleton.height_m * (0.50 + 0.30 * speed_m_s) * rng.normal(1, 0.02)
+    return _gait(skeleton, times, rng, speed_m_s, turn_radius_m, stride, stance=0.38, bounce=0.035)
+
+
+def _path(distance: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray]:
+    """Place (..., 2) and heading (...) after a distance along a line or circle that starts at the origin along X."""
+    if radius == 0:
+        return np.stack([distance, np.zeros_like(distance)], axis=-1), np.zeros_like(distance)
+    heading = distance / radius
+    return radius * np.stack([np.sin(heading), 1 - np.cos(heading)], axis=-1), heading
+
+
+def _gait(
+    skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator, speed: float, radius: float, stride: float, stance: float, bounce: float
+) -> Motion:
+    running = bounce > 0
+    cycles = times * speed / stride + rng.uniform(0, 1)  # of the left foot; the right is half a cycle later
+    origin = cycles[0] * stride
+    width = skeleton.height_m * (0.025 if running else 0.045)
+    feet = _feet(skeleton, cycles, stride, stance, width, radius, origin, running)
+    sway = np.sin(2 * np.pi * cycles)
+    twist = np.cos(2 * np.pi * cycles)
+    middle, heading = _path(cycles * stride - origin, radius)
+    left = np.stack([-np.sin(heading), np.cos(heading)], axis=-1)
+    middle = middle + 0.016 * sway[:, None] * left
+    zero = np.zeros_like(times)
+    lean = (0.12 if running else 0.03) + rng.normal(0, 0.015)
+    yaw_size = np.radians(rng.uniform(4, 6))
+    pelvis_yaw = heading - yaw_size * twist
+    fps = 1 / np.median(np.diff(times)) if len(times) > 1 else 25.0
+    if running:
+        # Lowest in the middle of each stance, highest in flight.
+        base = skeleton.hip_height - 0.055 * skeleton.height_m / 1.75
+        height = base - bounce * np.cos(4 * np.pi * (cycles - stance / 2))
+    else:
+        height = pelvis_height(skeleton, middle, pelvis_yaw, feet, slack=0.995, smooth=0.035 * fps) - 0.004
+        # Knees give way a little in the middle of stance, so that the pelvis rises less than straight legs would lift it.
+        height = height.min() + 0.55 * (height - height.min())
+    upper = Upper(
+        pelvis=np.stack([0.045 * sway, lean * 0.5 + zero, pelvis_yaw], axis=-1),
+        abdomen=np.stack([-0.03 * sway, lean * 0.5 + zero, yaw_size * twist], axis=-1),
+        chest=np.stack([-0.02 * sway, zero + 0.02, 1.1 * yaw_size * twist], axis=-1),
+        neck=np.stack([zero, zero + 0.05, -0.5 * yaw_size * twist], axis=-1),
+        head=np.stack([zero, zero - 0.05 - lean * 0.7, -0.5 * yaw_size * twist], axis=-1),
+    )
+    size = np.radians(rng.uniform(19, 26) * (1.5 if running else 0.6 + 0.35 * speed))
+    swing_left, swing_right = -size * np.cos(2 * np.pi * (cycles - 0.05)), size * np.cos(2 * np.pi * (cycles - 0.05))
+    swing = np.stack([swing_left, swing_right], axis=-1) + (-0.08 if running else 0.03)
+    bend = np.radians(85 if running else 14 + 6 * speed)
+    flex = bend + 0.35 * np.clip(swing, -0.5, 1.0)
+    out = np.full_like(swing, np.radians(rng.uniform(8, 12)))
+    root = np.column_stack([middle, height])
+    return assemble(skeleton, root, upper, feet, arms_by_angles(swing, flex, out))
+
+
+# Pitch of the foot over its cycle, degrees, toes up positive: heel strike, flat, heel off, toe off, swing.
+_WALK_PITCH = ((0.0, 18), (0.08, 3), (0.13, 0), (0.36, 0), (0.50, -18), (0.62, -58), (0.70, -48), (0.82, -5), (0.93, 18), (1.0, 18))
+_RUN_PITCH = ((0.0, 6), (0.05, 0), (0.16, 0), (0.28, -20), (0.38, -60), (0.52, -80), (0.75, -20), (0.92, 6), (1.0, 6))
+
+
+def _feet(
+    skeleton: Skeleton, cycles: np.ndarray, stride: float, stance: float, width: float, radius: float, origin: float, running: bool
+) -> Feet:
+    """Feet that stay where they are put while they bear weight, and swing on to the next footprint."""
+    curve = np.array(_RUN_PITCH if running else _WALK_PITCH, float)
+    foot = skeleton.offsets[BONE_NAMES.index("l_toes")]
+    heel, ball, sole = -0.035 * skeleton.height_m / 1.75, foot[0], skeleton.ankle_height
+    n = len(cycles)
+    ankles, yaw, pitch, toe = np.zeros((n, 2, 3)), np.zeros((n, 2)), np.zeros((n, 2)), np.zeros((n, 2))
+    for s, offset in enumerate((0.0, 0.5)):
+        phase = cycles - offset
+        step = np.floor(phase)
+        phase = phase - step
+        angle = np.radians(keyframes(phase, curve[:, 0], curve[:, 1]))
+
+        def print_of(k: np.ndarray, s: int = s, offset: float = offset) -> tuple[np.ndarray, np.ndarray]:
+            # The body passes over the foot a little before the middle of stance.
+            centre, heading = _path((k + offset + 0.43 * stance) * stride - origin, radius)
+            side = (1 - 2 * s) * width
+            return centre + side * np.stack([-np.sin(heading), np.cos(heading)], axis=-1), heading + (1 - 2 * s) * np.radians(5)
+
+        here, yaw_here = print_of(step)
+        there, yaw_there = print_of(step + 1)
+
+        def ankle(flat: np.ndarray, heading: np.ndarray, tilt: np.ndarray) -> np.ndarray:
+            pivot = np.where(tilt > 0, heel, ball)
+            forward = pivot - np.cos(tilt) * pivot - np.sin(tilt) * sole
+            height = sole * np.cos(tilt) - pivot * np.sin(tilt)
+            place = flat + forward[:, None] * np.stack([np.cos(heading), np.sin(heading)], axis=-1)
+            return np.column_stack([place, height])
+
+        off = np.radians(np.interp(stance, curve[:, 0], curve[:, 1])) * np.ones(n)
+        strike = np.radians(curve[0, 1]) * np.ones(n)
+        bearing = phase < stance
+        u = np.clip((phase - stance) / (1 - stance), 0, 1)
+        ease = u * u * u * (u * (6 * u - 15) + 10) * 0.5 + u * u * (3 - 2 * u) * 0.5
+        swing = (1 - ease)[:, None] * ankle(here, yaw_here, off) + ease[:, None] * ankle(there, yaw_there, strike)
+        lift = (0.16 if running else 0.025) * skeleton.height_m / 1.75
+        swing[:, 2] += lift * np.sin(np.pi * u) ** 2 + (0.06 if running else 0.035) * np.sin(np.pi * np.clip(u * 1.6, 0, 1)) ** 2
+        ankles[:, s] = np.where(bearing[:, None], ankle(here, yaw_here, angle), swing)
+        yaw[:, s] = np.where(bearing, yaw_here, (1 - ease) * yaw_here + ease * yaw_there)
+        pitch[:, s] = angle
+        # On the floor the toes lie flat while the heel rises; in the air they follow the foot.
+        toe[:, s] = np.where(angle < 0, np.where(bearing, 0.0, angle * np.clip(1.5 * u, 0, 1)), angle)
+    return Feet(ankles, yaw, pitch, toe)

@@ -1,0 +1,291 @@
+"""Recipes: what to render, as TOML with a unit in every key."""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from dataclasses import MISSING, dataclass, fields, replace
+from pathlib import Path
+from typing import Any, get_type_hints
+
+from hmc.errors import InputError
+from hmc.synthetic.actor import PATTERNS
+from hmc.synthetic.physique import girth_of
+from hmc.synthetic.rigs import RIGS
+from hmc.synthetic.room import FURNITURE
+from hmc.synthetic.textures import TEXTURES
+
+__all__ = ["ActorRecipe", "FurnitureRecipe", "ImageRecipe", "LightRecipe", "Recipe", "RigRecipe", "RoomRecipe", "load_recipe", "shipped_recipes"]
+
+Colour = tuple[float, float, float]
+
+#: Recipes that come with a checkout.
+RECIPE_FOLDER = Path(__file__).resolve().parents[2] / "data" / "synthetic"
+
+MOTIONS = ("walk", "jog", "stand", "box", "gesture", "throw_catch", "sit", "pick_up", "bvh")
+
+
+@dataclass(frozen=True)
+class RigRecipe:
+    """Cameras; see `hmc.synthetic.rigs.make_rig`."""
+
+    kind: str = "ring7"
+    size_px: tuple[int, int] = (640, 480)
+    camera_height_m: float = 2.3
+    target_height_m: float = 0.95
+    field_of_view_deg: float = 0.0
+    distorted: bool = False
+
+
+@dataclass(frozen=True)
+class RoomRecipe:
+    """Walls and floor; colours are sRGB in [0, 1]. One texture or colour serves all four walls, or there are four."""
+
+    size_m: tuple[float, float, float] = (6.4, 5.6, 3.2)
+    walls: tuple[str, ...] = ("plaster",)
+    wall_colours: tuple[Colour, ...] = ((0.72, 0.74, 0.70),)
+    floor: str = "tiles"
+    floor_colour: Colour = (0.60, 0.58, 0.56)
+    posters: int = 5
+
+
+@dataclass(frozen=True)
+class LightRecipe:
+    """Lamps on the ceiling."""
+
+    lamps: int = 3
+    brightness: float = 1.0
+    ambient: float = 0.26
+
+
+@dataclass(frozen=True)
+class ImageRecipe:
+    """The sensor: noise in grey levels (of 255) at black, what the light adds at white, and the flicker of the gain (a fraction)."""
+
+    read_noise: float = 1.5
+    shot_noise: float = 2.0
+    flicker: float = 0.004
+
+
+@dataclass(frozen=True)
+class FurnitureRecipe:
+    """One piece of furniture; see `hmc.synthetic.room.furnish`."""
+
+    kind: str
+    at_m: tuple[float, float]
+    heading_deg: float = 0.0
+    size_m: tuple[float, float, float] | None = None
+    colour: Colour = (0.55, 0.42, 0.30)
+    texture: str = "wood"
+
+
+@dataclass(frozen=True)
+class ActorRecipe:
+    """One person: body, clothes and motion."""
+
+    height_m: float = 1.75
+    build: str | float = "average"
+    sex: str = "man"
+    shirt: Colour = (0.16, 0.32, 0.55)
+    trousers: Colour = (0.25, 0.24, 0.22)
+    skin: Colour = (0.82, 0.62, 0.50)
+    hair: Colour = (0.22, 0.15, 0.10)
+    shoes: Colour = (0.10, 0.10, 0.11)
+    pattern: str = "plain"
+    pattern_colour: Colour = (0.85, 0.85, 0.80)
+    sleeves: str = "short"
+    legs: str = "long"
+    long_hair: bool = False
+    loose_m: float = 0.007
+    motion: str = "walk"
+    start_m: tuple[float, float] = (0.0, 0.0)
+    heading_deg: float = 0.0
+    speed_m_s: float = 0.0
+    turn_radius_m: float = 0.0
+    bvh: str = ""
+    bvh_start_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """All that a rendered recording depends on.
+
+    Parameters
+    ----------
+    name : str
+    seed : int
+    fps, seconds : float
+    background_frames : int
+        Frames of the empty room before the action, a camera.
+    silhouette_every : int
+        True silhouettes are written for every frame number that this divides.
+    cell_m : float
+        Edge length of the actors' meshes.
+    rig, room, light, image : tables of their own
+    furniture, actors : tuples of tables
+    """
+
+    name: str
+    seed: int = 0
+    fps: float = 30.0
+    seconds: float = 4.0
+    background_frames: int = 30
+    silhouette_every: int = 30
+    cell_m: float = 0.016
+    rig: RigRecipe = RigRecipe()
+    room: RoomRecipe = RoomRecipe()
+    light: LightRecipe = LightRecipe()
+    image: ImageRecipe = ImageRecipe()
+    furniture: tuple[FurnitureRecipe, ...] = ()
+    actors: tuple[ActorRecipe, ...] = (ActorRecipe(),)
+
+    @property
+    def n_frames(self) -> int:
+        """Frames a camera."""
+        return max(1, round(self.fps * self.seconds))
+
+
+def shipped_recipes() -> list[str]:
+    """Names of the recipes that come with a checkout."""
+    return sorted(path.stem for path in RECIPE_FOLDER.glob("*.toml"))
+
+
+def load_recipe(source: str | Path) -> Recipe:
+    """Read a recipe from a file, or by the name of a shipped one.
+
+    Raises
+    ------
+    InputError
+        When there is no such recipe, when it is no TOML, or when a key or value is not one; the nearest key is named.
+    """
+    path = Path(source)
+    if not path.is_file():
+        path = RECIPE_FOLDER / f"{source}.toml"
+    if not path.is_file():
+        near = difflib.get_close_matches(str(source), shipped_recipes(), 1)
+        hint = f"did you mean {near[0]!r}?" if near else f"shipped recipes are {', '.join(shipped_recipes()) or 'missing from this installation'}"
+        raise InputError(f"recipe {str(source)!r} is neither a file nor a shipped recipe; {hint}")
+    try:
+        content = tomllib.loads(path.read_text())
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: not a TOML file: {error}") from None
+    recipe = recipe_from(content, str(path))
+    # Motion files are named relative to the recipe.
+    actors = tuple(replace(a, bvh=str(path.parent / a.bvh)) if a.bvh and not Path(a.bvh).is_absolute() else a for a in recipe.actors)
+    return replace(recipe, actors=actors)
+
+
+def recipe_from(content: dict[str, Any], where: str = "recipe") -> Recipe:
+    """A checked recipe from the dictionary of its TOML.
+
+    Raises
+    ------
+    InputError
+        As `load_recipe`.
+    """
+    content = dict(content)
+    if "actor" in content:
+        content["actors"] = content.pop("actor")
+    nested = {"rig": RigRecipe, "room": RoomRecipe, "light": LightRecipe, "image": ImageRecipe}
+    for key, kind in nested.items():
+        if key in content:
+            content[key] = _fill(kind, content[key], f"{where}: [{key}]")
+    for key, kind in (("furniture", FurnitureRecipe), ("actors", ActorRecipe)):
+        if key in content:
+            label = key.removesuffix("s")
+            content[key] = tuple(_fill(kind, item, f"{where}: [[{label}]] number {k + 1}") for k, item in enumerate(content[key]))
+    recipe = _fill(Recipe, content, where)
+    _check(recipe, where)
+    return recipe
+
+
+def _fill(kind: type, table: Any, where: str) -> Any:
+    """A dataclass from a TOML table, with every key and value checked."""
+    if not isinstance(table, dict):
+        raise InputError(f"{where}: must be a table")
+    hints = get_type_hints(kind)
+    for key in table:
+        if key not in hints:
+            near = difflib.get_close_matches("actor" if key == "actors" else key, [*hints, "actor"], 1, cutoff=0.4)
+            raise InputError(f"{where}: unknown key '{key}'" + (f"; did you mean '{near[0]}'?" if near else f"; keys are {', '.join(hints)}"))
+    for field in fields(kind):
+        if field.default is MISSING and field.name not in table:
+            raise InputError(f"{where}: '{field.name}' is missing")
+    values = {}
+    for key, value in table.items():
+        value = _tuples(value)
+        default = next(field.default for field in fields(kind) if field.name == key)
+        if not _fits(value, hints[key], default):
+            raise InputError(f"{where}: '{key}' has a value of the wrong kind: {value!r}")
+        values[key] = value
+    return kind(**values)
+
+
+def _tuples(value: Any) -> Any:
+    return tuple(_tuples(item) for item in value) if isinstance(value, list) else value
+
+
+def _fits(value: Any, hint: Any, default: Any) -> bool:
+    text = str(hint)
+    number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    if hint is bool:
+        return isinstance(value, bool)
+    if hint is int:
+        return isinstance(value, int) and not isinstance(value, bool)
+    if hint is float:
+        return number
+    if hint is str:
+        return isinstance(value, str)
+    if "str | float" in text or text == "str | float":
+        return number or isinstance(value, str)
+    if text.startswith("tuple[hmc") or isinstance(value, (RigRecipe, RoomRecipe, LightRecipe, ImageRecipe)):
+        return True
+    if text == "tuple[str, ...]":
+        return isinstance(value, tuple) and bool(value) and all(isinstance(v, str) for v in value)
+    if "..." in text:
+        return isinstance(value, tuple) and bool(value) and all(_numbers(v, 3) for v in value)
+    return _numbers(value, text.count("float") + text.count("int"))
+
+
+def _numbers(value: Any, count: int) -> bool:
+    return isinstance(value, tuple) and len(value) == count and all(isinstance(v, (int, float)) and not isinstance(v, bool) for v in value)
+
+
+def _check(recipe: Recipe, where: str) -> None:
+    """Values that make no sense together or alone."""
+
+    def among(value: str, names, what: str) -> None:
+        if value not in names:
+            near = difflib.get_close_matches(value, list(names), 1)
+            raise InputError(f"{where}: {what} '{value}' is unknown; " + (f"did you mean '{near[0]}'?" if near else f"use one of {', '.join(names)}"))
+
+    def within(value: float, low: float, high: float, what: str) -> None:
+        if not low <= value <= high:
+            raise InputError(f"{where}: {what} must lie between {low} and {high}; got {value}")
+
+    within(recipe.fps, 1, 240, "fps")
+    within(recipe.seconds, 0, 3600, "seconds")
+    within(recipe.background_frames, 0, 10000, "background_frames")
+    within(recipe.silhouette_every, 1, 10**6, "silhouette_every")
+    within(recipe.cell_m, 0.008, 0.03, "cell_m")
+    within(recipe.light.lamps, 1, 6, "lamps")
+    among(recipe.rig.kind, RIGS, "rig kind")
+    for texture in (*recipe.room.walls, recipe.room.floor, *(item.texture for item in recipe.furniture)):
+        among(texture, TEXTURES, "texture")
+    for count in (len(recipe.room.walls), len(recipe.room.wall_colours)):
+        if count not in (1, 4):
+            raise InputError(f"{where}: [room] takes one wall texture and colour or four of each; got {count}")
+    for item in recipe.furniture:
+        among(item.kind, FURNITURE, "furniture")
+    if len(recipe.actors) > 3:
+        raise InputError(f"{where}: at most 3 actors, so that silhouettes can be told apart by 85 x (person + 1); got {len(recipe.actors)}")
+    for actor in recipe.actors:
+        among(actor.motion, MOTIONS, "motion")
+        among(actor.pattern, PATTERNS, "pattern")
+        among(actor.sex, ("man", "woman"), "sex")
+        among(actor.sleeves, ("long", "short"), "sleeves")
+        among(actor.legs, ("long", "short"), "legs")
+        within(actor.height_m, 1.2, 2.2, "height_m")
+        girth_of(actor.build)
+        if (actor.motion == "bvh") != bool(actor.bvh):
+            raise InputError(f"{where}: motion = 'bvh' and the key 'bvh' (a file) go together")

@@ -1,0 +1,222 @@
+"""Recipes to recordings on disk: frames are rendered by several processes and written in order."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import shutil
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from hmc.camera.calibration import write_calibration
+from hmc.errors import InputError
+from hmc.files import write_toml
+from hmc.landmarks import LANDMARKS
+from hmc.results import PoseTable, TrackTable, write_joints, write_tracks
+from hmc.synthetic.actor import PARTS
+from hmc.synthetic.image import Backdrop, develop, light_crowd, make_backdrop, picture, static_shadows
+from hmc.synthetic.recipe import Recipe, load_recipe
+from hmc.synthetic.scene import Scene, build_scene, crowd_at
+from hmc.synthetic.shading import ShadowMap
+from hmc.synthetic.skeleton import landmark_positions
+from hmc.synthetic.surface import volume_centroid
+
+__all__ = ["render_recording"]
+
+Pictures = list[tuple[np.ndarray, np.ndarray | None]]
+
+
+def render_recording(
+    recipe: Recipe | str | Path,
+    out: str | Path,
+    seed: int | None = None,
+    workers: int | None = None,
+    on_progress: Callable[[int, int], None] | None = None,
+) -> Path:
+    """Render a recipe into a recording with truth.
+
+    The recording appears under its name only when it is complete.
+
+    Parameters
+    ----------
+    recipe : Recipe, path, or name of a shipped recipe
+    out : path
+        Folder of the recording; must not exist, or hold a recording that was rendered before (it is replaced).
+    seed : int, optional
+        In place of the recipe's. The same recipe and seed give the same recording, whatever the number of workers.
+    workers : int, optional
+        Processes; by default one a core.
+    on_progress : callable, optional
+        Called with the number of frames done and their total, once a frame.
+
+    Returns
+    -------
+    Path
+        `out`.
+
+    Raises
+    ------
+    InputError
+        When the recipe is wrong, or `out` is something else than a rendered recording.
+    """
+    recipe = recipe if isinstance(recipe, Recipe) else load_recipe(recipe)
+    out = Path(out)
+    if out.exists() and not (out.is_dir() and (not any(out.iterdir()) or ((out / "calibration.toml").is_file() and (out / "truth").is_dir()))):
+        raise InputError(f"{out}: exists and is no rendered recording; choose another folder or remove it")
+    workers = workers or os.cpu_count() or 1
+    scene = build_scene(recipe, seed)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    part = out.with_name(f".{out.name}.{os.getpid()}.part")
+    try:
+        _write_tables(scene, part)
+        _write_pictures(scene, part, workers, on_progress)
+        if out.exists():
+            shutil.rmtree(out)
+        part.rename(out)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+    return out
+
+
+def _write_tables(scene: Scene, folder: Path) -> None:
+    """Calibration, settings, and the truth about joints and volumes."""
+    recipe = scene.recipe
+    (folder / "truth").mkdir(parents=True)
+    write_calibration(folder / "calibration.toml", scene.rig)
+    settings = {
+        "name": recipe.name, "fps": recipe.fps, "frames": recipe.n_frames, "units": "m", "up": "z", "room": scene.room.corners,
+        "persons": len(scene.actors), "subject_height_m": [actor.skeleton.height_m for actor in scene.actors],
+    }  # fmt: skip
+    write_toml(folder / "recording.toml", settings)
+    n, persons = recipe.n_frames, len(scene.actors)
+    frames, who = np.repeat(np.arange(n), persons), np.tile(np.arange(persons), n)
+    joints = np.zeros((n, persons, len(LANDMARKS), 3))
+    centroids, heads = np.zeros((n, persons, 3)), np.zeros((n, persons, 3))
+    for k, (actor, motion) in enumerate(zip(scene.actors, scene.motions, strict=True)):
+        joints[:, k] = landmark_positions(actor.skeleton, motion.root, motion.orientations)
+    for frame in range(n):
+        crowd = crowd_at(scene, frame)
+        for k, actor in enumerate(scene.actors):
+            own = crowd.vertices[crowd.persons == k]
+            centroids[frame, k] = volume_centroid(own, actor.triangles)[1]
+            heads[frame, k] = own[actor.parts == list(PARTS).index("head")].mean(axis=0)
+    write_joints(folder / "truth" / "joints.csv", PoseTable(frames, who, joints.reshape(-1, len(LANDMARKS), 3)))
+    write_tracks(folder / "truth" / "centroids.csv", TrackTable(frames, who, centroids.reshape(-1, 3), heads.reshape(-1, 3)))
+
+
+def _write_pictures(scene: Scene, folder: Path, workers: int, on_progress: Callable[[int, int], None] | None) -> None:
+    """Videos of the action and of the empty room, and silhouettes."""
+    recipe, store = scene.recipe, folder / "backdrops"
+    store.mkdir()
+    total = recipe.n_frames + recipe.background_frames
+    done = 0
+    with _pool(workers, scene, store) as (prepare, render):
+        for _ in prepare(range(len(scene.rig))):
+            pass
+        for name, frames in (("background", range(-recipe.background_frames, 0)), ("videos", range(recipe.n_frames))):
+            if not frames:
+                continue
+            with _writers(scene, folder / name) as writers:
+                for frame, pictures in zip(frames, render(frames), strict=True):
+                    for camera, writer, (image, labels) in zip(scene.rig, writers, pictures, strict=True):
+                        writer.write(image)
+                        if labels is not None:
+                            _write_silhouette(folder / "truth" / "silhouettes" / camera.name / f"{frame:06d}.png", labels, len(scene.actors))
+                    done += 1
+                    if on_progress is not None:
+                        on_progress(done, total)
+    shutil.rmtree(store)
+
+
+def _write_silhouette(path: Path, labels: np.ndarray, persons: int) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    cv2.imwrite(str(path), labels * np.uint8(255 if persons == 1 else 85))
+
+
+@contextmanager
+def _writers(scene: Scene, folder: Path) -> Iterator[list[cv2.VideoWriter]]:
+    folder.mkdir()
+    code = cv2.VideoWriter.fourcc(*"mp4v")
+    writers = [cv2.VideoWriter(str(folder / f"{camera.name}.mp4"), code, scene.recipe.fps, camera.size) for camera in scene.rig]
+    try:
+        if not all(writer.isOpened() for writer in writers):
+            raise OSError(f"{folder}: OpenCV cannot write MPEG-4 video here")
+        yield writers
+    finally:
+        for writer in writers:
+            writer.release()
+
+
+class _Studio:
+    """What one process needs to render frames; built once in each."""
+
+    def __init__(self, scene: Scene, store: Path) -> None:
+        self.scene = scene
+        self.store = store
+        self.furniture: tuple[ShadowMap, ...] = static_shadows(scene)
+        self.backdrops: list[Backdrop] | None = None
+
+    def store_backdrop(self, camera: int) -> None:
+        backdrop = make_backdrop(self.scene, self.scene.rig[camera], self.furniture, _rng(self.scene, 0, camera))
+        np.savez(self.store / f"{camera}.npz", **vars(backdrop))
+
+    def load(self) -> list[Backdrop]:
+        if self.backdrops is None:
+            self.backdrops = []
+            for camera in range(len(self.scene.rig)):
+                with np.load(self.store / f"{camera}.npz") as arrays:
+                    self.backdrops.append(Backdrop(**arrays))
+        return self.backdrops
+
+    def render(self, frame: int) -> Pictures:
+        """The images of all cameras, and silhouettes where they are due; negative frames show the empty room."""
+        scene, pictures = self.scene, []
+        lit = light_crowd(scene, crowd_at(scene, frame), self.furniture) if frame >= 0 else None
+        for k, (camera, backdrop) in enumerate(zip(scene.rig, self.load(), strict=True)):
+            rng = _rng(scene, 1 + (frame if frame >= 0 else 10**7 - frame), k)
+            labels = None
+            radiance = backdrop.radiance
+            if lit is not None:
+                radiance, labels = picture(scene, camera, backdrop, lit)
+                if frame % scene.recipe.silhouette_every:
+                    labels = None
+            pictures.append((develop(radiance, camera.size, scene, rng), labels))
+        return pictures
+
+
+def _rng(scene: Scene, stage: int, camera: int) -> np.random.Generator:
+    """A generator that depends on what is rendered, never on who renders it."""
+    return np.random.default_rng([scene.seed, stage, camera])
+
+
+# A worker process keeps its studio here; `_open_studio` is the pool's initialiser and nothing else writes it.
+_STUDIO: list[_Studio] = []
+
+
+def _open_studio(scene: Scene, store: Path) -> None:
+    cv2.setNumThreads(1)
+    _STUDIO[:] = [_Studio(scene, store)]
+
+
+def _store_backdrop(camera: int) -> None:
+    _STUDIO[0].store_backdrop(camera)
+
+
+def _render_frame(frame: int) -> Pictures:
+    return _STUDIO[0].render(frame)
+
+
+@contextmanager
+def _pool(workers: int, scene: Scene, store: Path) -> Iterator[tuple[Callable, Callable]]:
+    """Two functions that map `_Studio.store_backdrop` over cameras and `_Studio.render` over frames, lazily and in order."""
+    if workers == 1:
+        studio = _Studio(scene, store)
+        yield (lambda cameras: map(studio.store_backdrop, cameras)), (lambda frames: map(studio.render, frames))
+        return
+    # Spawned, not forked: a fork copies the locks of threads that the parent may be running.
+    with multiprocessing.get_context("spawn").Pool(workers, _open_studio, (scene, store)) as pool:
+        yield (lambda cameras: pool.imap(_store_backdrop, cameras)), (lambda frames: pool.imap(_render_frame, frames))
