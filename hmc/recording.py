@@ -269,14 +269,14 @@ def background_frames(recording: Recording, camera_index: int, limit: int | None
         yield from (image for image in reader if image is not None)
 
 
-def find_views(path: Path, names: Sequence[str]) -> tuple[list[Footage | None], list[Footage | None]]:
-    """The images (``videos/`` first, else ``images/``) and the silhouettes of each camera."""
+def find_views(path: Path, names: Sequence[str], count: bool = True) -> tuple[list[Footage | None], list[Footage | None]]:
+    """The images (``videos/`` first, else ``images/``) and the silhouettes of each camera; ``count`` as `hmc.footage.open_video`."""
     folder = path / "videos" if (path / "videos").is_dir() else path / "images"
     first = _first_number(folder, names)
-    footage = [find_footage(folder, name, first) for name in names]
+    footage = [find_footage(folder, name, first, count) for name in names]
     if not any(footage):
         first = _first_number(path / "silhouettes", names)
-    return footage, [find_footage(path / "silhouettes", name, first) for name in names]
+    return footage, [find_footage(path / "silhouettes", name, first, count) for name in names]
 
 
 def _first_number(folder: Path, names: Sequence[str]) -> int:

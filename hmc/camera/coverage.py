@@ -8,7 +8,7 @@ import numpy as np
 
 from hmc.camera.model import Camera, Rig, project
 
-__all__ = ["estimate_room", "in_view", "point_looked_at"]
+__all__ = ["estimate_room", "in_view", "inside_image", "point_looked_at"]
 
 #: Height of an estimated room, metres: a tall person with raised arms.
 ROOM_HEIGHT_M = 2.4
@@ -50,7 +50,13 @@ def estimate_room(rig: Rig) -> np.ndarray:
 def in_view(camera: Camera, points: np.ndarray) -> np.ndarray:
     """Whether world points, (..., 3), fall into a camera's image; bool, (...)."""
     uv, valid = project(camera, points)
-    return valid & (uv >= -0.5).all(axis=-1) & (uv < np.array(camera.size) - 0.5).all(axis=-1)
+    return valid & inside_image(camera, uv)
+
+
+def inside_image(camera: Camera, uv: np.ndarray) -> np.ndarray:
+    """Whether pixels, (..., 2), lie on a camera's image, border pixels whole; bool, (...)."""
+    u, v = np.moveaxis(uv, -1, 0)
+    return (u >= -0.5) & (v >= -0.5) & (u < camera.size[0] - 0.5) & (v < camera.size[1] - 0.5)
 
 
 def point_looked_at(rig: Rig) -> np.ndarray:

@@ -1,0 +1,311 @@
+"""What is wrong with a recording: everything that can be found, not only the first thing.
+
+`hmc.recording.open_recording` stops at the first fault that makes a recording useless; here each part is looked at by itself, and what is
+merely odd is told too.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from hmc.camera.calibration import CalibrationEntry, build_camera, read_entries
+from hmc.camera.coverage import estimate_room, in_view
+from hmc.camera.model import Camera, Rig, undistort
+from hmc.errors import InputError
+from hmc.footage import IMAGE_SUFFIXES, VIDEO_SUFFIXES, Footage
+from hmc.recording import Frame, Recording, find_views, iterate_frames, open_recording, wrong_sizes, wrong_units
+from hmc.settings import read_settings
+from hmc.silhouette_check import disagreements
+
+__all__ = ["Finding", "Inspection", "check_recording", "inspect_recording"]
+
+#: Frames that are read unless all are asked for, and how many of them the silhouettes are compared in.
+PROBE_FRAMES = 90
+COMPARED_FRAMES = 3
+#: Background frames below which an adaptive model is not settled yet.
+FEW_BACKGROUND_FRAMES = 10
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing found: ``severity`` is "error" (the recording cannot be used), "warning" (results will suffer) or "note"."""
+
+    severity: str
+    sentence: str
+
+    def __str__(self) -> str:
+        return f"{self.severity}: {self.sentence}"
+
+
+@dataclass(frozen=True, eq=False)
+class Inspection:
+    """All findings, and as much of the recording as could be had for a picture: rig, room and one image a camera (or None)."""
+
+    findings: tuple[Finding, ...]
+    rig: Rig | None = None
+    room: np.ndarray | None = None
+    images: tuple[np.ndarray | None, ...] = ()
+    recording: Recording | None = None
+
+    @property
+    def usable(self) -> bool:
+        """Whether nothing was found that stands in the way of a run."""
+        return not any(finding.severity == "error" for finding in self.findings)
+
+
+def check_recording(path: str | Path, cameras: Sequence[str] | None = None, read_all: bool = False) -> list[Finding]:
+    """Find what is wrong with a recording.
+
+    Parameters
+    ----------
+    path : str or Path
+        Folder of the recording.
+    cameras : sequence of str, optional
+        Look at these cameras only.
+    read_all : bool
+        Read every frame; by default the first 90.
+
+    Returns
+    -------
+    list of Finding
+        Errors first, then warnings, then notes; empty when there is nothing to say.
+    """
+    return list(inspect_recording(path, cameras, read_all).findings)
+
+
+def inspect_recording(path: str | Path, cameras: Sequence[str] | None = None, read_all: bool = False) -> Inspection:
+    """As `check_recording`, with what a picture of the rig needs. Parameters as there."""
+    path = Path(path)
+    found: list[Finding] = []
+
+    def say(severity: str, sentences: Iterable[str]) -> None:
+        found.extend(Finding(severity, sentence) for sentence in sentences)
+
+    if not path.is_dir():
+        return Inspection((Finding("error", f"{path}: no such folder"),))
+    room = None
+    try:
+        room = read_settings(path).get("room")
+    except InputError as error:
+        say("error", [str(error)])
+    try:
+        entries = read_entries(path)
+    except InputError as error:
+        say("error", [str(error)])
+        return Inspection(tuple(found))
+    unknown = [name for name in cameras or () if name not in {entry.name for entry in entries}]
+    if unknown:
+        say("error", [f"{path}: no camera named '{unknown[0]}' in the calibration; it has {', '.join(entry.name for entry in entries)}"])
+    if cameras is None:
+        say("note", unused_views(path, [entry.name for entry in entries]))
+    entries = [entry for entry in entries if cameras is None or entry.name in cameras]
+
+    views = _views_by_camera(path, entries, say)
+    rig = _usable_rig(entries, {name: view.size for name, view in views.items()}, say)
+    if rig is None:
+        return Inspection(_sorted(found))
+    own = [views.get(camera.name) for camera in rig]
+    say("error", wrong_sizes(rig, own))
+    say("error", wrong_units(rig))
+    say("warning", gaps(own))
+    say("warning", rates([view.fps for view in own if view is not None]))
+    say("warning", itertools.chain.from_iterable(odd_camera(camera) for camera in rig))
+    say("note", [sentence for camera in rig for sentence in orientation(camera)])
+    say("warning", same_place(rig))
+    if not wrong_units(rig):
+        room = estimate_room(rig) if room is None else room
+        say(*coverage(rig, room))
+
+    recording = None
+    images: tuple[np.ndarray | None, ...] = (None,) * len(rig)
+    if not any(finding.severity == "error" for finding in found):
+        try:
+            recording = open_recording(path, cameras=cameras)
+        except InputError as error:
+            say("error", [str(error)])
+    if recording is not None:
+        say("warning", recording.problems)
+        if recording.room_is_estimated:
+            low, high = recording.room.round(1).tolist()
+            say("note", [f"recording.toml gives no `room`; estimated from the rig: {low} to {high} m"])
+        say("note", background(recording))
+        first, sentences = _read(recording, read_all)
+        say("warning", sentences)
+        images = first.images if recording.has_images else _as_pictures(first)
+    return Inspection(_sorted(found), rig, room, images, recording)
+
+
+def _sorted(found: Sequence[Finding]) -> tuple[Finding, ...]:
+    order = ("error", "warning", "note")
+    return tuple(sorted(dict.fromkeys(found), key=lambda finding: order.index(finding.severity)))
+
+
+def _views_by_camera(path: Path, entries: Sequence[CalibrationEntry], say: Callable[[str, Iterable[str]], None]) -> dict[str, Footage]:
+    """The first of images and silhouettes that can be had, a camera; errors are told one by one."""
+    views: dict[str, Footage] = {}
+    for entry in entries:
+        try:
+            footage, silhouettes = find_views(path, [entry.name], count=False)
+        except InputError as error:
+            say("error", [str(error)])
+            continue
+        view = footage[0] or silhouettes[0]
+        if view is None:
+            say("error", [f"{path}: camera '{entry.name}' has no video, images or silhouettes; name them {entry.name}.* or use --cameras"])
+        else:
+            views[entry.name] = view
+    return views
+
+
+def _usable_rig(entries: Sequence[CalibrationEntry], sizes: dict, say: Callable[[str, Iterable[str]], None]) -> Rig | None:
+    cameras: list[Camera] = []
+    for entry in entries:
+        try:
+            cameras.append(build_camera(entry, sizes))
+        except InputError as error:
+            say("error", [str(error)])
+    try:
+        return Rig(tuple(cameras))
+    except InputError as error:
+        if cameras:
+            say("error", [str(error)])
+        return None
+
+
+def unused_views(path: Path, names: Sequence[str]) -> list[str]:
+    """A sentence for each video or image folder without a camera in the calibration."""
+    folders = [path / name for name in ("videos", "images", "silhouettes", "background") if (path / name).is_dir()]
+    suffixes = VIDEO_SUFFIXES | IMAGE_SUFFIXES
+    return [
+        f"{item}: no camera of this name in the calibration; it is not used"
+        for folder in folders
+        for item in sorted(folder.iterdir())
+        if (item.is_dir() or item.suffix.lower() in suffixes) and item.stem not in names
+    ]
+
+
+def gaps(views: Sequence[Footage | None]) -> list[str]:
+    """A sentence for each camera whose numbered images have holes."""
+    sentences = []
+    for view in views:
+        if view is None or view.images is None:
+            continue
+        missing = sorted(set(range(min(view.images), view.n_frames)) - view.images.keys())
+        if missing:
+            sentences.append(f"{view.path}: {len(missing)} of {view.n_frames} images are missing, the first is number {missing[0]}")
+    return sentences
+
+
+def rates(fps: Sequence[float | None]) -> list[str]:
+    """A sentence when the videos' frame rates differ by more than 1 %."""
+    known = [rate for rate in fps if rate]
+    if known and max(known) > 1.01 * min(known):
+        return [f"videos differ in frame rate ({min(known):g} to {max(known):g} a second); cameras must be synchronised, frame by frame"]
+    return []
+
+
+def odd_camera(camera: Camera) -> list[str]:
+    """Sentences about numbers that no ordinary camera has."""
+    sentences = []
+    width, height = camera.size
+    fx, fy = camera.matrix[0, 0], camera.matrix[1, 1]
+    if not 0.8 < fx / fy < 1.25:
+        sentences.append(f"camera '{camera.name}': focal lengths {fx:.0f} and {fy:.0f} differ by more than a quarter")
+    if not 0.15 < fx / max(width, height) < 20:
+        sentences.append(f"camera '{camera.name}': a focal length of {fx:.0f} does not fit {width} x {height} pixels; is `size` right?")
+    offset = np.abs(camera.matrix[:2, 2] / camera.size - 0.5).max()
+    if offset > 0.3:
+        u, v = camera.matrix[:2, 2]
+        sentences.append(f"camera '{camera.name}': its optical centre ({u:.0f}, {v:.0f}) is far from the middle of {width} x {height}")
+    edges = np.array([[0, height / 2], [width - 1, height / 2], [width / 2, 0], [width / 2, height - 1]])
+    if np.linalg.norm(undistort(camera, edges), axis=1).max() > 0.97 * camera.max_radius:
+        sentences.append(f"camera '{camera.name}': its lens distortion folds over inside the image; calibrate with points near the border")
+    if camera.centre[2] < -0.2:
+        sentences.append(f"camera '{camera.name}' stands {-camera.centre[2]:.1f} m under the floor; z must point up, with the floor at 0")
+    return sentences
+
+
+def orientation(camera: Camera) -> list[str]:
+    """A sentence when the image is upside down or lies on its side."""
+    right_up, down_up = camera.rotation[0, 2], camera.rotation[1, 2]
+    if abs(camera.rotation[2, 2]) > 0.95:
+        return []  # looks straight down or up: there is no upright
+    if down_up > abs(right_up):
+        return [f"camera '{camera.name}' is mounted upside down (fine, the calibration says so)"]
+    if abs(right_up) > abs(down_up):
+        return [f"camera '{camera.name}' lies on its side (fine, the calibration says so)"]
+    return []
+
+
+def same_place(rig: Rig) -> list[str]:
+    """A sentence for each two cameras closer than 5 cm: the same calibration twice, mostly."""
+    return [
+        f"cameras '{one.name}' and '{other.name}' stand in one place; is one calibration in the file twice?"
+        for one, other in itertools.combinations(rig, 2)
+        if np.linalg.norm(one.centre - other.centre) < 0.05
+    ]
+
+
+def coverage(rig: Rig, room: np.ndarray) -> tuple[str, list[str]]:
+    """Severity and sentences on how much of the room, up to 2 m, the cameras see."""
+    top = min(room[1, 2], room[0, 2] + 2.0)
+    axes = [np.linspace(room[0, i], high, 15) for i, high in enumerate((room[1, 0], room[1, 1], top))]
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    seen = np.array([in_view(camera, points) for camera in rig])
+    if not seen.any():
+        return "error", ["no camera sees anything of the room; do calibration and `room` share origin, axes and units (metres, z up)?"]
+    blind = [
+        f"camera '{camera.name}' sees {'nothing' if not views.any() else f'only {views.mean():.1%}'} of the room; is its calibration right?"
+        for camera, views in zip(rig, seen, strict=True)
+        if views.mean() < 0.02
+    ]
+    several = float((seen.sum(axis=0) >= min(2, len(rig))).mean())
+    if several < 0.5:
+        blind.append(f"only {several:.0%} of the room is seen by two cameras or more; give a smaller `room` in recording.toml")
+    if len(rig) < 3:
+        blind.append(f"{len(rig)} camera{'s' * (len(rig) > 1)} cannot tell a body's shape; a pose needs four or more around the room")
+    return "warning", blind
+
+
+def background(recording: Recording) -> list[str]:
+    """A sentence when there are no or few frames of the empty scene."""
+    if recording.has_silhouettes and not recording.has_images:
+        return []
+    counts = dict(zip(recording.rig.names, recording.n_background_frames, strict=True))
+    none = [name for name, n in counts.items() if n == 0]
+    few = [name for name, n in counts.items() if 0 < n < FEW_BACKGROUND_FRAMES]
+    sentences = []
+    if none and not recording.has_silhouettes:
+        who = "no camera has" if len(none) == len(counts) else f"{', '.join(none)} have no"
+        sentences.append(f"{who} frames of the empty scene in background/; the temporal median of the recording takes their place")
+    if few:
+        sentences.append(f"{', '.join(few)} have fewer than {FEW_BACKGROUND_FRAMES} frames of the empty scene; 30 or more are better")
+    return sentences
+
+
+def _read(recording: Recording, read_all: bool) -> tuple[Frame, list[str]]:
+    """The first frame, and sentences on what turned up while reading."""
+    sentences: list[str] = []
+    n = min(recording.n_frames, PROBE_FRAMES)
+    wanted = {recording.start + round(i) for i in np.linspace(0, n - 1, COMPARED_FRAMES)}
+    probes: list[Frame] = []
+    dark: set[str] = set()
+    for frame in iterate_frames(recording, last=None if read_all else recording.start + n, on_problem=sentences.append):
+        if frame.index in wanted:
+            probes.append(frame)
+    for camera, image in zip(recording.rig, probes[0].images, strict=True):
+        if image is not None and image.max() < 10:
+            dark.add(camera.name)
+    sentences.extend(f"camera '{name}': its first image is black" for name in sorted(dark))
+    sentences.extend(disagreements(recording, probes))
+    return probes[0], sentences
+
+
+def _as_pictures(frame: Frame) -> tuple[np.ndarray | None, ...]:
+    masks = frame.silhouettes or ()
+    return tuple(None if mask is None else np.repeat(mask[..., None], 3, axis=2).astype(np.uint8) * 255 for mask in masks)

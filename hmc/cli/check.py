@@ -1,0 +1,52 @@
+"""``hmc check``: what is wrong with a recording, and a picture of its rig."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from hmc.cli.common import camera_names
+
+__all__ = ["add_parser", "run"]
+
+
+def add_parser(subparsers) -> None:
+    """Add the command to the argument parser."""
+    parser = subparsers.add_parser(
+        "check",
+        help="tell what is wrong with a recording, and draw its rig",
+        description="Look a recording over, tell everything that is wrong with it, and draw its rig from above with a frame of every view. "
+        "The exit code is 2 if the recording cannot be used.",
+    )
+    parser.add_argument("recording", type=Path, help="folder of the recording")
+    parser.add_argument("--out", type=Path, default=None, metavar="FILE.png", help="the picture (default: NAME_check.png here)")
+    parser.add_argument("--cameras", type=camera_names, default=None, metavar="A,B,...", help="look at these cameras only (default: all)")
+    parser.add_argument("--all", action="store_true", help="read every frame (default: the first 90)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print one line a finding and a last one that sums up; write the picture."""
+    from hmc.check import inspect_recording
+
+    inspection = inspect_recording(args.recording, args.cameras, args.all)
+    for finding in inspection.findings:
+        print(finding)
+    name = args.recording.resolve().name
+    if inspection.rig is not None and inspection.room is not None:
+        from hmc.rig_picture import save_rig_picture
+
+        out = args.out or Path(f"{name}_check.png")
+        save_rig_picture(out, inspection.rig, inspection.room, inspection.images, name)
+        print(f"picture: {out}")
+    print(f"{name}: {_summary(inspection)}")
+    return 0 if inspection.usable else 2
+
+
+def _summary(inspection) -> str:
+    counts = [sum(finding.severity == severity for finding in inspection.findings) for severity in ("error", "warning")]
+    words = " and ".join(f"{n} {word}{'s' * (n > 1)}" for n, word in zip(counts, ("error", "warning"), strict=True) if n)
+    recording = inspection.recording
+    if recording is None:
+        return f"cannot be used ({words})"
+    what = f"{len(recording.rig)} cameras, {recording.n_frames} frames, {recording.fps:g} a second"
+    return f"{'can' if inspection.usable else 'cannot'} be used{f' ({words})' if words else ''}: {what}"
