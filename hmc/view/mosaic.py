@@ -20,7 +20,7 @@ from hmc.pose.body.model import BodyModel
 from hmc.pose.body.proportions import make_body
 from hmc.recording import Frame, Recording, iterate_frames
 from hmc.results import PoseStates, PoseTable, TrackTable, read_joints, read_pose, read_tracks
-from hmc.view.overlay import LEFT, RIGHT, draw_label, draw_outline, draw_path, draw_sticks, draw_track, person_colour
+from hmc.view.overlay import LEFT, RIGHT, draw_label, draw_outline, draw_paths, draw_sticks, draw_track, person_colour
 from hmc.view.scene import BACKGROUND, draw_floor, draw_rig, draw_voxels, viewpoint
 from hmc.voxels.grid import VoxelGrid
 
@@ -296,7 +296,7 @@ def draw_trails(image: np.ndarray, camera: Camera, result: Result, frame: int) -
     recent = table.where((table.frames <= frame) & (table.frames > frame - TRAIL_FRAMES))
     for number in np.unique(recent.persons):
         way = recent.of(number).positions * np.array([1, 1, 0])
-        draw_path(image, camera, way[~np.isnan(way).any(axis=1)], person_colour(int(number)), 1)
+        draw_paths(image, camera, way, person_colour(int(number)), 1)
 
 
 def _draw_number(image: np.ndarray, camera: Camera, person: Person) -> None:

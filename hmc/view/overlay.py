@@ -16,7 +16,7 @@ from hmc.pose.body.flesh import place_points, surface_samples
 from hmc.pose.body.kinematics import segment_transforms
 from hmc.pose.body.model import BodyModel
 
-__all__ = ["LEFT", "RIGHT", "draw_label", "draw_outline", "draw_path", "draw_sticks", "draw_track", "person_colour"]
+__all__ = ["LEFT", "RIGHT", "draw_label", "draw_outline", "draw_paths", "draw_sticks", "draw_track", "person_colour"]
 
 Colour = tuple[int, int, int]
 
@@ -60,10 +60,8 @@ def draw_sticks(image: np.ndarray, camera: Camera, points: np.ndarray, person: i
     lines = points[ends[:, 0], None] * (1 - t) + points[ends[:, 1], None] * t
     colours = [{"l_": LEFT, "r_": RIGHT}.get(b[:2], person_colour(person)) for _, b in BONES]
     # Dark edges first, so that no edge covers a neighbour's colour.
-    for line in lines:
-        draw_path(image, camera, line, DARK, width + 2)
-    for line, colour in zip(lines, colours, strict=True):
-        draw_path(image, camera, line, colour, width)
+    draw_paths(image, camera, lines, DARK, width + 2)
+    draw_paths(image, camera, lines, colours, width)
     uv, valid = project(camera, points)
     for u, v in uv[valid & _near_image(uv, camera)]:
         centre = round(u * 2**SHIFT), round(v * 2**SHIFT)
@@ -88,8 +86,8 @@ def draw_outline(image: np.ndarray, camera: Camera, body: BodyModel, state: np.n
             hull = cv2.convexHull(np.round(ring * 2**SHIFT).astype(np.int32))
             cv2.fillConvexPoly(mask, hull, 255, cv2.LINE_8, SHIFT)
     outlines, _ = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
-    cv2.polylines(image, outlines, True, DARK, round(width + 2), cv2.LINE_AA)
-    cv2.polylines(image, outlines, True, person_colour(person), max(1, round(width)), cv2.LINE_AA)
+    smooth = [cv2.approxPolyDP(outline, 0.8, True) for outline in outlines]  # the staircase of pixels
+    cv2.polylines(image, smooth, True, person_colour(person), max(1, round(width)), cv2.LINE_AA)
 
 
 def cone_rings(body: BodyModel, state: np.ndarray) -> np.ndarray:
@@ -125,17 +123,34 @@ def draw_track(image: np.ndarray, camera: Camera, position: np.ndarray, person: 
     line = foot + np.linspace(0, TRACK_HEIGHT_M, 9)[:, None] * np.array([0, 0, 1.0])
     for colour, extra in ((DARK, 2.0), (person_colour(person), 0.0)):
         for path in (ring, line):
-            draw_path(image, camera, path, colour, width + extra)
+            draw_paths(image, camera, path, colour, width + extra)
 
 
-def draw_path(image: np.ndarray, camera: Camera, points: np.ndarray, colour: Colour, width: float) -> None:
-    """Draw a chain of world points, shape (n, 3); the parts of it that the camera cannot have in view are left out."""
-    uv, valid = project(camera, points)
+def draw_paths(image: np.ndarray, camera: Camera, paths: np.ndarray, colours: Colour | list[Colour], width: float) -> None:
+    """Draw chains of world points; the parts that the camera cannot have in view are left out.
+
+    Parameters
+    ----------
+    image, camera, width
+        As for `draw_sticks`.
+    paths : ndarray, shape (k, 3) or (n, k, 3)
+        One chain or many, metres; a point with NaN interrupts its chain.
+    colours : colour, or list of n of them
+    """
+    paths = paths.reshape(-1, *paths.shape[-2:])
+    uv, valid = project(camera, paths)
     seen = valid & _near_image(uv, camera)
-    pixels = np.round(np.where(seen[:, None], uv, 0) * 2**SHIFT).astype(np.int32)
-    pieces = np.split(pixels, np.flatnonzero(~seen))
-    chains = [piece if k == 0 and seen[:1].all() else piece[1:] for k, piece in enumerate(pieces)]
-    cv2.polylines(image, [chain for chain in chains if len(chain) > 1], False, colour, max(1, round(width)), cv2.LINE_AA, SHIFT)
+    pixels = np.round(np.where(seen[..., None], uv, 0) * 2**SHIFT).astype(np.int32)
+    for k, chain in enumerate(pixels):
+        colour = colours[k] if isinstance(colours, list) else colours
+        parts = [chain] if seen[k].all() else [part[seen_part] for part, seen_part in _split(chain, seen[k])]
+        cv2.polylines(image, [part for part in parts if len(part) > 1], False, colour, max(1, round(width)), cv2.LINE_AA, SHIFT)
+
+
+def _split(chain: np.ndarray, seen: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    """A chain cut before every unseen point, with what of each part is seen."""
+    cuts = np.flatnonzero(~seen)
+    return list(zip(np.split(chain, cuts), np.split(seen, cuts), strict=True))
 
 
 def draw_label(

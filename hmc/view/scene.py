@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hmc.camera.model import Camera, Rig, backproject, look_at, project
-from hmc.view.overlay import draw_label, draw_path
+from hmc.view.overlay import draw_label, draw_paths
 from hmc.voxels.grid import VoxelGrid
 from hmc.voxels.surface import surface
 
@@ -41,23 +41,21 @@ def viewpoint(bounds: np.ndarray, size: tuple[int, int], margin: float = 0.94) -
     """
     corners = np.array([[bounds[i, 0], bounds[j, 1], bounds[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
     middle, away = bounds.mean(axis=0), _direction(AZIMUTH_DEG, ELEVATION_DEG)
-    frame = margin * np.array(size) / 2
-    for distance in np.geomspace(1.0, 200.0, 120):
-        camera = look_at("view", size, middle + distance * away, middle, FIELD_OF_VIEW_DEG)
-        uv, valid = project(camera, corners)
-        if valid.all() and (np.abs(uv - (np.array(size) - 1) / 2) <= frame).all():
-            break
-    return camera
+    near = look_at("view", size, middle + away, middle, FIELD_OF_VIEW_DEG)
+    offsets = (corners - middle) @ near.rotation.T
+    # A corner is in the picture from the distance on at which focal * |x| / (distance + z) falls to half its width, and so for y.
+    reach = near.matrix[0, 0] * np.abs(offsets[:, :2]) / (margin * np.array(size) / 2)
+    distance = (reach - offsets[:, 2:]).max()
+    return look_at("view", size, middle + distance * away, middle, FIELD_OF_VIEW_DEG)
 
 
 def draw_floor(image: np.ndarray, camera: Camera, room: np.ndarray) -> None:
     """Draw the floor of the room, shape (2, 3), as a grid of metres."""
     (x0, y0), (x1, y1) = room[0, :2], room[1, :2]
     t = np.linspace(0, 1, 33)
-    for x in (x0, *np.arange(np.ceil(x0), np.floor(x1) + 1), x1):
-        draw_path(image, camera, np.stack([np.full(33, x), y0 + t * (y1 - y0), 0 * t], axis=1), FLOOR, 1)
-    for y in (y0, *np.arange(np.ceil(y0), np.floor(y1) + 1), y1):
-        draw_path(image, camera, np.stack([x0 + t * (x1 - x0), np.full(33, y), 0 * t], axis=1), FLOOR, 1)
+    along_y = [np.stack([np.full(33, x), y0 + t * (y1 - y0), 0 * t], axis=1) for x in (x0, *np.arange(np.ceil(x0), x1), x1)]
+    along_x = [np.stack([x0 + t * (x1 - x0), np.full(33, y), 0 * t], axis=1) for y in (y0, *np.arange(np.ceil(y0), y1), y1)]
+    draw_paths(image, camera, np.array(along_y + along_x), FLOOR, 1)
 
 
 def draw_rig(image: np.ndarray, camera: Camera, rig: Rig, depth_m: float = 0.25) -> None:
@@ -66,9 +64,9 @@ def draw_rig(image: np.ndarray, camera: Camera, rig: Rig, depth_m: float = 0.25)
         width, height = member.size
         corners = np.array([[0, 0], [width - 1, 0], [width - 1, height - 1], [0, height - 1.0]])
         ends = member.centre + depth_m * backproject(member, corners)
-        draw_path(image, camera, ends[[0, 1, 2, 3, 0]], CAMERAS, 1)
-        for end in ends:
-            draw_path(image, camera, np.stack([member.centre, end]), CAMERAS, 1)
+        a, b, c, d = ends
+        pen = np.array([a, b, c, d, a, member.centre, b, member.centre, c, member.centre, d])
+        draw_paths(image, camera, pen, CAMERAS, 1)
         uv, valid = project(camera, member.centre)
         if valid and (uv > 0).all() and (uv < camera.size).all():
             draw_label(image, member.name, uv + np.array([6, -6]), CAMERAS, 0.35)
