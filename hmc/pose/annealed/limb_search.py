@@ -1,0 +1,124 @@
+"""Search for a limb that got lost: random poses of that limb alone, the best refined, taken if the whole cost falls."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hmc.pose.annealed.hull_target import HullTarget, sample_points
+from hmc.pose.annealed.refine import RefineSettings, refine
+from hmc.pose.annealed.symmetric import SymmetricSettings, body_distance, outside_distance, symmetric_cost
+from hmc.pose.body.flesh import SurfaceSamples
+from hmc.pose.body.joints import DOF_NAMES, dof_index
+from hmc.pose.body.model import PARTS, BodyModel
+
+__all__ = ["LIMBS", "SearchSettings", "lost_limbs", "search_limbs"]
+
+#: Angles of each limb.
+LIMBS: dict[str, np.ndarray] = {
+    limb: dof_index(*(name for name in DOF_NAMES if name.startswith(joints)))
+    for limb, joints in {
+        "r_arm": ("r_shoulder", "r_elbow"),
+        "l_arm": ("l_shoulder", "l_elbow"),
+        "r_leg": ("r_hip", "r_knee"),
+        "l_leg": ("l_hip", "l_knee"),
+    }.items()
+}
+_PARTS = {
+    limb: [PARTS.index(f"{limb[0]}_{part}") for part in (("upper_arm", "forearm") if limb.endswith("arm") else ("thigh", "shank"))]
+    for limb in LIMBS
+}
+
+
+@dataclass(frozen=True)
+class SearchSettings:
+    """When a limb counts as lost and how it is looked for.
+
+    Parameters
+    ----------
+    far_m : float
+        A body or hull point farther than this from its counterpart is unexplained, metres.
+    outside_share : float
+        A limb is lost when more than this share of its surface is that far outside the tolerant hull ...
+    unexplained_share : float
+        ... or when more than this share of the hull's surface is that far from the body (then every limb is looked for).
+    draws : int
+        Random poses a limb.
+    gain : float
+        The new pose is taken when the cost falls by at least this share.
+    """
+
+    far_m: float = 0.05
+    outside_share: float = 0.25
+    unexplained_share: float = 0.02
+    draws: int = 200
+    gain: float = 0.03
+
+
+def lost_limbs(
+    body: BodyModel, samples: SurfaceSamples, state: np.ndarray, target: HullTarget, hull_points: np.ndarray, settings: SearchSettings
+) -> list[str]:
+    """Limbs that the hulls contradict, and all four where much of the hull is unexplained.
+
+    Returns
+    -------
+    list of str
+        Keys of `LIMBS`.
+    """
+    unexplained = body_distance(body, state[None], hull_points)[0]
+    if (unexplained > settings.far_m).mean() > settings.unexplained_share:
+        return list(LIMBS)
+    outside = outside_distance(body, samples, state[None], target)[0] > settings.far_m
+    return [limb for limb, parts in _PARTS.items() if outside[np.isin(samples.part, parts)].mean() > settings.outside_share]
+
+
+def search_limbs(
+    rng: np.random.Generator,
+    body: BodyModel,
+    samples: SurfaceSamples,
+    state: np.ndarray,
+    cost: float,
+    limbs: list[str],
+    target: HullTarget,
+    hull_points: np.ndarray,
+    cost_settings: SymmetricSettings,
+    refine_settings: RefineSettings,
+    settings: SearchSettings,
+) -> tuple[np.ndarray, float, int]:
+    """Look for limbs one after the other.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    body, samples, target, hull_points, cost_settings
+        As for `hmc.pose.annealed.symmetric.symmetric_cost`.
+    state : ndarray, shape (27,)
+    cost : float
+        Its cost as the refinement gives it, square metres.
+    limbs : list of str
+        As from `lost_limbs`.
+    refine_settings : RefineSettings
+    settings : SearchSettings
+
+    Returns
+    -------
+    state : ndarray, shape (27,)
+    cost : float
+    evaluations : int
+    """
+    low, high = body.limits.low, body.limits.high
+    coarse = sample_points(rng, hull_points, 200)
+    evaluations = 0
+    for limb in limbs:
+        dofs = LIMBS[limb]
+        trials = np.repeat(state[None], settings.draws, axis=0)
+        trials[:, dofs] = rng.uniform(low[dofs], high[dofs], (settings.draws, len(dofs)))
+        costs = symmetric_cost(body, samples, trials, target, coarse, cost_settings)
+        evaluations += settings.draws
+        for pick in np.argsort(costs)[:2]:
+            trial, info = refine(body, samples, trials[pick], target, hull_points, cost_settings, refine_settings, anchor=trials[pick])
+            evaluations += info.evaluations
+            if info.cost_after < (1 - settings.gain) * cost:
+                state, cost = trial, info.cost_after
+    return state, cost, evaluations

@@ -1,0 +1,129 @@
+"""Named settings of the annealed pose filter, each with its source."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from hmc.errors import InputError
+from hmc.montecarlo.filters import AnnealedSettings
+from hmc.pose.annealed.fit_body import FitBodySettings
+from hmc.pose.annealed.limb_search import SearchSettings
+from hmc.pose.annealed.refine import RefineSettings
+from hmc.pose.annealed.symmetric import SymmetricSettings
+from hmc.pose.body.joints import DOF_NAMES
+
+__all__ = ["PRESETS", "PosePreset", "drift", "pose_preset"]
+
+# Half of the largest variation expected in a thirtieth of a second: metres for the translations, radians for the angles.
+_DRIFT = {
+    "root_tx": 0.05, "root_ty": 0.05, "root_tz": 0.04, "root_rz": 0.14, "root_ry": 0.10, "root_rx": 0.08,
+    "torso": 0.08, "neck": 0.10, "shoulder": 0.30, "elbow": 0.35, "hip": 0.20, "knee": 0.28,
+}  # fmt: skip
+
+
+def drift(fps: float) -> np.ndarray:
+    """P0, the first layer's deviations: half of the largest variation expected in one frame (Canton 2009, section 3.2.2).
+
+    Parameters
+    ----------
+    fps : float
+        Frames a second; below 30 the variation grows in proportion, up to threefold.
+
+    Returns
+    -------
+    ndarray, shape (27,)
+        Metres and radians.
+    """
+    scale = float(np.clip(30.0 / fps, 0.5, 3.0))
+    values = []
+    for name in DOF_NAMES:
+        key = next(key for key in _DRIFT if key in name) if name not in _DRIFT else name
+        values.append(_DRIFT[key])
+    return scale * np.array(values)
+
+
+@dataclass(frozen=True)
+class PosePreset:
+    """Everything that decides how poses are estimated.
+
+    Parameters
+    ----------
+    name : str
+    source : str
+        Where the numbers come from.
+    body : {"default", "canton"}
+        Proportions and joint limits (`hmc.pose.body.proportions`).
+    likelihood : {"symmetric", "factorised", "global"}
+        The symmetric cost, or the four scores of Canton (2009), section 6.5.
+    annealed : AnnealedSettings
+    drift_scale : float
+        Factor on `drift`.
+    surface_samples, hull_points : int
+        Points of the body's surface and of the hull's in the symmetric cost, for the particles.
+    fine_hull_points : int
+        The same in the refinement.
+    density : float
+        Spacing of the flesh table over the voxel size (Canton, Eq. 6.26), for the four scores.
+    symmetric : SymmetricSettings
+    refine : RefineSettings or None
+        Local refinement of each frame's estimate.
+    search : SearchSettings or None
+        Search for a limb that got lost.
+    fit_body : FitBodySettings or None
+        Fit the person's dimensions over the first frames.
+    start : {"hypotheses", "neutral"}
+        Several starts with a left-right test, or the thesis's neutral pose with the heading of the walk.
+    """
+
+    name: str
+    source: str
+    body: Literal["default", "canton"] = "default"
+    likelihood: Literal["symmetric", "factorised", "global"] = "symmetric"
+    annealed: AnnealedSettings = field(default_factory=AnnealedSettings)
+    drift_scale: float = 1.0
+    surface_samples: int = 350
+    hull_points: int = 150
+    fine_hull_points: int = 400
+    density: float = 1.0
+    symmetric: SymmetricSettings = field(default_factory=SymmetricSettings)
+    refine: RefineSettings | None = None
+    search: SearchSettings | None = None
+    fit_body: FitBodySettings | None = None
+    start: Literal["hypotheses", "neutral"] = "neutral"
+
+
+PRESETS: dict[str, PosePreset] = {
+    "canton2009": PosePreset(
+        name="canton2009",
+        source="Canton (2009), sections 3.2.2, 6.3 to 6.7: Table 6.1, Table 6.2, 6 layers of 600 particles, survival rate .5, neutral start",
+        body="canton",
+        likelihood="factorised",
+        annealed=AnnealedSettings(layers=6, particles=600, survival_rate=0.5, spread="survival"),
+    ),
+    "default": PosePreset(
+        name="default",
+        source="found on rendered recordings (docs/accuracy.md): symmetric cost, strong selection, refinement, limb search, fitted body",
+        annealed=AnnealedSettings(layers=4, particles=150, survival_rate=0.04, spread=0.6),
+        drift_scale=0.7,
+        refine=RefineSettings(),
+        search=SearchSettings(),
+        fit_body=FitBodySettings(),
+        start="hypotheses",
+    ),
+}
+
+
+def pose_preset(name: str) -> PosePreset:
+    """A preset by its name.
+
+    Raises
+    ------
+    InputError
+        When there is none of that name.
+    """
+    if name not in PRESETS:
+        raise InputError(f"no preset named {name!r}; there are {', '.join(sorted(PRESETS))}")
+    return PRESETS[name]

@@ -1,0 +1,219 @@
+"""Local least-squares refinement of a pose: Gauss-Newton steps with damping on the symmetric cost's distances.
+
+Each body-surface sample outside the tolerant hull pulls its segment back along the hull's distance field; each point of the
+strict hull's surface outside the body pulls the nearest cone towards itself. Both move with the twists of the joints
+(Canton 2009, Eq. A.1), so the Jacobian is analytic.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hmc.pose.annealed.hull_target import HullTarget, distance_at
+from hmc.pose.annealed.symmetric import SymmetricSettings, body_distance
+from hmc.pose.body.flesh import SurfaceSamples, place_points
+from hmc.pose.body.joints import N_DOF
+from hmc.pose.body.kinematics import dof_masks, joint_twists, segment_transforms
+from hmc.pose.body.model import BodyModel
+
+__all__ = ["RefineInfo", "RefineSettings", "refine", "residual_rows", "residual_values"]
+
+_MASKS = dof_masks().astype(float)
+
+
+@dataclass(frozen=True)
+class RefineSettings:
+    """How a pose is refined.
+
+    Parameters
+    ----------
+    iterations : int
+        Most accepted steps.
+    tolerance : float
+        Stop when the cost falls by less than this share in a step.
+    stay_weight : float
+        Weight (square metres for a step of one prior deviation) that holds angles no data speaks of, such as the twist of a
+        straight arm, where the start has them.
+    """
+
+    iterations: int = 12
+    tolerance: float = 2e-3
+    stay_weight: float = 4e-6
+
+
+@dataclass(frozen=True)
+class RefineInfo:
+    """Cost before and after (square metres, the hold on the start included), and cost evaluations."""
+
+    cost_before: float
+    cost_after: float
+    evaluations: int
+
+
+def refine(
+    body: BodyModel,
+    samples: SurfaceSamples,
+    state: np.ndarray,
+    target: HullTarget,
+    hull_points: np.ndarray,
+    cost_settings: SymmetricSettings,
+    settings: RefineSettings,
+    free: np.ndarray | None = None,
+    anchor: np.ndarray | None = None,
+    deviation: np.ndarray | None = None,
+) -> tuple[np.ndarray, RefineInfo]:
+    """Move one pose to the nearest minimum of the symmetric cost.
+
+    Parameters
+    ----------
+    body, samples, target, hull_points, cost_settings
+        As for `hmc.pose.annealed.symmetric.symmetric_cost`.
+    state : ndarray, shape (27,)
+        Start.
+    settings : RefineSettings
+    free : ndarray of bool, shape (27,), optional
+        Degrees of freedom that may move; all by default.
+    anchor : ndarray, shape (27,), optional
+        Pose on which the hold pulls; the start by default.
+    deviation : ndarray, shape (27,), optional
+        Deviations of the hold, metres and radians; .1 m and .5 rad by default.
+
+    Returns
+    -------
+    state : ndarray, shape (27,)
+        Within the body's joint limits.
+    info : RefineInfo
+    """
+    free = np.ones(N_DOF, bool) if free is None else free
+    low, high = body.limits.low, body.limits.high
+    state = np.clip(state, low, high)
+    anchor = state if anchor is None else anchor
+    if deviation is None:
+        deviation = np.r_[np.full(3, 0.1), np.full(N_DOF - 3, 0.5)]
+    hold = settings.stay_weight / deviation**2
+
+    def evaluate(s):
+        residuals, jacobian = residual_rows(body, samples, s, target, hull_points, cost_settings)
+        offset = s - anchor
+        cost = float(residuals @ residuals + hold @ offset**2)
+        return jacobian.T @ residuals + hold * offset, jacobian.T @ jacobian + np.diag(hold), cost
+
+    gradient, normal, cost = evaluate(state)
+    first, evaluations, damping, accepted = cost, 1, 1e-2, 0
+    while accepted < settings.iterations and damping < 1e4:
+        # An angle at its limit that wants further out takes no part in this step.
+        stuck = ((state <= low) & (gradient > 0)) | ((state >= high) & (gradient < 0)) | ~free
+        active = np.flatnonzero(~stuck)
+        matrix = normal[np.ix_(active, active)]
+        matrix = matrix + damping * np.diag(np.diag(matrix) + 1e-9)
+        step = np.zeros(N_DOF)
+        step[active] = -np.linalg.solve(matrix, gradient[active])
+        trial = np.clip(state + np.clip(step, -0.5, 0.5), low, high)
+        trial_gradient, trial_normal, trial_cost = evaluate(trial)
+        evaluations += 1
+        if trial_cost < cost:
+            gain = (cost - trial_cost) / max(cost, 1e-12)
+            state, gradient, normal, cost = trial, trial_gradient, trial_normal, trial_cost
+            damping = max(damping * 0.3, 1e-4)
+            accepted += 1
+            if gain < settings.tolerance:
+                break
+        else:
+            damping *= 5
+    return state, RefineInfo(first, cost, evaluations)
+
+
+def residual_rows(
+    body: BodyModel,
+    samples: SurfaceSamples,
+    state: np.ndarray,
+    target: HullTarget,
+    hull_points: np.ndarray,
+    settings: SymmetricSettings,
+) -> tuple[np.ndarray, np.ndarray]:
+    """The symmetric cost at one state as weighted residuals, and how they change with the state.
+
+    Parameters
+    ----------
+    body, samples, target, hull_points, settings
+        As for `hmc.pose.annealed.symmetric.symmetric_cost`.
+    state : ndarray, shape (27,)
+
+    Returns
+    -------
+    residuals : ndarray, shape (n_samples + n_hull_points,)
+        Their squares sum to the cost; square metres.
+    jacobian : ndarray, shape (n_samples + n_hull_points, 27)
+        Zero where a distance is zero or beyond the cap.
+    """
+    axes, centres, rotations, positions = joint_twists(body, state)
+    moments = np.cross(axes, centres)
+    points = place_points(rotations, positions, samples.points, samples.segment)
+    value, slope = _field(target, points)
+    residuals, jacobians = [], []
+    for distance, direction, where, segment, weight in (
+        (value, slope, points, samples.segment, 1.0 / len(points)),
+        (*_hull_to_body(body, rotations, positions, hull_points), settings.explain_weight / len(hull_points)),
+    ):
+        # g . (axis x (p - centre)) = (p x g) . axis - g . (axis x centre)
+        jacobian = np.cross(where, direction) @ axes.T - direction @ moments.T
+        jacobian[:, :3] = direction
+        pull = (distance > 0) & (distance < settings.cap_m)
+        jacobian *= _MASKS[segment] * (np.sqrt(weight) * pull)[:, None]
+        residuals.append(np.sqrt(weight) * np.minimum(distance, settings.cap_m))
+        jacobians.append(jacobian)
+    return np.concatenate(residuals), np.concatenate(jacobians)
+
+
+def residual_values(
+    body: BodyModel,
+    samples: SurfaceSamples,
+    state: np.ndarray,
+    target: HullTarget,
+    hull_points: np.ndarray,
+    settings: SymmetricSettings,
+) -> np.ndarray:
+    """The residuals of `residual_rows` alone, at a fraction of the work."""
+    rotations, positions = segment_transforms(body, state)
+    outside = distance_at(target, place_points(rotations, positions, samples.points, samples.segment), smooth=True)
+    unexplained = body_distance(body, state[None], hull_points)[0]
+    cap = settings.cap_m
+    return np.concatenate(
+        [
+            np.sqrt(1 / len(outside)) * np.minimum(outside, cap).astype(float),
+            np.sqrt(settings.explain_weight / len(hull_points)) * np.minimum(unexplained, cap).astype(float),
+        ]
+    )
+
+
+def _field(target: HullTarget, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Distance to the tolerant hull and its gradient, by central differences over a voxel."""
+    step = 0.5 * target.voxel_size_m
+    offsets = np.concatenate([np.zeros((1, 3)), step * np.eye(3), -step * np.eye(3)])
+    values = distance_at(target, points + offsets[:, None, :], smooth=True).astype(float)
+    return values[0], ((values[1:4] - values[4:7]) / (2 * step)).T
+
+
+def _hull_to_body(body: BodyModel, rotations, positions, points):
+    """Distance of hull points to the nearest cone; how it changes when that cone moves (minus the outward direction)."""
+    cones = body.cones
+    turn = cones.bases @ np.swapaxes(rotations[cones.segment], -1, -2)
+    start = positions[cones.segment] + (rotations[cones.segment] @ cones.start[..., None])[..., 0]
+    local = np.einsum("cij,ckj->cki", turn, points[None] - start[:, None])
+    along = local[..., 2]
+    clipped = np.clip(along, 0, cones.lengths[:, None])
+    beyond = along - clipped
+    t = (clipped / cones.lengths[:, None])[..., None]
+    radii = (1 - t) * cones.radii[:, None, 0] + t * cones.radii[:, None, 1]
+    level = np.maximum(np.hypot(local[..., 0] / radii[..., 0], local[..., 1] / radii[..., 1]), 1.0)
+    shrink = 1 - 1 / level
+    squared = (local[..., 0] ** 2 + local[..., 1] ** 2) * shrink**2 + beyond**2
+    nearest = squared.argmin(0)
+    k = np.arange(len(points))
+    distance = np.sqrt(squared[nearest, k])
+    outward = np.stack([local[nearest, k, 0] * shrink[nearest, k], local[nearest, k, 1] * shrink[nearest, k], beyond[nearest, k]], -1)
+    outward /= np.maximum(distance, 1e-9)[:, None]
+    direction = np.einsum("kji,kj->ki", turn[nearest], outward)
+    return distance, -direction, points, cones.segment[nearest]

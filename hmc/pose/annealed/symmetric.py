@@ -1,0 +1,139 @@
+"""The symmetric cost: body outside the tolerant hull, and strict hull that no part of the body explains.
+
+Canton's four scores (section 6.5) ask only that what the body fills be occupied, so a limb folded into the trunk costs
+nothing. Here the hull's own surface has to be explained too. The strict hull (every camera agrees) is what must be
+explained; the tolerant one (one camera may miss) is what the body must not leave.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hmc.pose.annealed.hull_target import HullTarget, distance_at
+from hmc.pose.body.flesh import SurfaceSamples, place_points
+from hmc.pose.body.kinematics import segment_transforms
+from hmc.pose.body.model import BodyModel
+
+__all__ = ["SymmetricSettings", "body_distance", "outside_distance", "symmetric_cost"]
+
+#: Elements (states x cones x points) worked on at a time: what stays in the second-level cache.
+CHUNK = 65536
+
+
+@dataclass(frozen=True)
+class SymmetricSettings:
+    """Weights of the symmetric cost.
+
+    Parameters
+    ----------
+    cap_m : float
+        Distances beyond this count as this (metres), so that furniture in the hull or a cut-off limb cannot pull without end.
+    explain_weight : float
+        Weight of unexplained hull against body outside the hull.
+    """
+
+    cap_m: float = 0.20
+    explain_weight: float = 1.0
+
+
+def outside_distance(body: BodyModel, samples: SurfaceSamples, states: np.ndarray, target: HullTarget) -> np.ndarray:
+    """Distance of each body-surface sample to the tolerant hull.
+
+    Parameters
+    ----------
+    body : BodyModel
+    samples : SurfaceSamples
+    states : ndarray, shape (n, 27)
+    target : HullTarget
+
+    Returns
+    -------
+    ndarray of float32, shape (n, n_samples)
+        Metres; 0 inside.
+    """
+    rotations, positions = segment_transforms(body, states)
+    points = place_points(rotations.astype(np.float32), positions.astype(np.float32), samples.points, samples.segment)
+    return distance_at(target, points)
+
+
+def body_distance(body: BodyModel, states: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Distance of hull points to the nearest truncated cone of the body.
+
+    Parameters
+    ----------
+    body : BodyModel
+    states : ndarray, shape (n, 27)
+    points : ndarray, shape (k, 3)
+        World, metres.
+
+    Returns
+    -------
+    ndarray of float32, shape (n, k)
+        Metres; 0 inside the body.
+    """
+    rotations, positions = segment_transforms(body, states)
+    cones = body.cones
+    turn = (cones.bases @ np.swapaxes(rotations[:, cones.segment], -1, -2)).astype(np.float32)  # cone from world, (n, C, 3, 3)
+    # Work relative to the points' middle: float32 then has digits to spare.
+    middle = points.mean(0)
+    start = positions[:, cones.segment] + (rotations[:, cones.segment] @ cones.start[..., None])[..., 0] - middle
+    shift = (turn @ start[..., None].astype(np.float32))[..., 0]
+    pts = np.ascontiguousarray((points - middle).T, np.float32)
+    n, n_cones = turn.shape[:2]
+    length = cones.lengths.astype(np.float32)[:, None]
+    radii0, slope = cones.radii[:, 0].astype(np.float32), (cones.radii[:, 1] - cones.radii[:, 0]).astype(np.float32)
+    out = np.empty((n, points.shape[0]), np.float32)
+    step = max(1, CHUNK // (n_cones * points.shape[0]))
+    for first in range(0, n, step):
+        part = slice(first, min(first + step, n))
+        local = turn[part].reshape(-1, 3) @ pts
+        local = local.reshape(-1, n_cones, 3, pts.shape[1])
+        local -= shift[part][..., None]
+        x, y, along = local[:, :, 0], local[:, :, 1], local[:, :, 2]
+        clipped = np.clip(along, 0, length)
+        beyond = along - clipped
+        t = clipped / length
+        a = x / (radii0[:, :1] + slope[:, :1] * t)
+        b = y / (radii0[:, 1:] + slope[:, 1:] * t)
+        level2 = a * a + b * b
+        np.maximum(level2, 1.0, out=level2)
+        # lateral * (1 - 1 / level), squared
+        squared = (x * x + y * y) * (1 - 1 / np.sqrt(level2)) ** 2 + beyond * beyond
+        np.sqrt(squared.min(1), out=out[part])
+    return out
+
+
+def symmetric_cost(
+    body: BodyModel,
+    samples: SurfaceSamples,
+    states: np.ndarray,
+    target: HullTarget,
+    hull_points: np.ndarray,
+    settings: SymmetricSettings,
+) -> np.ndarray:
+    """Mean squared distance of the body from the hulls and of the hull from the body.
+
+    Parameters
+    ----------
+    body : BodyModel
+    samples : SurfaceSamples
+    states : ndarray, shape (n, 27)
+    target : HullTarget
+    hull_points : ndarray, shape (k, 3)
+        Points of the strict hull's surface (`hmc.pose.annealed.hull_target.sample_points`).
+    settings : SymmetricSettings
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Square metres.
+    """
+    cap = np.float32(settings.cap_m)
+    outside = np.minimum(outside_distance(body, samples, states, target), cap)
+    unexplained = np.minimum(body_distance(body, states, hull_points), cap)
+    return (
+        np.einsum("ij,ij->i", outside, outside) / outside.shape[1]
+        + settings.explain_weight * np.einsum("ij,ij->i", unexplained, unexplained) / unexplained.shape[1]
+    )

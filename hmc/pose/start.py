@@ -1,0 +1,276 @@
+"""How a person's tracking starts: the first seconds decide the heading, left and right, and the body's dimensions.
+
+1. Candidate poses from several frames of the window (`hmc.pose.initialisation`), with the versions that a hull confuses.
+2. The most promising are followed for some frames; the mean cost decides, and walking backwards counts against a candidate.
+3. The winner is followed through the window, the body's dimensions are fitted to some of its frames, and kept if the other
+   frames agree; then the window is followed once more with that body.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hmc.montecarlo.filters import AnnealedSettings
+from hmc.pose.annealed.apf import PoseFilter, PoseInfo, PoseState, make_filter, pose_init, pose_step
+from hmc.pose.annealed.fit_body import FitBodyInfo, fit_body
+from hmc.pose.annealed.hull_target import HullTarget, sample_points
+from hmc.pose.annealed.presets import PosePreset
+from hmc.pose.annealed.refine import refine
+from hmc.pose.body.flesh import surface_coordinates
+from hmc.pose.body.kinematics import landmarks
+from hmc.pose.body.model import BodyModel, neutral_state
+from hmc.pose.body.proportions import canton_body, default_body
+from hmc.pose.initialisation import first_poses, swapped_poses
+
+__all__ = ["StartSettings", "Started", "estimate_height", "follow", "start_person"]
+
+#: Random generator of a frame: the same whatever the order in which frames are visited.
+FrameRng = Callable[[int], np.random.Generator]
+
+
+@dataclass(frozen=True)
+class StartSettings:
+    """How the first pose is found.
+
+    Parameters
+    ----------
+    anchors : int
+        Frames of the window from which candidates are taken.
+    candidates : int
+        Candidates followed.
+    follow_s : float
+        How long each is followed, seconds.
+    walk_speed_m_s : float
+        Above this speed of the track, a body is taken to face where it goes.
+    walk_penalty : float
+        Share by which facing straight backwards raises the cost.
+    body_frames : int
+        Frames to which the body's dimensions are fitted.
+    """
+
+    anchors: int = 3
+    candidates: int = 5
+    follow_s: float = 0.4
+    walk_speed_m_s: float = 0.5
+    walk_penalty: float = 0.6
+    body_frames: int = 12
+
+
+@dataclass(frozen=True)
+class Started:
+    """A person's first seconds.
+
+    Parameters
+    ----------
+    filter : PoseFilter
+        With the fitted body.
+    states : list of PoseState
+        One a frame of the window.
+    infos : list of PoseInfo
+    candidates : ndarray, shape (n,)
+        Mean cost of each candidate that was followed, the winner first; square metres.
+    fit : FitBodyInfo or None
+    """
+
+    filter: PoseFilter
+    states: list[PoseState]
+    infos: list[PoseInfo]
+    candidates: np.ndarray
+    fit: FitBodyInfo | None
+
+
+def estimate_height(targets: Sequence[HullTarget | None], floor_z: float = 0.0) -> float:
+    """Stature from the tracked volume: the highest that the top of the hull comes while it is as high as somebody who stands.
+
+    Parameters
+    ----------
+    targets : sequence of HullTarget or None
+        A person's hulls in some frames.
+    floor_z : float
+        Height of the floor, metres.
+
+    Returns
+    -------
+    float
+        Metres; an adult's mean stature where the person never stood up.
+    """
+    tops = [np.quantile(target.surface[:, 2], 0.995) - floor_z for target in targets if target is not None and len(target.surface) >= 20]
+    # Arms held up, hats and stray voxels reach above the crown: the median of the frames resists all that does not last.
+    top = float(np.median(tops)) if tops else 0.0
+    return float(np.clip(top, 1.45, 2.0)) if top > 1.3 else 1.7
+
+
+def start_person(
+    frame_rng: FrameRng,
+    preset: PosePreset,
+    fps: float,
+    targets: Sequence[HullTarget | None],
+    height_m: float | None = None,
+    velocities: np.ndarray | None = None,
+    floor_z: float = 0.0,
+    settings: StartSettings | None = None,
+) -> Started | None:
+    """Find a person's body and poses in the first seconds.
+
+    Parameters
+    ----------
+    frame_rng : callable
+        Frame of the window to `numpy.random.Generator`.
+    preset : PosePreset
+    fps : float
+    targets : sequence of HullTarget or None
+        The window's frames, in order.
+    height_m : float, optional
+        Stature where it is known; else `estimate_height`.
+    velocities : ndarray, shape (n, 3), optional
+        Of the track, metres a second.
+    floor_z : float
+    settings : StartSettings, optional
+
+    Returns
+    -------
+    Started or None
+        None where no frame of the window has a hull to start from.
+    """
+    settings = settings or StartSettings()
+    usable = [k for k, target in enumerate(targets) if target is not None and len(target.surface) >= 50]
+    if not usable:
+        return None
+    velocities = np.zeros((len(targets), 3)) if velocities is None else velocities
+    height = height_m or estimate_height(targets, floor_z)
+    body = canton_body(height) if preset.body == "canton" else default_body(height)
+    filt = make_filter(body, preset, fps)
+    if preset.start == "neutral":
+        anchor, costs = usable[0], np.array([np.nan])
+        state = _neutral_start(body, targets[anchor], velocities[: max(2, int(0.5 * fps))].mean(0), floor_z)
+    else:
+        anchor, state, costs = _best_hypothesis(frame_rng, filt, fps, targets, usable, velocities, floor_z, settings)
+    states, infos = follow(frame_rng, filt, state, anchor, targets)
+    fit = None
+    if preset.fit_body is not None:
+        filt, fit = _fit(frame_rng, filt, fps, targets, states, infos, settings, height_m is not None)
+        if fit is not None and fit.accepted:
+            states, infos = follow(frame_rng, filt, states[anchor].state, anchor, targets)
+    return Started(filt, states, infos, costs, fit)
+
+
+def follow(
+    frame_rng: FrameRng, filt: PoseFilter, state: np.ndarray, anchor: int, targets: Sequence[HullTarget | None], step=pose_step
+) -> tuple[list[PoseState], list[PoseInfo]]:
+    """Track from one frame backwards to the first and forwards to the last.
+
+    Parameters
+    ----------
+    frame_rng, filt, targets
+        As for `start_person`.
+    state : ndarray, shape (27,)
+        Pose in the frame `anchor`.
+    anchor : int
+    step : callable
+        As `hmc.pose.annealed.apf.pose_step`.
+
+    Returns
+    -------
+    states, infos : list
+        One a frame.
+    """
+    n = len(targets)
+    found: dict[int, tuple[PoseState, PoseInfo]] = {}
+    found[anchor] = step(frame_rng(anchor), filt, pose_init(state), targets[anchor])
+    for order in (range(anchor + 1, n), range(anchor - 1, -1, -1)):
+        current = replace(found[anchor][0], velocity=np.zeros_like(state))
+        for k in order:
+            found[k] = step(frame_rng(k), filt, current, targets[k])
+            current = found[k][0]
+    # Backwards, the velocity is that of time reversed; only the last frame's is used again, and that one is forward.
+    return [found[k][0] for k in range(n)], [found[k][1] for k in range(n)]
+
+
+def _neutral_start(body: BodyModel, target: HullTarget, velocity: np.ndarray, floor_z: float) -> np.ndarray:
+    """Canton (2009), section 6.3.3: root under the centroid, heading of the walk, all else neutral."""
+    state = neutral_state("down", body.limits)
+    legs = body.dimensions["thigh"] + body.dimensions["shank"] + body.dimensions["ankle_height"]
+    state[:3] = (*target.surface.mean(0)[:2], floor_z + legs)
+    state[3] = np.arctan2(velocity[1], velocity[0])
+    return state
+
+
+def _best_hypothesis(frame_rng, filt, fps, targets, usable, velocities, floor_z, settings):
+    """The frame and pose to start from, and the mean costs of all that were followed."""
+    preset, body, samples = filt.preset, filt.body, filt.samples
+    anchors = sorted({usable[round(q * (len(usable) - 1))] for q in np.linspace(0.1, 0.9, settings.anchors)})
+    pool = []
+    for anchor in anchors:
+        rng = frame_rng(anchor)
+        states, costs = first_poses(rng, body, samples, targets[anchor], preset.symmetric, floor_z)
+        pool += [(cost, anchor, state) for cost, state in zip(costs, states, strict=True)]
+    pool.sort(key=lambda entry: entry[0])
+    # All candidates are compared in the frame that was easiest to explain.
+    anchor = pool[0][1]
+    points = sample_points(frame_rng(anchor), targets[anchor].surface, preset.fine_hull_points)
+    here = [state for _, where, state in pool if where == anchor]
+    trials = [*here, *swapped_poses(body, here[0]), *swapped_poses(body, here[min(1, len(here) - 1)])]
+    refined = [refine(body, samples, trial, targets[anchor], points, preset.symmetric, preset.refine) for trial in trials]
+    refined.sort(key=lambda pair: pair[1].cost_after)
+    chosen: list[np.ndarray] = []
+    for state, _ in refined:
+        if all(np.abs(landmarks(body, state) - landmarks(body, other)).max() > 0.08 for other in chosen):
+            chosen.append(state)
+        if len(chosen) == settings.candidates:
+            break
+    quick = replace(preset, annealed=AnnealedSettings(layers=2, particles=60, survival_rate=0.1, spread=0.5), search=None)
+    quick_filter = replace(filt, preset=quick)
+    reach = max(2, round(settings.follow_s * fps))
+    first, last = max(0, anchor - reach), min(len(targets), anchor + reach + 1)
+    scores = []
+    for state in chosen:
+        states, infos = follow(lambda k: frame_rng(first + k), quick_filter, state, anchor - first, targets[first:last])
+        costs = np.array([info.cost for info in infos])
+        headings = np.array([one.state[3] for one in states])
+        scores.append(np.nanmean(costs) * (1 + settings.walk_penalty * _backwards(headings, velocities[first:last], settings)))
+    order = np.argsort(scores)
+    return anchor, chosen[order[0]], np.array(scores)[order]
+
+
+def _backwards(headings: np.ndarray, velocities: np.ndarray, settings: StartSettings) -> float:
+    """How much a body walks backwards: 0 (forwards, or hardly moving) to 1."""
+    speed = np.hypot(velocities[:, 0], velocities[:, 1])
+    moving = speed > settings.walk_speed_m_s
+    if not moving.any():
+        return 0.0
+    forwards = (np.cos(headings) * velocities[:, 0] + np.sin(headings) * velocities[:, 1])[moving] / speed[moving]
+    return float(np.mean((1 - forwards) / 2))
+
+
+def _fit(frame_rng, filt, fps, targets, states, infos, settings, height_known):
+    """The body fitted to some frames of the window, if the others agree."""
+    preset = filt.preset
+    good = [k for k, info in enumerate(infos) if np.isfinite(info.cost)]
+    if len(good) < 4:
+        return filt, None
+    # Frames in which the pose is in doubt teach nothing of the body: leave the worst third out.
+    limit = np.quantile([infos[k].cost for k in good], 0.67)
+    good = [k for k in good if infos[k].cost <= limit]
+    picks = sorted({good[round(q * (len(good) - 1))] for q in np.linspace(0, 1, settings.body_frames)})
+    held_out = [k for k in good if k not in picks][:: max(1, len(good) // 8)] or picks
+    points = {k: sample_points(frame_rng(k), targets[k].surface, preset.fine_hull_points) for k in {*picks, *held_out}}
+    fit_settings = replace(preset.fit_body, scale_deviation=0.015) if height_known else preset.fit_body
+    body, _, info = fit_body(
+        filt.body,
+        surface_coordinates(filt.body, preset.surface_samples),
+        np.array([states[k].state for k in picks]),
+        [targets[k] for k in picks],
+        [points[k] for k in picks],
+        preset.symmetric,
+        fit_settings,
+    )
+    fitted = make_filter(body, preset, fps)
+    costs = [
+        [refine(f.body, f.samples, states[k].state, targets[k], points[k], preset.symmetric, preset.refine)[1].cost_after for k in held_out]
+        for f in (filt, fitted)
+    ]
+    accepted = np.mean(costs[1]) < 0.97 * np.mean(costs[0])
+    return (fitted if accepted else filt), replace(info, accepted=bool(accepted))
