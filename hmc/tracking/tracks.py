@@ -12,7 +12,7 @@ from hmc.tracking.blobs import Observation
 from hmc.tracking.lifecycle import Row
 from hmc.tracking.naive import NaiveSettings, assign_voxels, finish, init, step
 
-__all__ = ["fill_gaps", "from_rows", "person_voxels", "run", "velocities"]
+__all__ = ["fill_gaps", "from_rows", "person_voxels", "run", "table_of", "velocities"]
 
 
 def run(
@@ -41,6 +41,11 @@ def run(
         rows += info.rows
         n_frames += 1
     rows += finish(state, n_frames, settings)
+    return table_of(rows, fps, gap_s)
+
+
+def table_of(rows: Iterable[Row], fps: float, gap_s: float = 1.0) -> TrackTable:
+    """The finished table: gaps up to `gap_s` seconds filled, persons numbered in the order in which they were first seen."""
     return renumber(fill_gaps(from_rows(rows), round(gap_s * fps)))
 
 

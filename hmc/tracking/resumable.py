@@ -1,0 +1,159 @@
+"""Following everybody through a whole recording, so that a run that was stopped goes on where it was.
+
+Every `CHECKPOINT_FRAMES` frames the tracker's rows and its whole state go into a journal. A run that is started again with the same
+journal and the same key takes them up and computes what is left. What is guaranteed: finished frames are kept as they were, and the
+tracker goes on from exactly the state it had. The background models are not stored; they are learnt again and then segment the
+`WARM_UP_FRAMES` frames before. Where that reaches back to the start of the selection, the result is identical to that of a run
+without a stop; later on the background has adapted to the last frames only, which may change single pixels of the silhouettes.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterable
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hmc.errors import InputError
+from hmc.frontend import FrontendSettings, HullStep, stream_hulls
+from hmc.journal import append_journal, read_journal
+from hmc.recording import Recording
+from hmc.results import TrackTable
+from hmc.tracking.blobs import Observation, observe
+from hmc.tracking.ghosts import Views
+from hmc.tracking.lifecycle import Candidate, Row, Track
+from hmc.tracking.naive import NaiveSettings, NaiveState, finish, init, step
+from hmc.tracking.tracks import table_of
+from hmc.voxels.grid import VoxelGrid
+
+__all__ = ["observe_step", "track_recording"]
+
+logger = logging.getLogger("hmc")
+
+CHECKPOINT_FRAMES = 25
+WARM_UP_FRAMES = 300
+#: Coarser voxels do not show people.
+MAX_VOXEL_M = 0.15
+
+
+def track_recording(
+    recording: Recording,
+    voxel_size_m: float = 0.05,
+    settings: NaiveSettings | None = None,
+    frontend: FrontendSettings | None = None,
+    *,
+    journal: str | Path | None = None,
+    key: str = "",
+    on_problem: Callable[[str], None] | None = None,
+    progress: Callable[[Iterable[HullStep], int], Iterable[HullStep]] | None = None,
+) -> TrackTable:
+    """Where everybody is in every frame of the selection.
+
+    Parameters
+    ----------
+    recording : Recording
+    voxel_size_m : float
+    settings : NaiveSettings, optional
+    frontend : FrontendSettings, optional
+    journal : path, optional
+        File in which the run is kept, and from which it goes on.
+    key : str
+        Says what the run depends on. A journal with another key is begun anew.
+    on_problem : callable, optional
+        Called with one line for everything that was survived.
+    progress : callable, optional
+        ``progress(steps, total)`` passes the steps on and may show how far they are.
+
+    Returns
+    -------
+    TrackTable
+        With heads; persons numbered from 0 in the order in which they were first seen.
+
+    Raises
+    ------
+    InputError
+        When the voxels are too coarse, or too many for the memory.
+    """
+    if not 0 < voxel_size_m <= MAX_VOXEL_M:
+        raise InputError(f"voxels of {voxel_size_m:g} m do not show people; choose at most {MAX_VOXEL_M:g} m")
+    grid = VoxelGrid.from_room(recording.room, voxel_size_m, len(recording.rig))
+    done = _take_up(journal, key, recording)
+    state, rows, problems = done.state, list(done.rows), list(done.problems)
+    report = on_problem or logger.warning
+
+    def note(line: str) -> None:
+        problems.append(line)
+        report(line)
+
+    for line in problems:
+        report(line)
+    end = recording.start + recording.n_frames
+    stream = stream_hulls(recording, grid, frontend, first=done.next_frame, warm_up=WARM_UP_FRAMES, on_problem=note)
+    hulls: Iterable[HullStep] = stream if done.next_frame < end else ()
+    for hull in progress(hulls, end - done.next_frame) if progress else hulls:
+        state, info = step(state, hull.index, observe_step(recording, grid, hull), settings)
+        rows += info.rows
+        n_frames = hull.index + 1 - recording.start
+        if journal is not None and (n_frames % CHECKPOINT_FRAMES == 0 or n_frames == recording.n_frames):
+            append_journal(journal, _to_plain(Done(hull.index + 1, state, tuple(rows), tuple(problems)), since=done))
+            done = Done(hull.index + 1, state, tuple(rows), tuple(problems))
+    rows += finish(state, recording.n_frames, settings)
+    return table_of(rows, recording.fps)
+
+
+def observe_step(recording: Recording, grid: VoxelGrid, hull: HullStep) -> Observation | None:
+    """What the tracker sees of a frame: the tolerant hull, the strict one in it, and the silhouettes; None where it tells nothing."""
+    return observe(grid, hull.tolerant, hull.strict, Views(recording.rig, hull.masks)) if hull.usable else None
+
+
+@dataclass(frozen=True)
+class Done:
+    """What is done of a run: the frames before `next_frame`."""
+
+    next_frame: int
+    state: NaiveState
+    rows: tuple[Row, ...] = ()
+    problems: tuple[str, ...] = ()
+
+
+def _take_up(journal: str | Path | None, key: str, recording: Recording) -> Done:
+    """What the journal says is done; a journal that is not there, or of another key, is begun."""
+    done = Done(recording.start, init(recording.fps))
+    if journal is None:
+        return done
+    records = read_journal(journal)
+    if not records or records[0].get("key") != key:
+        Path(journal).unlink(missing_ok=True)
+        append_journal(journal, {"key": key})
+        return done
+    for record in records[1:]:
+        done = Done(
+            record["next_frame"],
+            _state_of(record["state"]),
+            done.rows + tuple(_row_of(row) for row in record["rows"]),
+            done.problems + tuple(record["problems"]),
+        )
+    return done
+
+
+def _to_plain(done: Done, since: Done) -> dict[str, Any]:
+    """A record of the journal: the state, and what is new since the last record."""
+    new = replace(done, rows=done.rows[len(since.rows) :], problems=done.problems[len(since.problems) :])
+    return asdict(new)
+
+
+def _state_of(plain: dict[str, Any]) -> NaiveState:
+    tracks = tuple(Track(**_arrays(track)) for track in plain["tracks"])
+    candidates = tuple(Candidate(tuple(_row_of(row) for row in one["rows"]), one["missed"]) for one in plain["candidates"])
+    return NaiveState(plain["fps"], tracks, candidates, plain["next_person"])
+
+
+def _row_of(plain: dict[str, Any]) -> Row:
+    return Row(**_arrays(plain))
+
+
+def _arrays(plain: dict[str, Any]) -> dict[str, Any]:
+    return {name: np.array(value, float) if isinstance(value, list) else value for name, value in plain.items()}
