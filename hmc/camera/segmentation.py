@@ -23,10 +23,14 @@ from hmc.errors import InputError
 __all__ = ["BackgroundModel", "SegmentationSettings", "segment", "segment_views", "train_background"]
 
 #: Least standard deviations of luma and chroma, grey levels: rounding and video compression.
-LEAST_DEVIATION = (1.5, 0.8, 0.8)
+LEAST_DEVIATION = (1.5, 0.8)
 #: The same where too few frames were learnt from to know any.
-ASSUMED_DEVIATION = (3.0, 1.2, 1.2)
+ASSUMED_DEVIATION = (3.0, 1.2)
 FEWEST_FRAMES = 5
+#: Where people are, the foreground holds squares of this side, pixels.
+SOLID_PX = 5
+#: How far around those squares the image is looked at, pixels of a 640 x 480 image.
+MARGIN_PX = 40
 #: Share of the new image when everything changed at once, and in the frames after that.
 SWITCH_RATE = 0.5
 SETTLING_RATE = 0.2
@@ -55,7 +59,7 @@ class SegmentationSettings:
     halo_share : float
         A pixel of the outline stays where its contrast is at least this share of the person's beside it; 0 cuts nothing (measured).
     least_blob_px : int
-        Foreground pieces of fewer pixels are specks.
+        Pieces in which the mixture found fewer pixels are specks.
     learning_rate, learn_every : float, int
         Share of a new image in the background each time it learns, and frames from one time to the next. At 30 frames a second the
         defaults follow the light with a time constant of 11 s.
@@ -71,7 +75,7 @@ class SegmentationSettings:
     gap_shadow_factor: float = 0.7
     reach_threshold: float = 5.0
     halo_share: float = 0.4
-    least_blob_px: int = 20
+    least_blob_px: int = 40
     learning_rate: float = 0.03
     learn_every: int = 10
     keep_out_px: int = 12
@@ -95,9 +99,9 @@ class BackgroundModel:
     mixture : cv2.BackgroundSubtractorMOG2
         Changes in place when it learns.
     mean : ndarray of float32, shape (height, width, 3)
-        Luma and chroma (OpenCV's YCrCb) of the empty scene; changes in place when it learns.
-    deviation : ndarray of float32, shape (height, width, 3)
-        Their standard deviations.
+        Luma, 1 at least, and chroma (OpenCV's YCrCb) of the empty scene; changes in place when it learns.
+    deviation : ndarray of float32, shape (height, width, 2)
+        Standard deviations of luma and of chroma.
     people : ndarray of bool, shape (height, width)
         The last silhouette; nothing is learnt there.
     frame : int
@@ -151,10 +155,13 @@ def train_background(frames: Iterable[np.ndarray], settings: SegmentationSetting
     if mean is None or square is None:
         raise InputError("there is no background frame to learn from: give some, or a median of the recording")
     if count < FEWEST_FRAMES:
-        deviation = np.broadcast_to(np.array(ASSUMED_DEVIATION, np.float32), mean.shape).copy()
+        deviation = np.broadcast_to(np.array(ASSUMED_DEVIATION, np.float32), (*mean.shape[:2], 2)).copy()
     else:
         # A pixel's own few samples say little of its noise; its neighbours' do.
-        deviation = np.maximum(np.sqrt(cv2.blur(square / (count - 1), (9, 9))), np.array(LEAST_DEVIATION, np.float32))
+        variance = cv2.blur(square / (count - 1), (9, 9))
+        variance = np.stack([variance[..., 0], variance[..., 1:].mean(axis=2)], axis=-1)
+        deviation = np.maximum(np.sqrt(variance), np.array(LEAST_DEVIATION, np.float32))
+    mean[..., 0] = np.maximum(mean[..., 0], 1)
     return BackgroundModel(mixture, mean, deviation, np.zeros(mean.shape[:2], bool))
 
 
@@ -233,20 +240,24 @@ def _complete(found: np.ndarray, image: np.ndarray, model: BackgroundModel, sett
     scale = max(image.shape[:2]) / 640
     found = cv2.morphologyEx(found, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
     mask = np.zeros_like(found)
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(found, connectivity=8)
-    blob = stats[:, cv2.CC_STAT_AREA] >= settings.least_blob_px * scale**2
-    blob[0] = False
-    if not blob.any():
+    # Specks are all over the image; a person has some solid part.
+    left, top, width, height = cv2.boundingRect(cv2.erode(found, np.ones((SOLID_PX, SOLID_PX), np.uint8)))
+    if width == 0:
         return mask
-    left, top = stats[blob, cv2.CC_STAT_LEFT], stats[blob, cv2.CC_STAT_TOP]
-    right, bottom = left + stats[blob, cv2.CC_STAT_WIDTH], top + stats[blob, cv2.CC_STAT_HEIGHT]
-    margin = round(40 * scale)
-    rows = slice(max(0, top.min() - margin), bottom.max() + margin)
-    columns = slice(max(0, left.min() - margin), right.max() + margin)
-    seeds = blob[labels[rows, columns]].view(np.uint8)
+    margin = round(MARGIN_PX * scale)
+    rows = slice(max(0, top - margin), top + height + margin)
+    columns = slice(max(0, left - margin), left + width + margin)
+    seeds = found[rows, columns]
     seen = evidence(image[rows, columns], model.mean[rows, columns], model.deviation[rows, columns])
     part = fill_gaps(
-        seeds, seen, settings.gap_threshold, settings.reach_threshold, settings.shadow_factor, settings.gap_shadow_factor, scale
+        seeds,
+        seen,
+        threshold=settings.gap_threshold,
+        reach_threshold=settings.reach_threshold,
+        shadow=settings.shadow_factor,
+        gap_shadow=settings.gap_shadow_factor,
+        least=settings.least_blob_px,
+        scale=scale,
     )
     mask[rows, columns] = cut_halo(part, seen, settings.halo_share, scale)
     return mask
@@ -257,7 +268,7 @@ def _learn(model: BackgroundModel, image: np.ndarray, rate: float, settings: Seg
     side = 2 * round(settings.keep_out_px * max(image.shape[:2]) / 640) + 1
     near = cv2.dilate(model.people.view(np.uint8), np.ones((side, side), np.uint8))
     outside = 1 - near
-    cv2.accumulateWeighted(cv2.cvtColor(image, cv2.COLOR_BGR2YCrCb), model.mean, rate, mask=outside)
+    cv2.accumulateWeighted(_luma_chroma(image), model.mean, rate, mask=outside)
     empty = _as_image(model.mean)
     cv2.copyTo(image, outside, empty)
     model.mixture.apply(empty, learningRate=rate)
@@ -272,9 +283,16 @@ def _adapt_to_switch(model: BackgroundModel, image: np.ndarray, settings: Segmen
     window = (4 * side + 1, 4 * side + 1)
     gain = (cv2.blur(image * outside, window) + 1e-3) / (cv2.blur(old * outside, window) + 1e-3)
     empty = np.where(near[..., None] > 0, np.clip(old * gain, 0, 255), image).astype(np.uint8)
-    model.mean[...] = cv2.cvtColor(empty, cv2.COLOR_BGR2YCrCb)
+    model.mean[...] = _luma_chroma(empty)
     model.mixture.apply(empty, learningRate=SWITCH_RATE)
     return replace(model, frame=model.frame + 1, settling=SETTLING_FRAMES)
+
+
+def _luma_chroma(image: np.ndarray) -> np.ndarray:
+    """A BGR image in YCrCb, with luma 1 at least so that one may divide by it."""
+    colour = cv2.cvtColor(image, cv2.COLOR_BGR2YCrCb)
+    np.maximum(colour[..., 0], 1, out=colour[..., 0])
+    return colour
 
 
 def _as_image(mean: np.ndarray) -> np.ndarray:

@@ -29,15 +29,15 @@ class Evidence:
         Difference in luma, in standard deviations; negative where darker.
     chroma2 : ndarray
         Squared difference in chroma, in variances, after the background was darkened as much as the pixel is: a shadow has none.
-    darkening : ndarray
-        Luma over the background's luma, at most 1.
+    lost : ndarray
+        Share of the background's luma that is gone, 0 where the pixel is as bright or brighter.
     contrast : ndarray
         Largest difference in luma or chroma, grey levels.
     """
 
     luma: np.ndarray
     chroma2: np.ndarray
-    darkening: np.ndarray
+    lost: np.ndarray
     contrast: np.ndarray
 
 
@@ -48,8 +48,10 @@ def evidence(image: np.ndarray, mean: np.ndarray, deviation: np.ndarray) -> Evid
     ----------
     image : ndarray of uint8, shape (height, width, 3)
         BGR.
-    mean, deviation : ndarray of float32, shape (height, width, 3)
-        Of the empty scene, in luma and chroma (OpenCV's YCrCb, chroma centred on 128).
+    mean : ndarray of float32, shape (height, width, 3)
+        The empty scene in luma and chroma (OpenCV's YCrCb, chroma centred on 128); luma at least 1.
+    deviation : ndarray of float32, shape (height, width, 2)
+        Standard deviations of luma and of chroma (both axes alike).
 
     Returns
     -------
@@ -59,25 +61,38 @@ def evidence(image: np.ndarray, mean: np.ndarray, deviation: np.ndarray) -> Evid
     # Noise is rougher than people: a 3 x 3 average halves it.
     luma, red, blue = cv2.split(cv2.GaussianBlur(difference, (3, 3), 0))
     luma_mean, red_mean, blue_mean = cv2.split(mean)
-    luma_deviation, red_deviation, blue_deviation = cv2.split(deviation)
-    lost = np.maximum(-luma / np.maximum(luma_mean, 1), 0)  # share of light lost
-    contrast = np.maximum(np.abs(luma), np.maximum(np.abs(red), np.abs(blue)))
-    red += lost * (red_mean - 128)  # chroma shrinks with the light
-    blue += lost * (blue_mean - 128)
-    red /= red_deviation
-    blue /= blue_deviation
-    return Evidence(luma / luma_deviation, red * red + blue * blue, 1 - lost, contrast)
+    luma_deviation, chroma_deviation = cv2.split(deviation)
+    contrast, spare = np.abs(luma), np.abs(red)
+    np.maximum(contrast, spare, out=contrast)
+    np.maximum(contrast, np.abs(blue, out=spare), out=contrast)
+    lost = np.divide(luma, luma_mean, out=luma_mean)
+    np.clip(np.negative(lost, out=lost), 0, 1, out=lost)
+    for colour, colour_mean in ((red, red_mean), (blue, blue_mean)):  # chroma shrinks with the light
+        np.subtract(colour_mean, 128, out=spare)
+        spare *= lost
+        colour += spare
+        colour *= colour
+    np.multiply(chroma_deviation, chroma_deviation, out=spare)
+    chroma2 = np.divide(np.add(red, blue, out=red), spare, out=spare)
+    return Evidence(np.divide(luma, luma_deviation, out=luma), chroma2, lost, contrast)
 
 
 def fill_gaps(
-    seeds: np.ndarray, seen: Evidence, threshold: float, reach_threshold: float, shadow: float, gap_shadow: float, scale: float
+    seeds: np.ndarray,
+    seen: Evidence,
+    threshold: float,
+    reach_threshold: float,
+    shadow: float,
+    gap_shadow: float,
+    least: float,
+    scale: float,
 ) -> np.ndarray:
     """Grow a foreground mask by weaker evidence: inside its gaps, and outwards over a short reach.
 
     Parameters
     ----------
     seeds : ndarray of uint8, shape (height, width)
-        1 where the mixture sees foreground, specks removed.
+        1 where the mixture sees foreground.
     seen : Evidence
     threshold : float
         Standard deviations that are enough in gaps and bays of the seeds.
@@ -85,28 +100,29 @@ def fill_gaps(
         Standard deviations that are enough outside of them, within reach.
     shadow, gap_shadow : float
         Darkening above which a pixel may be shadow: anywhere, and in gaps, where it is rather dark clothes.
+    least : float
+        Pixels of the seeds that a piece must hold, in a 640 x 480 image; others are specks.
     scale : float
         Size of the image against 640 x 480.
 
     Returns
     -------
     ndarray of uint8, shape (height, width)
-        Contains no piece without a seed.
+        Every piece holds `least` pixels of the seeds.
     """
     inner = cv2.morphologyEx(seeds, cv2.MORPH_CLOSE, _square(GAP_PX, scale)).view(bool)
     outer = cv2.dilate(seeds, _square(REACH_PX, scale)).view(bool)
     dark = seen.luma < -threshold
-    weak = (seen.chroma2 > threshold**2) | (seen.luma > threshold) | (dark & (seen.darkening < gap_shadow))
-    reached = (seen.chroma2 > reach_threshold**2) | (seen.luma > reach_threshold) | (dark & (seen.darkening < shadow))
+    weak = (seen.chroma2 > threshold**2) | (seen.luma > threshold) | (dark & (seen.lost > 1 - gap_shadow))
+    reached = (seen.chroma2 > reach_threshold**2) | (seen.luma > reach_threshold) | (dark & (seen.lost > 1 - shadow))
     grown = cv2.morphologyEx((reached & outer).view(np.uint8), cv2.MORPH_OPEN, _square(3, scale))
     mask = cv2.bitwise_or(cv2.bitwise_or(seeds, (weak & inner).view(np.uint8)), grown)
     mask = cv2.morphologyEx(mask, cv2.MORPH_OPEN, _square(3, scale))
     mask = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, _disc(CLOSE_PX, scale))
     n, labels = cv2.connectedComponents(mask, connectivity=8)
-    seeded = np.zeros(n, np.uint8)
-    seeded[labels[seeds.view(bool)]] = 1
-    seeded[0] = 0
-    return seeded[labels]
+    counts = np.bincount(labels[seeds.view(bool)], minlength=n)
+    counts[0] = 0
+    return (counts >= least * scale**2).view(np.uint8)[np.asarray(labels)]
 
 
 def cut_halo(mask: np.ndarray, seen: Evidence, share: float, scale: float) -> np.ndarray:
@@ -130,9 +146,9 @@ def cut_halo(mask: np.ndarray, seen: Evidence, share: float, scale: float) -> np
     """
     if share <= 0:
         return mask
-    person = cv2.dilate(seen.contrast * mask, _square(5, scale))
+    person = cv2.dilate(cv2.copyTo(seen.contrast, mask), _square(5, scale))
     core = cv2.erode(mask, _square(5, scale))
-    return cv2.bitwise_or(core, mask & (seen.contrast > share * person).view(np.uint8))
+    return cv2.bitwise_or(core, cv2.bitwise_and(mask, (seen.contrast > share * person).view(np.uint8)))
 
 
 #: Widths in pixels of a 640 x 480 image: gaps that may be filled on weak evidence, twice the outward reach, cuts closed blindly.

@@ -1,0 +1,27 @@
+"""Timing for the benchmarks: several things in turn in one run, so that their ratio holds on a busy machine too."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+
+
+def interleaved(functions: Mapping[str, Callable[[], object]], rounds: int = 15) -> dict[str, float]:
+    """Median seconds of each function, called in turn `rounds` times after one call to warm up."""
+    times: dict[str, list[float]] = {name: [] for name in functions}
+    for function in functions.values():
+        function()
+    for _ in range(rounds):
+        for name, function in functions.items():
+            start = time.perf_counter()
+            function()
+            times[name].append(time.perf_counter() - start)
+    return {name: sorted(values)[rounds // 2] for name, values in times.items()}
+
+
+def report(row: str, what: str, value: float, target: float, at_least: bool = False, note: str = "") -> bool:
+    """Print one target with what was measured; tell whether it is met."""
+    met = value >= target if at_least else value <= target
+    bound = "at least" if at_least else "at most"
+    print(f"{row:4} {what:58} {value:8.3f}   {bound} {target:<6g} {'pass' if met else 'FAIL'}   {note}".rstrip(), flush=True)
+    return met
