@@ -26,8 +26,9 @@ from hmc.voxels.grid import VoxelGrid
 
 __all__ = ["Layout", "Person", "Result", "make_layout", "people_in", "read_result", "render", "stream_mosaics"]
 
-#: Largest picture, (width, height) in pixels.
+#: Largest picture, (width, height) in pixels, and the most that a camera's image is enlarged.
 MAX_SIZE = (1920, 1080)
+MAX_SCALE = 2.0
 #: How far around the people the 3-D panel looks, metres.
 PANEL_MARGIN_M = 0.2
 PANEL_HEIGHT_M = 1.9
@@ -123,12 +124,16 @@ def make_layout(sizes: Iterable[tuple[int, int]], max_size: tuple[int, int] = MA
     width, height = max(w for w, _ in sizes), max(h for _, h in sizes)
     n = len(sizes)
 
-    def scale(columns: int) -> float:
-        return min(1.0, max_size[0] / (columns * width), max_size[1] / (math.ceil((n + 1) / columns) * height))
+    def fit(columns: int) -> tuple[float, int, float]:
+        rows = math.ceil((n + 1) / columns)
+        scale = min(MAX_SCALE, max_size[0] / (columns * width), max_size[1] / (rows * height))
+        shape = columns * width * max_size[1] / (rows * height * max_size[0])
+        return round(scale, 6), -rows * columns, -max(shape, 1 / shape)  # as large as can be, no cells to spare, most like the screen
 
-    columns = max(range(1, n + 2), key=lambda count: (round(scale(count), 6), -count * math.ceil((n + 1) / count)))
+    columns = max(range(1, n + 2), key=fit)
+    scale = fit(columns)[0]
     rows = math.ceil((n + 1) / columns)
-    cell = int(width * scale(columns)), int(height * scale(columns))
+    cell = max(1, int(width * scale)), max(1, int(height * scale))
     left, top = n % columns * cell[0], n // columns * cell[1]
     return Layout(columns, rows, cell, (left, top, columns * cell[0] - left, rows * cell[1] - top))
 
@@ -174,7 +179,7 @@ def render(
             image = np.repeat(mask[..., None].astype(np.uint8) * 110, 3, axis=2)
         known = image is not None
         picture = (
-            cv2.resize(image, small.size, interpolation=cv2.INTER_AREA)
+            cv2.resize(image, small.size, interpolation=cv2.INTER_AREA if factor < 1 else cv2.INTER_LINEAR)
             if image is not None
             else np.full((*small.size[::-1], 3), 60, np.uint8)
         )
@@ -185,8 +190,9 @@ def render(
     panel = panel.copy()
     draw_people(panel, panel_camera, people, outlines=False)
     draw_label(panel, f"{recording.name}, frame {frame.index}, {frame.index / recording.fps:.2f} s", (8, 18))
-    draw_label(panel, "left", (8, panel.shape[0] - 10), LEFT)
-    draw_label(panel, "right", (44, panel.shape[0] - 10), RIGHT)
+    if any(person.landmarks is not None for person in people):
+        draw_label(panel, "left", (8, panel.shape[0] - 10), LEFT)
+        draw_label(panel, "right", (44, panel.shape[0] - 10), RIGHT)
     left, top = layout.panel[:2]
     out[top : top + panel.shape[0], left : left + panel.shape[1]] = panel
     return out
@@ -194,7 +200,7 @@ def render(
 
 def draw_people(image: np.ndarray, camera: Camera, people: list[Person], outlines: bool) -> None:
     """Draw everybody: outlines first, sticks over them; who has no pose as a mark on the floor."""
-    width = max(1.5, min(camera.size) / 160)
+    width = float(np.clip(min(camera.size) / 160, 1.5, 3.0))
     for person in people:
         if outlines and person.body is not None and person.state is not None:
             draw_outline(image, camera, person.body, person.state, person.number)
