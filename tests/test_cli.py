@@ -1,0 +1,171 @@
+"""The frame of the command line: exit codes, one line for a user's mistake, help without heavy imports."""
+
+import argparse
+import subprocess
+import sys
+
+import pytest
+
+import hmc
+from hmc.cli import COMMANDS, common, main
+from hmc.errors import InputError
+
+
+def run(*args, **kwargs):
+    return subprocess.run([sys.executable, "-m", "hmc", *args], capture_output=True, text=True, timeout=120, **kwargs)
+
+
+def test_without_arguments_help_is_printed(capsys):
+    assert main([]) == 0
+    shown = capsys.readouterr().out
+    assert "usage: hmc" in shown and "check" in shown
+
+
+def test_version(capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(["--version"])
+    assert stop.value.code == 0 and capsys.readouterr().out.strip() == f"hmc {hmc.__version__}"
+
+
+@pytest.mark.parametrize("argv", [["fly"], ["check"], ["check", "x", "--cameras", ","], ["check", "x", "--no-such-option"]])
+def test_wrong_options_end_with_2_and_usage(argv, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(argv)
+    assert stop.value.code == 2
+    assert "usage: hmc" in capsys.readouterr().err
+
+
+def test_check_good_recording(recording_folder, tmp_path, capsys):
+    out = tmp_path / "rig.png"
+    assert main(["check", str(recording_folder), "--out", str(out)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert out.is_file() and f"picture: {out}" in lines
+    assert lines[-1] == "take_1: can be used: 5 cameras, 12 frames, 25 a second"
+
+
+def test_check_default_picture_and_all_frames(recording_folder, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["check", str(recording_folder), "--all", "--cameras", "cam_00,cam_01,cam_02"]) == 0
+    assert (tmp_path / "take_1_check.png").is_file()
+    assert "3 cameras, 12 frames" in capsys.readouterr().out
+
+
+def test_check_bad_recording(recording_folder, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (recording_folder / "videos" / "cam_01.avi").unlink()
+    assert main(["check", str(recording_folder)]) == 2
+    captured = capsys.readouterr()
+    assert "error: " in captured.out and captured.out.splitlines()[-1] == "take_1: cannot be used (1 error)"
+    assert main(["check", str(tmp_path / "nowhere")]) == 2
+    assert "no such folder" in capsys.readouterr().out
+
+
+def test_picture_that_cannot_be_written(recording_folder, tmp_path, capsys):
+    for name in ("no/such/folder.png", "rig.docx"):
+        assert main(["check", str(recording_folder), "--out", str(tmp_path / name)]) == 2
+        assert "the picture cannot be written" in capsys.readouterr().err
+
+
+def test_in_a_process_of_its_own(tmp_path):
+    result = run("check", str(tmp_path), cwd=tmp_path)
+    assert result.returncode == 2 and "no calibration found" in result.stdout and "Traceback" not in result.stderr
+
+
+def test_help_needs_no_heavy_imports():
+    code = (
+        "import sys, hmc.cli\ntry:\n hmc.cli.main(['--help'])\nexcept SystemExit: pass\n"
+        "print([m for m in ('matplotlib', 'pandas', 'tqdm', 'sklearn') if m in sys.modules])"
+    )
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
+    assert result.returncode == 0 and result.stdout.splitlines()[-1] == "[]", result.stderr
+
+
+def fake_command(monkeypatch, action):
+    """Replace what `check` does."""
+    import hmc.cli.check
+
+    monkeypatch.setattr(hmc.cli.check, "run", action)
+
+
+def raising(error):
+    def action(args):
+        raise error
+
+    return action
+
+
+def test_input_error_is_one_line(monkeypatch, capsys):
+    fake_command(monkeypatch, raising(InputError("here.toml: this is wrong; do that")))
+    assert main(["check", "x"]) == 2
+    assert capsys.readouterr().err == "hmc check: here.toml: this is wrong; do that\n"
+
+
+def test_interrupt(monkeypatch, capsys):
+    fake_command(monkeypatch, raising(KeyboardInterrupt()))
+    assert main(["check", "x"]) == 130
+    assert capsys.readouterr().err.strip() == "hmc check: interrupted"
+
+
+def test_faults_of_our_own_are_not_hidden(monkeypatch):
+    fake_command(monkeypatch, raising(RuntimeError("a bug")))
+    with pytest.raises(RuntimeError):
+        main(["check", "x"])
+
+
+def test_reader_of_the_pipe_went_away(tmp_path):
+    """`hmc check x | true`: no traceback, whatever is printed after the reader has gone."""
+    code = (
+        "import sys, time, hmc.cli.check as c\n"
+        "def run(args):\n time.sleep(0.3)\n print('x' * 100000)\n return 0\n"
+        "c.run = run\nfrom hmc.cli import main\nsys.exit(main(['check', 'x']))"
+    )
+    process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    process.stdout.close()
+    error = process.stderr.read()
+    process.stderr.close()
+    assert process.wait(timeout=60) == 0 and error == ""
+
+
+def test_every_command_that_is_there_has_help(capsys):
+    import importlib.util
+
+    there = [name for name in COMMANDS if importlib.util.find_spec(f"hmc.cli.{name}")]
+    assert "check" in there
+    for name in there:
+        with pytest.raises(SystemExit) as stop:
+            main([name, "--help"])
+        assert stop.value.code == 0
+        assert f"usage: hmc {name}" in capsys.readouterr().out
+
+
+def test_selection_options(recording_folder):
+    parser = argparse.ArgumentParser()
+    common.add_selection_options(parser)
+    args = parser.parse_args([str(recording_folder), "--start", "3", "--frames", "4", "--cameras", "cam_02, cam_00", "--quiet"])
+    recording = common.open_selected(args)
+    assert recording.start == 3 and recording.n_frames == 4 and recording.rig.names == ("cam_02", "cam_00") and args.quiet
+
+
+@pytest.mark.parametrize(
+    "kind, good, bad",
+    [("whole_number", "7", ["-1", "1.5", "x", ""]), ("positive_float", "0.5", ["0", "-1", "nan", "inf", "x"])],
+)
+def test_number_types(kind, good, bad):
+    convert = getattr(common, kind)
+    assert convert(good) == float(good)
+    for text in bad:
+        with pytest.raises(argparse.ArgumentTypeError, match="must be a"):
+            convert(text)
+
+
+def test_progress_passes_everything_on(capsys):
+    assert list(common.progress(range(5), quiet=True)) == list(range(5))
+    assert capsys.readouterr().err == ""
+    assert list(common.progress(iter(range(5)), total=5, desc="reading")) == list(range(5))
+    shown = capsys.readouterr().err
+    assert "reading" in shown and "5/5" in shown and "frame/s" in shown
+
+
+def test_problems_are_listed_once(capsys):
+    common.print_problems(["a", "b", "a"])
+    assert capsys.readouterr().err.splitlines() == ["note: a", "note: b"]
