@@ -17,7 +17,7 @@ import cv2
 import numpy as np
 from scipy import ndimage
 
-from hmc.pose.annealed.overlap import OverlapTable, exact_overlap, make_overlap_table, quick_overlap
+from hmc.pose.annealed.overlap import OverlapTable, exact_overlap, make_overlap_table, particles_last, quick_overlap
 from hmc.pose.body.flesh import FleshTable
 from hmc.pose.body.joints import SEGMENTS
 from hmc.pose.body.kinematics import segment_transforms
@@ -33,6 +33,7 @@ __all__ = [
     "log_likelihood_factorised",
     "log_likelihood_global",
     "make_score_table",
+    "map_scores",
     "observe",
     "scores",
 ]
@@ -181,9 +182,8 @@ def _bounds(occupied: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Lowest and one past the highest occupied index; one voxel where none is occupied."""
     bounds = np.zeros((2, 3), int)
     bounds[1] = 1
-    plane = occupied.any(axis=2)
-    lines = (plane.any(axis=1), plane.any(axis=0), occupied.any(axis=(0, 1)))
-    for axis, line in enumerate(lines):
+    over_z = np.any(occupied, axis=2)
+    for axis, line in enumerate((np.any(over_z, axis=1), np.any(over_z, axis=0), np.any(occupied, axis=(0, 1)))):
         where = np.flatnonzero(line)
         if where.size:
             bounds[:, axis] = where[0], where[-1] + 1
@@ -230,37 +230,43 @@ def scores(table: ScoreTable, states: np.ndarray, maps: ScoreMaps, exact: bool =
         Columns as in `SCORES`, each from 0 (good) to 1. Out is the fraction of the part's voxels outside the room.
     """
     rotations, positions = segment_transforms(table.body, states)
+    placed = particles_last(rotations, positions, maps.origin)
     out = np.empty((len(states), len(PARTS), 4))
-    out[..., 0], out[..., 2], out[..., 3] = _map_scores(table, rotations, positions, maps)
-    out[..., 1] = (
-        exact_overlap(table.flesh, rotations, positions, maps.origin, maps.voxel_size_m)
-        if exact
-        else quick_overlap(table.overlap, rotations, positions)
-    )
+    if len(out) == 0:
+        return out
+    out[..., 0], out[..., 2], out[..., 3] = map_scores(table, placed, maps)
+    if exact:
+        out[..., 1] = exact_overlap(table.flesh, rotations, positions, maps.origin, maps.voxel_size_m)
+    else:
+        out[..., 1] = quick_overlap(table.overlap, placed)
     return out
 
 
-def _map_scores(
-    table: ScoreTable, rotations: np.ndarray, positions: np.ndarray, maps: ScoreMaps
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Out, Empty and Surf, each of shape (n, n_parts)."""
-    n = len(rotations)
+def map_scores(table: ScoreTable, placed: np.ndarray, maps: ScoreMaps) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The scores that need the maps: Out, Empty and Surf.
+
+    Parameters
+    ----------
+    table : ScoreTable
+    placed : ndarray of float32, shape (11, 3, 4, n)
+        From `particles_last`, relative to the maps' origin.
+    maps : ScoreMaps
+
+    Returns
+    -------
+    out, empty, surface : ndarray, shape (n, n_parts)
+    """
+    n = placed.shape[-1]
     size = maps.voxel_size_m
     nx, ny, nz = maps.occupancy.shape
     occupancy, closeness = maps.occupancy.ravel(), maps.surface.ravel()
-    offsets = (positions - maps.origin) / size
-    reach = table.reach[:, None] / size + 0.01
+    columns = placed * np.float32(1 / size)  # points @ columns[segment, axis] is a coordinate in voxels
     # A segment whose sphere of reach leaves the crop (the room) for some particle has its points clamped (tested).
-    low, high = offsets.min(0) - reach, offsets.max(0) + reach
+    reach = table.reach[:, None] / size + 0.01
+    low, high = columns[:, :, 3].min(2) - reach, columns[:, :, 3].max(2) + reach
     clamped = np.any((low < 0) | (high > maps.occupancy.shape), axis=1)
     room = (maps.room - maps.origin) / size
     crossed = np.stack([low < room[0], high > room[1]], axis=2)  # (segment, axis, side)
-
-    # coordinate[segment, axis] = points @ columns[segment, axis], in voxels
-    columns = np.empty((len(SEGMENTS), 3, 4, n), np.float32)
-    columns[:, :, :3] = rotations.transpose(1, 2, 3, 0)
-    columns[:, :, :3] *= 1 / size
-    columns[:, :, 3] = offsets.transpose(1, 2, 0)
 
     totals = np.zeros((3, len(PARTS), n))
     rows = max(8, CHUNK_ELEMENTS // max(n, 1))
