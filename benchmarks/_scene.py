@@ -31,7 +31,7 @@ def ring_rig(n: int = 5, size: tuple[int, int] = (640, 480)) -> Rig:
 
 def people(places) -> np.ndarray:
     """Ellipsoids, (n, 6), of people who stand at the places (x, y)."""
-    return np.concatenate([PARTS + [x, y, 0, 0, 0, 0] for x, y in places])
+    return np.concatenate([PARTS + np.array([x, y, 0, 0, 0, 0]) for x, y in places])
 
 
 def silhouette(camera: Camera, ellipsoids: np.ndarray) -> np.ndarray:

@@ -1,6 +1,6 @@
 """Carving against a bare gather of the full voxel-to-pixel tables, in one run. Rows 1a, 1b and 1c of README.md.
 
-    python benchmarks/bench_carving.py
+python benchmarks/bench_carving.py
 """
 
 from __future__ import annotations
@@ -25,9 +25,12 @@ OPEN3D_TARGETS = {"64^3": 0.03, "128^3": 0.01}
 
 
 def bare_gather(tables, masks):
-    """One `take` a camera of every voxel's pixel: the floor of any carving that looks at every voxel. Nothing else is done."""
+    """One `take` a camera of every voxel's pixel: the floor of any carving that looks at every voxel. Nothing else is done.
+
+    64-bit indices, which NumPy need not cast, and no bounds check: the quickest form there is (int32 tables are slower).
+    """
     sources = [np.append(mask.ravel(), False) for mask in masks]
-    indices = [np.ascontiguousarray(pixels.ravel(), np.int32) for pixels in tables.pixels]
+    indices = [pixels.ravel().astype(np.int64) for pixels in tables.pixels]
     out = np.empty(indices[0].size, bool)
 
     def run():
@@ -65,7 +68,10 @@ def main() -> int:
             same = np.array_equal(carve(tables, noisy, despeckle=True), brute_force(tables, medians))
             times = interleaved({"ours": lambda t=tables: carve(t, noisy, despeckle=True), "gather": bare_gather(tables, noisy)})
             note = f"{times['ours'] * 1e3:.2f} ms; identical set: {same}"
-            good &= report("1c", f"carve / gather, salt, 3 people, {name}", times["ours"] / times["gather"], NOISY_TARGETS[name], note=note) and same
+            good &= (
+                report("1c", f"carve / gather, salt, 3 people, {name}", times["ours"] / times["gather"], NOISY_TARGETS[name], note=note)
+                and same
+            )
     return 0 if open3d_rows(rig, one) and good else 1
 
 

@@ -54,6 +54,10 @@ class CarvingTables:
         Pixels in that rectangle; 0 where the camera sees no voxel of the block.
     seen_whole : ndarray of bool, shape (n_cameras, n_blocks)
         The camera sees every voxel of the block.
+    first : ndarray of int64, shape (n_blocks,)
+        Flat place in the volume of each block's first voxel.
+    sticks_out : ndarray of bool, shape (n_blocks,)
+        Some of the block lies beyond the grid.
     """
 
     grid: VoxelGrid
@@ -63,6 +67,8 @@ class CarvingTables:
     corners: np.ndarray
     areas: np.ndarray
     seen_whole: np.ndarray
+    first: np.ndarray
+    sticks_out: np.ndarray
 
 
 def make_tables(grid: VoxelGrid, rig: Rig) -> CarvingTables:
@@ -110,7 +116,9 @@ def make_tables(grid: VoxelGrid, rig: Rig) -> CarvingTables:
             stride = width + 1  # of the integral image
             places = [bottom * stride + right, top * stride + left, top * stride + right, bottom * stride + left]
             corners[c, :, part] = np.where(some, places, 0)
-    return CarvingTables(grid, rig, (nx, ny, nz), pixels, corners, areas, seen_whole)
+    first = starts @ np.array([grid.shape[1] * grid.shape[2], grid.shape[2], 1])
+    sticks_out = (starts + BLOCK > grid.shape).any(axis=1)
+    return CarvingTables(grid, rig, (nx, ny, nz), pixels, corners, areas, seen_whole, first, sticks_out)
 
 
 def pixel_of_voxel(camera: Camera, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -204,12 +212,15 @@ def carve_levels(
         raise InputError(f"`tolerance` must be 0 or more cameras; got {tolerances}")
     images = _check_masks(tables, masks, despeckle)
     voting = [c for c, image in enumerate(images) if image is not None]
-    hulls = tuple(np.zeros([n * BLOCK for n in tables.blocks], bool) for _ in tolerances)
+    hulls = tuple(np.zeros(tables.grid.shape, bool) for _ in tolerances)
     if voting:
-        views_needed = min(DEFAULT_MIN_VIEWS, len(voting)) if min_views is None else min_views
-        _carve_into(hulls, tables, images, voting, tolerances, outside, views_needed)
-    nx, ny, nz = tables.grid.shape
-    return tuple(np.ascontiguousarray(hull[:nx, :ny, :nz]) for hull in hulls)
+        needed = min(DEFAULT_MIN_VIEWS, len(voting)) if min_views is None else min_views
+        whole, undecided, order = _judge_blocks(tables, images, voting, max(tolerances), outside, needed)
+        voxels, misses = _judge_voxels(tables, images, order, undecided, max(tolerances), outside, needed)
+        for hull, tolerance in zip(hulls, tolerances, strict=True):
+            _mark(hull, tables, (whole[:, None] * BLOCK_VOXELS + np.arange(BLOCK_VOXELS)).ravel())
+            _mark(hull, tables, voxels[misses <= tolerance])
+    return hulls
 
 
 def _check_masks(tables: CarvingTables, masks: Sequence[np.ndarray | None], despeckle: bool) -> list[np.ndarray | None]:
@@ -229,71 +240,71 @@ def _check_masks(tables: CarvingTables, masks: Sequence[np.ndarray | None], desp
     return images
 
 
-def _carve_into(hulls, tables, images, voting, tolerances, outside, min_views) -> None:
-    """Fill the padded volumes `hulls` in place."""
-    blocks = _undecided_blocks(tables, images, voting, max(tolerances), outside, min_views)
-    n_whole, undecided = blocks
-    views = [hull.reshape(tables.blocks[0], BLOCK, tables.blocks[1], BLOCK, tables.blocks[2], BLOCK) for hull in hulls]
-    views = [view.transpose(0, 2, 4, 1, 3, 5) for view in views]
-    for view in views:
-        view[np.unravel_index(n_whole, tables.blocks)] = True
-    if undecided.size == 0:
-        return
-    misses = _gather_misses(tables, images, voting, undecided, max(tolerances), outside, min_views)
-    place = np.unravel_index(undecided, tables.blocks)
-    for view, tolerance in zip(views, tolerances, strict=True):
-        view[place] = (misses <= tolerance).reshape(-1, BLOCK, BLOCK, BLOCK)
-
-
-def _undecided_blocks(tables, images, voting, tolerance, outside, min_views) -> tuple[np.ndarray, np.ndarray]:
-    """Blocks that are occupied as a whole, and blocks whose voxels must be looked at; the others are empty."""
-    n_blocks = tables.areas.shape[1]
-    missing = np.zeros(n_blocks, np.int16)  # cameras that miss every voxel of the block
-    full = np.zeros(n_blocks, np.int16)  # cameras that have every voxel in their silhouette
-    reach = np.zeros(n_blocks, np.int16)  # cameras that vote on some voxel of the block
-    for c in voting:
-        integral = cv2.integral(images[c]).ravel()
-        a, b, d, e = (integral.take(corner) for corner in tables.corners[c])
-        inside = a + b - d - e
-        area, whole = tables.areas[c], tables.seen_whole[c]
-        some = area > 0
-        missing += (inside == 0) & (whole | (outside == "carve"))
-        full += (inside == area) & (whole | (outside == "keep"))
-        reach += some if outside == "ignore" else True
-    possible = (missing <= tolerance) & (reach >= min_views)
-    occupied = possible & (full == len(voting)) & (len(voting) >= min_views)
-    return np.flatnonzero(occupied), np.flatnonzero(possible & ~occupied)
-
-
-def _gather_misses(tables, images, voting, blocks, tolerance, outside, min_views) -> np.ndarray:
-    """Cameras that miss each voxel of the blocks, (n, 512) uint8; 255 where it is surely more than `tolerance` or too few voted."""
-    # One number a pixel: 16 for "voted", 1 for "missed"; summed over cameras, low part misses, high part votes.
-    vote = 16 if len(voting) < 16 else 256
-    dtype = np.uint8 if vote == 16 else np.uint32
-    beyond = {"ignore": 0, "carve": vote + 1, "keep": vote}[outside]
-    codes = {}
-    for c in voting:
-        code = np.empty(images[c].size + 1, dtype)
-        np.subtract(vote + 1, images[c].ravel(), out=code[:-1], casting="unsafe")
-        code[-1] = beyond
-        codes[c] = code
-    total = np.zeros(len(blocks) * BLOCK_VOXELS, dtype)
-    alive = None  # flat voxels among the blocks that can still be occupied; all of them at first
+def _judge_blocks(tables, images, voting, tolerance, outside, min_views) -> tuple[np.ndarray, np.ndarray, list[int]]:
+    """Blocks that are occupied as a whole; blocks whose voxels must be looked at; in which order of cameras. Other blocks are empty."""
+    blocks = np.arange(tables.areas.shape[1])
+    missing = np.zeros(blocks.size, np.uint8)  # cameras that miss every voxel of the block
+    full = np.zeros(blocks.size, np.uint8)  # cameras that have every voxel in their silhouette
+    absent = np.zeros(blocks.size, np.uint8)  # cameras that do not vote on any voxel of the block
+    foreground = []
     for done, c in enumerate(voting):
-        table = tables.pixels[c]
-        if alive is None:
-            total += codes[c].take(table[blocks].ravel())
-        else:
-            rows, columns = np.divmod(alive, BLOCK_VOXELS)
-            total[alive] += codes[c].take(table[blocks[rows], columns])
+        integral = cv2.integral(images[c]).ravel()
+        bottom_right, top_left, top_right, bottom_left = (integral.take(corner.take(blocks)) for corner in tables.corners[c])
+        inside = bottom_right + top_left - top_right - bottom_left
+        area, whole = tables.areas[c].take(blocks), tables.seen_whole[c].take(blocks)
+        missing += (inside == 0) & (whole if outside != "carve" else True)
+        full += (inside == area) & (whole if outside != "keep" else True)
+        if outside == "ignore":
+            absent += area == 0
+        foreground.append(float(np.count_nonzero(images[c])))
         if done >= tolerance:
-            source = total if alive is None else total[alive]
-            good = (source & (vote - 1)) <= tolerance
-            alive = np.flatnonzero(good) if alive is None else alive[good]
-    misses = np.full(total.shape, 255, np.uint8)
-    if alive is None:  # more cameras may miss than there are
-        alive = np.arange(total.size)
-    last = total[alive]
-    enough = last // vote >= min_views
-    misses[alive[enough]] = (last & (vote - 1))[enough]
-    return misses.reshape(len(blocks), BLOCK_VOXELS)
+            possible = np.flatnonzero((missing <= tolerance) & (absent <= len(voting) - min_views))
+            blocks, missing, full, absent = (array.take(possible) for array in (blocks, missing, full, absent))
+    occupied = (full == len(voting)) & (len(voting) >= min_views)
+    # The camera that rejects most comes first.
+    order = [voting[i] for i in np.argsort(foreground, kind="stable")]
+    return blocks[occupied], blocks[~occupied], order
+
+
+def _judge_voxels(tables, images, order, blocks, tolerance, outside, min_views) -> tuple[np.ndarray, np.ndarray]:
+    """The occupied voxels of the blocks, as block * 512 + place in the block, and how many cameras miss each."""
+    # One number a pixel: `vote` for having voted plus 1 for a miss; in the sum over cameras the low part is the number of misses.
+    vote: int = 16 if len(order) < 16 else 1 << 16
+    dtype: type = np.uint8 if len(order) < 16 else np.uint32
+    beyond = {"ignore": 0, "carve": vote + 1, "keep": vote}[outside]
+    voxels = None  # those that can still be occupied; all of the blocks' at first
+    total: np.ndarray = np.zeros(0, dtype)
+    for done, c in enumerate(order):
+        codes = np.empty(images[c].size + 1, dtype)
+        np.subtract(dtype(vote + 1), images[c].ravel(), out=codes[:-1])
+        codes[-1] = beyond
+        pixels = tables.pixels[c][blocks].ravel() if voxels is None else tables.pixels[c].ravel().take(voxels)
+        found = codes.take(pixels)
+        total = found if done == 0 else total + found
+        if done >= tolerance:
+            good = np.flatnonzero((total & (vote - 1)) <= tolerance)
+            total = total.take(good)
+            voxels = _number_voxels(blocks, good) if voxels is None else voxels.take(good)
+    if voxels is None:  # more cameras may miss than there are
+        voxels = _number_voxels(blocks, np.arange(total.size))
+    seen = np.flatnonzero(total // vote >= min_views)
+    return voxels.take(seen), (total & (vote - 1)).take(seen)
+
+
+def _number_voxels(blocks: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Places in the list of the blocks' voxels to block * 512 + place in the block."""
+    return blocks.take(places // BLOCK_VOXELS) * BLOCK_VOXELS + places % BLOCK_VOXELS
+
+
+def _mark(hull: np.ndarray, tables: CarvingTables, voxels: np.ndarray) -> None:
+    """Set voxels, given as block * 512 + place in the block, in the volume; those beyond the grid are dropped."""
+    _, ny, nz = hull.shape
+    within = np.stack(np.unravel_index(np.arange(BLOCK_VOXELS), (BLOCK,) * 3), axis=-1)
+    block, place = voxels // BLOCK_VOXELS, voxels % BLOCK_VOXELS
+    flat = tables.first.take(block) + (within @ np.array([ny * nz, nz, 1])).take(place)
+    suspects = np.flatnonzero(tables.sticks_out.take(block))
+    if suspects.size:
+        corner = np.stack(np.unravel_index(block[suspects], tables.blocks), axis=-1) * BLOCK
+        beyond = (corner + within[place[suspects]] >= hull.shape).any(axis=1)
+        flat = np.delete(flat, suspects[beyond])
+    hull.ravel()[flat] = True
