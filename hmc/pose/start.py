@@ -110,7 +110,7 @@ def start_person(
     targets: Sequence[HullTarget | None],
     height_m: float | None = None,
     velocities: np.ndarray | None = None,
-    floor_z: float = 0.0,
+    room: np.ndarray | None = None,
     settings: StartSettings | None = None,
 ) -> Started | None:
     """Find a person's body and poses in the first seconds.
@@ -127,7 +127,8 @@ def start_person(
         Stature where it is known; else `estimate_height`.
     velocities : ndarray, shape (n, 3), optional
         Of the track, metres a second.
-    floor_z : float
+    room : ndarray, shape (2, 3), optional
+        Limits of the room, metres; its lowest z is the floor, 0 where left out.
     settings : StartSettings, optional
 
     Returns
@@ -140,9 +141,11 @@ def start_person(
     if not usable:
         return None
     velocities = np.zeros((len(targets), 3)) if velocities is None else velocities
+    floor_z = 0.0 if room is None else float(room[0, 2])
     height = height_m or estimate_height(targets, floor_z)
     body = canton_body(height) if preset.body == "canton" else default_body(height)
-    filt = make_filter(body, preset, fps)
+    voxel = targets[usable[0]].voxel_size_m
+    filt = make_filter(body, preset, fps, voxel, room)
     if preset.start == "neutral":
         anchor, costs = usable[0], np.array([np.nan])
         state = _neutral_start(body, targets[anchor], velocities[: max(2, int(0.5 * fps))].mean(0), floor_z)
@@ -267,7 +270,7 @@ def _fit(frame_rng, filt, fps, targets, states, infos, settings, height_known):
         preset.symmetric,
         fit_settings,
     )
-    fitted = make_filter(body, preset, fps)
+    fitted = make_filter(body, preset, fps, targets[picks[0]].voxel_size_m, filt.room)
     costs = [
         [refine(f.body, f.samples, states[k].state, targets[k], points[k], preset.symmetric, preset.refine)[1].cost_after for k in held_out]
         for f in (filt, fitted)

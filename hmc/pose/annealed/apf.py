@@ -15,9 +15,22 @@ from hmc.pose.annealed.hull_target import HullTarget, sample_points
 from hmc.pose.annealed.limb_search import lost_limbs, search_limbs
 from hmc.pose.annealed.presets import PosePreset, drift
 from hmc.pose.annealed.refine import refine
+from hmc.pose.annealed.scores import (
+    ScoreTable,
+    ScoreVariances,
+    log_likelihood_factorised,
+    log_likelihood_global,
+    make_score_table,
+    observe,
+    scores,
+)
 from hmc.pose.annealed.symmetric import symmetric_cost
-from hmc.pose.body.flesh import SurfaceSamples, surface_coordinates, surface_samples
+from hmc.pose.body.flesh import SurfaceSamples, flesh_points, surface_coordinates, surface_samples
 from hmc.pose.body.model import BodyModel
+from hmc.voxels.grid import VoxelGrid
+
+#: Fewer surface voxels than this are noise, not a person.
+LEAST_SURFACE = 20
 
 __all__ = ["PoseFilter", "PoseInfo", "PoseState", "make_filter", "pose_init", "pose_step"]
 
@@ -34,12 +47,18 @@ class PoseFilter:
     preset : PosePreset
     drift : ndarray, shape (27,)
         P0, metres and radians.
+    table : ScoreTable or None
+        The body's flesh, where the four scores are used.
+    room : ndarray, shape (2, 3), or None
+        Where a body may be, metres; for the score Out.
     """
 
     body: BodyModel
     samples: SurfaceSamples
     preset: PosePreset
     drift: np.ndarray
+    table: ScoreTable | None = None
+    room: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -85,7 +104,7 @@ class PoseInfo:
     status: str
 
 
-def make_filter(body: BodyModel, preset: PosePreset, fps: float) -> PoseFilter:
+def make_filter(body: BodyModel, preset: PosePreset, fps: float, voxel_size_m: float = 0.03, room: np.ndarray | None = None) -> PoseFilter:
     """Prepare the filter for one person.
 
     Parameters
@@ -94,19 +113,34 @@ def make_filter(body: BodyModel, preset: PosePreset, fps: float) -> PoseFilter:
     preset : PosePreset
     fps : float
         Frames a second of the recording.
+    voxel_size_m : float
+        Of the hulls: the spacing of the flesh where the four scores are used.
+    room : ndarray, shape (2, 3), optional
+        Limits of the room, metres.
     """
     samples = surface_samples(body, surface_coordinates(body, preset.surface_samples))
-    return PoseFilter(body, samples, preset, preset.drift_scale * drift(fps))
+    table = None if preset.likelihood == "symmetric" else make_score_table(body, flesh_points(body, preset.density * voxel_size_m))
+    return PoseFilter(body, samples, preset, preset.drift_scale * drift(fps), table, room)
 
 
-def pose_init(state: np.ndarray) -> PoseState:
-    """A filter's first state, all particles on one pose, shape (27,)."""
+def pose_init(state: np.ndarray, velocity: np.ndarray | None = None, particles: ParticleState | None = None) -> PoseState:
+    """A filter's state on one pose.
+
+    Parameters
+    ----------
+    state : ndarray, shape (27,)
+    velocity : ndarray, shape (27,), optional
+        Zero where left out.
+    particles : ParticleState, optional
+        All on `state` where left out.
+    """
     state = np.asarray(state, float)
-    return PoseState(state, np.zeros_like(state), particle_init(state[None]))
+    velocity = np.zeros_like(state) if velocity is None else np.asarray(velocity, float)
+    return PoseState(state, velocity, particles or particle_init(state[None]))
 
 
 def pose_step(rng: np.random.Generator, filt: PoseFilter, state: PoseState, target: HullTarget | None) -> tuple[PoseState, PoseInfo]:
-    """One frame by the symmetric cost: annealed layers, refinement, search for lost limbs.
+    """One frame: annealed layers, then, where the preset has them, refinement and search for lost limbs.
 
     Parameters
     ----------
@@ -121,39 +155,63 @@ def pose_step(rng: np.random.Generator, filt: PoseFilter, state: PoseState, targ
     state : PoseState
     info : PoseInfo
     """
-    if target is None or len(target.surface) < 20:
+    if target is None or len(target.surface) < LEAST_SURFACE:
         return replace(state, velocity=np.zeros_like(state.velocity)), PoseInfo(np.nan, (), 0, None, "no hull of this person in this frame")
-    preset, body, samples = filt.preset, filt.body, filt.samples
-    low, high = body.limits.low, body.limits.high
-    coarse = sample_points(rng, target.surface, preset.hull_points)
-    fine = sample_points(rng, target.surface, preset.fine_hull_points)
-
-    def log_likelihood(states: np.ndarray) -> np.ndarray:
-        return -symmetric_cost(body, samples, states, target, coarse, preset.symmetric)
-
-    # The no-motion and the smooth-motion assumption (Canton 3.1.2.2), half of the first layer's particles each.
-    predicted = np.clip(state.state + state.velocity, low, high)
-    starts = np.stack([state.state, predicted])
-    particles, annealed = annealed_step(rng, particle_init(starts), log_likelihood, filt.drift, low, high, preset.annealed)
+    preset = filt.preset
+    low, high = filt.body.limits.low, filt.body.limits.high
+    likelihood = _by_symmetric_cost(rng, filt, target) if filt.table is None else _by_scores(filt, filt.table, target)
     if preset.refine is None:
-        estimate, evaluations = annealed.estimate, annealed.evaluations
-        return PoseState(estimate, estimate - state.state, particles), PoseInfo(
-            -annealed.best_log_likelihood, (), evaluations, annealed, "fitted"
-        )
-    # From the particles and from the last pose: where the body hardly moved the second is the better start.
-    trials = [
-        refine(body, samples, start, target, fine, preset.symmetric, preset.refine, anchor=state.state)
-        for start in (annealed.best, state.state)
-    ]
-    evaluations = annealed.evaluations + sum(info.evaluations for _, info in trials)
+        particles, annealed = annealed_step(rng, state.particles, likelihood, filt.drift, low, high, preset.annealed)
+        estimate = annealed.estimate
+        info = PoseInfo(-annealed.best_log_likelihood, (), annealed.evaluations, annealed, "fitted")
+        return PoseState(estimate, estimate - state.state, particles), info
+    # A refined estimate is better than any particle: the next frame's particles start from it, half by the no-motion and
+    # half by the smooth-motion assumption (Canton 2009, section 3.1.2.2).
+    predicted = np.clip(state.state + state.velocity, low, high)
+    starts = particle_init(np.stack([state.state, predicted]))
+    particles, annealed = annealed_step(rng, starts, likelihood, filt.drift, low, high, preset.annealed)
+    estimate, cost, searched, more = _polish(rng, filt, preset, [annealed.best, state.state], state.state, target)
+    info = PoseInfo(cost, tuple(searched), annealed.evaluations + more, annealed, "fitted")
+    return PoseState(estimate, estimate - state.state, particles), info
+
+
+def _polish(rng, filt, preset, starts, anchor, target):
+    """Refine several starts, take the best, look for limbs that the hulls contradict."""
+    body, samples = filt.body, filt.samples
+    points = sample_points(rng, target.surface, preset.fine_hull_points)
+    trials = [refine(body, samples, start, target, points, preset.symmetric, preset.refine, anchor=anchor) for start in starts]
+    evaluations = sum(info.evaluations for _, info in trials)
     estimate, best = min(trials, key=lambda trial: trial[1].cost_after)
     cost, searched = best.cost_after, []
     if preset.search is not None:
-        searched = lost_limbs(body, samples, estimate, target, fine, preset.search)
+        searched = lost_limbs(body, samples, estimate, target, points, preset.search)
         if searched:
             estimate, cost, more = search_limbs(
-                rng, body, samples, estimate, cost, searched, target, fine, preset.symmetric, preset.refine, preset.search
+                rng, body, samples, estimate, cost, searched, target, points, preset.symmetric, preset.refine, preset.search
             )
             evaluations += more
-    velocity = estimate - state.state
-    return PoseState(estimate, velocity, particles), PoseInfo(cost, tuple(searched), evaluations, annealed, "fitted")
+    return estimate, cost, searched, evaluations
+
+
+def _by_symmetric_cost(rng, filt, target):
+    points = sample_points(rng, target.surface, filt.preset.hull_points)
+
+    def log_likelihood(states: np.ndarray) -> np.ndarray:
+        return -symmetric_cost(filt.body, filt.samples, states, target, points, filt.preset.symmetric)
+
+    return log_likelihood
+
+
+def _by_scores(filt, table, target):
+    """The four scores against the tolerant hull, which is where the target's distance is zero."""
+    grid = VoxelGrid(target.origin - 0.5 * target.voxel_size_m, target.voxel_size_m, target.distance.shape)
+    maps = observe(target.distance == 0, grid, filt.room)
+    variances = ScoreVariances()
+
+    def log_likelihood(states: np.ndarray) -> np.ndarray:
+        values = scores(table, states, maps)
+        if filt.preset.likelihood == "global":
+            return log_likelihood_global(values, table.counts, variances.whole_body())
+        return log_likelihood_factorised(values, variances.by_part())
+
+    return log_likelihood

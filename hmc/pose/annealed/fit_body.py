@@ -16,7 +16,7 @@ import numpy as np
 from hmc.pose.annealed.hull_target import HullTarget
 from hmc.pose.annealed.refine import residual_rows, residual_values
 from hmc.pose.annealed.symmetric import SymmetricSettings
-from hmc.pose.body.flesh import SurfaceSamples, surface_samples
+from hmc.pose.body.flesh import surface_samples
 from hmc.pose.body.joints import N_DOF
 from hmc.pose.body.model import BodyModel
 from hmc.pose.body.proportions import make_body

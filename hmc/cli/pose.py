@@ -1,0 +1,146 @@
+"""``hmc pose``: the pose of everybody in every frame."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from hmc.cli.common import add_selection_options, open_selected, positive_float, print_problems, progress
+from hmc.cli.track import JOURNAL, _last_change
+
+__all__ = ["add_parser", "run"]
+
+METHODS = ("apf",)
+#: The journal of a run that is not finished.
+POSE_JOURNAL = ".pose.journal"
+
+
+def add_parser(subparsers) -> argparse.ArgumentParser:
+    """Add the command to the parser."""
+    parser = subparsers.add_parser(
+        "pose",
+        help="the pose of everybody in every frame",
+        description="Find and follow everybody in a recording and fit an articulated body to each. Writes tracks.csv, joints.csv (frame, "
+        "person, joint, x, y, z; metres), pose.npz (state vectors and bodies) and run.toml. A run that was stopped goes on where it was "
+        "when it is started again; a finished one is not repeated unless the recording or a parameter changed.",
+    )
+    add_selection_options(parser)
+    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the result")
+    parser.add_argument("--method", choices=METHODS, default="apf", help="apf: annealed particle filter (default)")
+    parser.add_argument("--preset", default="default", metavar="NAME", help="default, or canton2009 for the thesis's printed parameters")
+    parser.add_argument("--voxel", type=positive_float, default=0.03, metavar="M", help="side of a voxel, metres (default: 0.03)")
+    parser.add_argument("--track-voxel", type=positive_float, default=0.05, metavar="M", help="the same for the tracker (default: 0.05)")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of the random numbers (default: 0)")
+    parser.add_argument(
+        "--height",
+        default="recording",
+        metavar="M|auto",
+        help="everybody's stature in metres; auto: estimated from each person's volume; by default what recording.toml says of a "
+        "single person, else auto",
+    )
+    return parser
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the command."""
+    import numpy as np
+
+    from hmc.errors import InputError
+    from hmc.files import to_toml
+    from hmc.frontend import FrontendSettings
+    from hmc.pose.annealed.presets import pose_preset
+    from hmc.pose.sequence import pose_recording
+    from hmc.results import read_run, write_joints, write_pose, write_run, write_tracks
+    from hmc.tracking.naive import NaiveSettings
+    from hmc.tracking.resumable import track_recording
+
+    recording = open_selected(args)
+    preset = pose_preset(args.preset)
+    if args.out.is_file():
+        raise InputError(f"--out {args.out}: is a file; give a folder")
+    height = _height(args.height, recording)
+    tracker, frontend = NaiveSettings(), FrontendSettings()
+    parameters: dict[str, Any] = {
+        "voxel_size_m": args.voxel,
+        "track_voxel_size_m": args.track_voxel,
+        "start": recording.start,
+        "frames": recording.n_frames,
+        "cameras": list(recording.rig.names),
+        "room_m": recording.room,
+        "fps": recording.fps,
+        "height_m": height or "auto",
+        "preset": preset,
+        "tracker": tracker,
+        "frontend": frontend,
+    }
+    source = {"recording": recording.path.resolve(), "recording_changed": _last_change(recording.path)}
+    key = to_toml({"method": args.method, "seed": args.seed, **source, "parameters": parameters})
+    paths = {name: args.out / name for name in ("tracks.csv", "joints.csv", "pose.npz", "run.toml")}
+    if all(path.exists() for path in paths.values()):
+        before = read_run(paths["run.toml"])
+        if to_toml({name: before.get(name) for name in ("method", "seed", *source, "parameters")}) == key:
+            print(f"{paths['joints.csv']} was finished before, with the same parameters; delete it to compute it again")
+            return 0
+        print(f"{args.out}: its result has other parameters or another recording; starting anew")
+
+    problems: list[str] = [*recording.problems]
+    track_journal, pose_journal = args.out / JOURNAL, args.out / POSE_JOURNAL
+    tracks = track_recording(
+        recording,
+        args.track_voxel,
+        tracker,
+        frontend,
+        journal=track_journal,
+        key=key,
+        on_problem=problems.append,
+        progress=lambda steps, total: progress(steps, total, "track", args.quiet),
+    )
+    people = pose_recording(
+        recording,
+        tracks,
+        args.voxel,
+        preset,
+        args.seed,
+        height_m=height,
+        frontend=frontend,
+        journal=pose_journal,
+        key=key,
+        on_problem=problems.append,
+        progress=lambda steps, total: progress(steps, total, "pose", args.quiet),
+    )
+    problems += people.notes
+    write_tracks(paths["tracks.csv"], tracks)
+    write_joints(paths["joints.csv"], people.poses)
+    write_pose(paths["pose.npz"], people.states)
+    write_run(paths["run.toml"], args.method, parameters, args.seed, **source, problems=list(dict.fromkeys(problems)))
+    for journal in (track_journal, pose_journal):
+        for file in args.out.glob(f"{journal.name}*"):
+            file.unlink()
+    for person in np.unique(people.poses.persons):
+        rows = people.poses.persons == person
+        frames, body = people.poses.frames[rows], people.states.bodies[int(person)]
+        print(f"person {person}: {rows.sum()} frames, from {frames.min()} to {frames.max()}, stature {float(body['height']):.2f} m")
+    if not len(people.poses.frames):
+        print(f"nobody in {recording.n_frames} frames")
+    print(f"wrote {paths['joints.csv']}")
+    print_problems(problems)
+    return 0
+
+
+def _height(text: str, recording) -> float | None:
+    """The stature that is given, metres, or None where it is to be estimated."""
+    from hmc.errors import InputError
+
+    if text == "auto":
+        return None
+    if text == "recording":
+        heights = recording.subject_height_m
+        return float(heights[0]) if len(heights) == 1 and recording.persons in (None, 1) else None
+    try:
+        height = float(text)
+    except ValueError:
+        height = float("nan")
+    if not 0.5 <= height <= 2.6:
+        raise InputError(f"--height {text}: give a stature in metres (1.75) or 'auto'")
+    return height
