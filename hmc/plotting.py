@@ -179,8 +179,12 @@ def draw_body(body: BodyModel, state: np.ndarray, ax: Axes3D | None = None, pers
     names = [PARTS[part] for part in body.cones.part]
     base = np.array([_rgb({"l_": LEFT, "r_": RIGHT}.get(name[:2], person_colour(person))) for name in names])
     colours = base[:, None] * _brightness(normals * outward[..., None])[..., None]
-    polygons = [*sides.reshape(-1, 4, 3), *starts, *ends]
-    faces = np.concatenate([np.clip(colours, 0, 1).reshape(-1, 3), 0.6 * base, 0.6 * base])
+    caps = np.stack([starts, ends])
+    middles, following = np.broadcast_to(caps.mean(axis=2, keepdims=True), caps.shape), np.roll(caps, -1, axis=2)
+    fans = np.stack([middles, caps, following, following], axis=3)
+    polygons = np.concatenate([sides.reshape(-1, 4, 3), fans.reshape(-1, 4, 3)])
+    flat = np.tile(np.repeat(0.6 * base, caps.shape[2], axis=0), (2, 1))
+    faces = np.concatenate([np.clip(colours, 0, 1).reshape(-1, 3), flat])
     ax.add_collection3d(Poly3DCollection(polygons, facecolors=faces, edgecolors="none", alpha=alpha))
     return _fit(ax, rings.reshape(-1, 3), had_data)
 
