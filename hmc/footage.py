@@ -21,6 +21,9 @@ __all__ = ["IMAGE_SUFFIXES", "VIDEO_SUFFIXES", "Footage", "find_footage", "open_
 VIDEO_SUFFIXES = frozenset({".mp4", ".avi", ".mov", ".mkv", ".m4v", ".mpg", ".mpeg", ".webm", ".wmv", ".mts", ".ts", ".h264"})
 IMAGE_SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp", ".pgm", ".ppm"})
 
+#: A video is over when this many frames in a row cannot be decoded.
+MAX_FAILURES = 25
+
 
 @dataclass(frozen=True)
 class Footage:
@@ -121,12 +124,31 @@ def open_video(path: Path, count: bool = True) -> Footage:
 def _count(path: Path) -> int:
     capture = cv2.VideoCapture(str(path))
     try:
-        n = 0
-        while capture.grab():
-            n += 1
-        return n
+        return max(_grab(capture), default=-1) + 1
     finally:
         capture.release()
+
+
+def _grab(capture: cv2.VideoCapture) -> Iterator[int]:
+    """Grab frame after frame and give the index of each.
+
+    Frames are counted, as every container allows, until one cannot be decoded. A decoder loses some frames there without a word, so
+    from then on time stamps tell which frame it is.
+    """
+    fps = capture.get(cv2.CAP_PROP_FPS)
+    index, shift, failures, damaged = -1, 0.0, 0, False
+    while failures < MAX_FAILURES:
+        if not capture.grab():
+            failures, damaged = failures + 1, True
+            continue
+        failures = 0
+        stamp = capture.get(cv2.CAP_PROP_POS_MSEC) * fps / 1000
+        if damaged:
+            index = max(index + 1, round(stamp + shift))
+        else:
+            index += 1
+            shift = index - stamp
+        yield index
 
 
 def open_images(folder: Path, first_number: int | None = None) -> Footage:
@@ -182,39 +204,50 @@ def read_footage(footage: Footage, first: int, last: int, on_problem: Callable[[
     ndarray, shape (h, w, 3), uint8 BGR, or None
         None where the frame is missing, unreadable or of another size.
     """
-    reader = _read_video(footage, first, last) if footage.images is None else _read_images(footage, first, last)
-    for index, image in enumerate(reader, first):
+    images = footage.images
+    frames = _read_video(footage, first, last) if images is None else _read_images(images, first, last)
+    lost: list[int] = []
+    for index, image in enumerate(frames, first):
         if image is not None and image.shape[1::-1] != footage.size:
             on_problem(
                 f"{label}: frame {index} is {image.shape[1]} x {image.shape[0]} and not {footage.size[0]} x {footage.size[1]}; left out"
             )
             image = None
-        elif image is None and footage.images is None and index < footage.n_frames:
-            on_problem(f"{label}: the video stops at frame {index} of {footage.n_frames}; the rest goes without this camera")
-            break
-        elif image is None and footage.images is not None and index in footage.images:
-            on_problem(f"{label}: frame {index} ({footage.images[index].name}) cannot be read; left out")
+        elif image is None and index < footage.n_frames and (images is None or index in images):
+            lost.append(index)
+        if image is not None and lost:
+            on_problem(f"{label}: {_frames(lost)} cannot be read; left out")
+            lost.clear()
         yield image
-    else:
-        return
-    for _ in range(index, last):
-        yield None
+    if lost:
+        on_problem(f"{label}: {_frames(lost)} cannot be read; left out")
+
+
+def _frames(indices: list[int]) -> str:
+    return f"frame {indices[0]}" if len(indices) == 1 else f"frames {indices[0]} to {indices[-1]}"
 
 
 def _read_video(footage: Footage, first: int, last: int) -> Iterator[np.ndarray | None]:
     capture = cv2.VideoCapture(str(footage.path))
     try:
         # Grabbing up to the first frame is slower than seeking, but exact for every codec and container.
-        alive = all(capture.grab() for _ in range(first))
-        for _ in range(first, last):
-            image = capture.read()[1] if alive else None
-            alive = image is not None
-            yield image
+        due = first
+        for index in _grab(capture) if last > first else ():
+            if index < first:
+                continue
+            for _ in range(due, min(index, last)):
+                yield None
+            if index < last:
+                yield capture.retrieve()[1]
+            due = index + 1
+            if due >= last:
+                return
+        for _ in range(due, last):
+            yield None
     finally:
         capture.release()
 
 
-def _read_images(footage: Footage, first: int, last: int) -> Iterator[np.ndarray | None]:
-    images = footage.images or {}
+def _read_images(images: dict[int, Path], first: int, last: int) -> Iterator[np.ndarray | None]:
     for index in range(first, last):
         yield cv2.imread(str(images[index]), cv2.IMREAD_COLOR) if index in images else None

@@ -106,6 +106,12 @@ def test_interrupt(monkeypatch, capsys):
     assert capsys.readouterr().err.strip() == "hmc check: interrupted"
 
 
+def test_files_that_cannot_be_had_are_one_line(monkeypatch, capsys):
+    fake_command(monkeypatch, raising(PermissionError(13, "Permission denied", "/out/tracks.csv")))
+    assert main(["check", "x"]) == 2
+    assert capsys.readouterr().err == "hmc check: /out/tracks.csv: Permission denied\n"
+
+
 def test_faults_of_our_own_are_not_hidden(monkeypatch):
     fake_command(monkeypatch, raising(RuntimeError("a bug")))
     with pytest.raises(RuntimeError):

@@ -54,6 +54,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     int
         Exit code: 0 done, 2 the input was wrong (one line on stderr says what), 130 interrupted.
     """
+    # FFmpeg's own complaints about a damaged video would bury the one line that says which; OpenCV reads these on its first use.
+    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+    os.environ.setdefault("OPENCV_LOG_LEVEL", "ERROR")
     argv = list(sys.argv[1:] if argv is None else argv)
     parser = make_parser(argv[0] if argv else None)
     args = parser.parse_args(argv)
@@ -67,10 +70,15 @@ def main(argv: Sequence[str] | None = None) -> int:
     except InputError as error:
         print(f"hmc {args.command}: {error}", file=sys.stderr)
         return EXIT_INPUT
-    except KeyboardInterrupt:
-        print(f"hmc {args.command}: interrupted", file=sys.stderr)
-        return EXIT_INTERRUPTED
     except BrokenPipeError:
         # The reader of a pipe went away (`| head`); point stdout elsewhere, or the interpreter complains when it closes.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+    except OSError as error:
+        if error.filename is None:
+            raise
+        print(f"hmc {args.command}: {error.filename}: {error.strerror}", file=sys.stderr)
+        return EXIT_INPUT
+    except KeyboardInterrupt:
+        print(f"hmc {args.command}: interrupted", file=sys.stderr)
+        return EXIT_INTERRUPTED
