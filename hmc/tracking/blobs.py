@@ -32,8 +32,6 @@ class Blobs:
         World, metres.
     lowest, highest : ndarray, shape (n, 3)
         Corners of the bounding box, outer faces of the voxels, metres. ``highest[:, 2]`` is Table 4.1's "top".
-    footprint_m2 : ndarray, shape (n,)
-        Area of the shadow on the floor.
     """
 
     counts: np.ndarray
@@ -42,7 +40,6 @@ class Blobs:
     centroid: np.ndarray
     lowest: np.ndarray
     highest: np.ndarray
-    footprint_m2: np.ndarray
 
     def __len__(self) -> int:
         return len(self.counts)
@@ -143,8 +140,6 @@ def blob_features(points: np.ndarray, labels: np.ndarray, n_blobs: int, voxel_si
     np.minimum.at(lowest, labels, points)
     np.maximum.at(highest, labels, points)
     some = counts[:, None] > 0
-    columns = np.round((points[:, :2] - points[:1, :2]) / voxel_size_m).astype(np.int64)
-    shadows = np.unique(np.column_stack([labels, columns]), axis=0)[:, 0]
     volume = counts * voxel_size_m**3
     return Blobs(
         counts=counts,
@@ -153,5 +148,4 @@ def blob_features(points: np.ndarray, labels: np.ndarray, n_blobs: int, voxel_si
         centroid=sums / np.maximum(counts, 1)[:, None],
         lowest=np.where(some, lowest - voxel_size_m / 2, 0.0),
         highest=np.where(some, highest + voxel_size_m / 2, 0.0),
-        footprint_m2=np.bincount(shadows, minlength=n_blobs) * voxel_size_m**2,
     )

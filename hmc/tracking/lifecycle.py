@@ -16,8 +16,20 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from hmc.tracking.blobs import Blobs, Observation, blob_features
+from hmc.voxels.components import label_voxels
 
-__all__ = ["Candidate", "LifecycleSettings", "Row", "Track", "confirm", "delete", "looks_like_person", "propose", "unowned_blobs"]
+__all__ = [
+    "Candidate",
+    "LifecycleSettings",
+    "Row",
+    "Track",
+    "confirm",
+    "delete",
+    "looks_like_person",
+    "newcomers",
+    "propose",
+    "unowned_blobs",
+]
 
 
 @dataclass(frozen=True)
@@ -34,6 +46,8 @@ class LifecycleSettings:
         Furniture may hide the legs, but nobody floats higher than this.
     least_volume_m3, most_volume_m3 : float
         A hull is fatter than its person; the most leaves room for two who come in arm in arm.
+    least_joined_m3 : float
+        A set larger than this may be several people.
     most_side_m, least_side_m : float
         Longest horizontal side (arms stretched out) and least value of the longer side (a ghost is a thin column).
     keep_volume_m3, keep_top_m : float
@@ -56,6 +70,7 @@ class LifecycleSettings:
     most_bottom_m: float = 0.9
     least_volume_m3: float = 0.025
     most_volume_m3: float = 0.7
+    least_joined_m3: float = 0.2
     most_side_m: float = 2.2
     least_side_m: float = 0.25
     keep_volume_m3: float = 0.012
@@ -176,19 +191,64 @@ def unowned_blobs(observation: Observation, owners: np.ndarray, settings: Lifecy
     free = owners < 0
     if not free.any():
         return labels, blob_features(observation.points, labels, 0, size)
-    _, labels[free] = np.unique(observation.labels[free], return_inverse=True)
-    n_pieces = labels.max() + 1
+    present = np.bincount(observation.labels[free]) > 0
+    labels[free] = (np.cumsum(present) - 1)[observation.labels[free]]
+    n_pieces = int(present.sum())
     whole = looks_like_person(blob_features(observation.points, labels, n_pieces, size), settings)
     in_pieces = free & ~whole[labels]
-    columns = np.unique(np.column_stack([labels, observation.indices[:, :2]])[in_pieces], axis=0)
-    near = np.zeros((0, 2), int)
-    if len(columns):
-        near = cKDTree(columns[:, 1:]).query_pairs(settings.fragment_gap_m / size, output_type="ndarray")
-    a, b = columns[near[:, 0], 0], columns[near[:, 1], 0]
+    where = observation.indices[in_pieces, :2]
+    shape = (n_pieces, *(where.max(axis=0, initial=0) + 1))
+    columns = np.unique(np.ravel_multi_index((labels[in_pieces], *where.T), shape))
+    piece, x, y = np.unravel_index(columns, shape)
+    near = cKDTree(np.column_stack([x, y])).query_pairs(settings.fragment_gap_m / size, output_type="ndarray")
+    a, b = piece[near[:, 0]], piece[near[:, 1]]
     links = coo_array((np.ones(len(a)), (a, b)), shape=(n_pieces, n_pieces))
     n_groups, group = connected_components(links, directed=False)
     labels[free] = group[labels[free]]
     return labels, blob_features(observation.points, labels, n_groups, size)
+
+
+def newcomers(observation: Observation, owners: np.ndarray, settings: LifecycleSettings) -> list[np.ndarray]:
+    """Sets of voxels that look like a person and that no track owns.
+
+    Where people stand so close that the tolerant hull joins them, the strict hull's parts are taken apart.
+
+    Parameters
+    ----------
+    observation : Observation
+    owners : ndarray of int, shape (n,)
+        Row of the track that owns each voxel, or -1.
+    settings : LifecycleSettings
+
+    Returns
+    -------
+    list of ndarray of int
+        Rows of the observation's voxels, a set each.
+    """
+    labels, blobs = unowned_blobs(observation, owners, settings)
+    likely = looks_like_person(blobs, settings)
+    large = blobs.volume_m3 > settings.least_joined_m3
+    sets = []
+    for b in np.flatnonzero(likely | large):
+        rows = np.flatnonzero(labels == b)
+        parts = _strict_parts(observation, rows[observation.certain[rows]], settings) if large[b] else []
+        if len(parts) > 1 or not likely[b]:
+            sets += parts
+        else:
+            sets.append(rows)
+    return sets
+
+
+def _strict_parts(observation: Observation, rows: np.ndarray, settings: LifecycleSettings) -> list[np.ndarray]:
+    """Components of the voxels in `rows`, each a part of `rows`, that look like people."""
+    if rows.size == 0:
+        return []
+    indices = observation.indices[rows] - observation.indices[rows].min(axis=0)
+    box = np.zeros(indices.max(axis=0) + 1, bool)
+    box[tuple(indices.T)] = True
+    labels = label_voxels(box)[1]  # rows are in C order, and so are these
+    blobs = blob_features(observation.points[rows], labels, int(labels.max()) + 1, observation.voxel_size_m)
+    return [rows[labels == b] for b in np.flatnonzero(looks_like_person(blobs, settings))]
 
 
 def propose(

@@ -23,6 +23,7 @@ from hmc.tracking.lifecycle import (
     confirm,
     delete,
     looks_like_person,
+    newcomers,
     propose,
     still_a_person,
     unowned_blobs,
@@ -277,18 +278,18 @@ def head_centre(points: np.ndarray) -> np.ndarray:
 
 
 def _newcomers(observation: Observation, owners: np.ndarray, frame: int, settings: NaiveSettings) -> list[Row]:
-    """Person-like sets of voxels that no track owns and that are no ghosts."""
-    labels, blobs = unowned_blobs(observation, owners, settings.lifecycle)
-    likely = np.flatnonzero(looks_like_person(blobs, settings.lifecycle))
-    if likely.size and observation.views is not None:
-        sets = [observation.points[labels == b] for b in likely]
-        likely = likely[real_people(observation.views, observation.points[owners >= 0], sets, observation.voxel_size_m)]
-    numbers = np.full(len(blobs) + 1, -1)
-    numbers[likely] = np.arange(likely.size)
-    newcomers = numbers[labels]
-    best = locating_voxels(observation, newcomers, likely.size, settings)
-    sets = [observation.points[best & (newcomers == j)] for j in range(likely.size)]
-    return [Row(frame, -1, points.mean(axis=0), head_centre(points)) for points in sets]
+    """Where person-like sets of voxels are that no track owns and that are no ghosts."""
+    sets = newcomers(observation, owners, settings.lifecycle)
+    if sets and observation.views is not None:
+        points = [observation.points[rows] for rows in sets]
+        real = real_people(observation.views, observation.points[owners >= 0], points, observation.voxel_size_m)
+        sets = [rows for rows, one in zip(sets, real, strict=True) if one]
+    person = np.full(len(owners), -1)
+    for j, rows in enumerate(sets):
+        person[rows] = j
+    best = locating_voxels(observation, person, len(sets), settings)
+    located = [observation.points[best & (person == j)] for j in range(len(sets))]
+    return [Row(frame, -1, points.mean(axis=0), head_centre(points)) for points in located]
 
 
 def _predict(tracks: tuple[Track, ...], frame: int, fps: float) -> np.ndarray:
