@@ -114,7 +114,7 @@ def test_only_the_frames_of_the_run_count(result, recording, truth, capsys):
     write_joints(result / "joints.csv", truth.where(part))
     assert main(["evaluate", str(result), str(recording), "--quiet"]) == 0
     assert "10 with an estimate (25.0%)" in capsys.readouterr().out
-    write_run(result / "run.toml", "x", {}, 0, start=5, frames=5)
+    write_run(result / "run.toml", "x", {"start": 5, "frames": 5}, 0)
     assert main(["evaluate", str(result), str(recording), "--quiet"]) == 0
     assert "10 with an estimate (100.0%)" in capsys.readouterr().out
     assert main(["evaluate", str(result), str(recording), "--quiet", "--start", "8", "--frames", "1"]) == 0

@@ -221,6 +221,14 @@ def test_people_come_from_whichever_table_has_them(result, tmp_path):
     assert people_in(read_result(tmp_path), 0) == []
 
 
+def test_a_person_who_could_not_be_fitted_is_a_mark_on_the_floor(result, tmp_path):
+    for name in ("tracks.csv", "pose.npz"):
+        (tmp_path / name).write_bytes((result / name).read_bytes())
+    write_joints(tmp_path / "joints.csv", PoseTable(np.arange(FRAMES), np.zeros(FRAMES, int), np.full((FRAMES, 15, 3), np.nan)))
+    (person,) = people_in(read_result(tmp_path), 1)
+    assert person.landmarks is None and person.state is None and person.position is not None
+
+
 def test_view_writes_pictures_and_videos(recording, result, tmp_path, capsys):
     arguments = ["view", str(result), str(recording), "--quiet", "--voxel", "0.06"]
     assert main([*arguments, "--out", str(tmp_path / "new" / "one.png")]) == 0

@@ -106,7 +106,7 @@ def selection(args: argparse.Namespace) -> tuple[int, int | None]:
     from hmc.results import read_run
 
     run_file = args.directory / "run.toml"
-    made = read_run(run_file) if run_file.exists() else {}
+    made = read_run(run_file).get("parameters", {}) if run_file.exists() else {}
     start, frames = (made.get(key) if getattr(args, key) is None else getattr(args, key) for key in ("start", "frames"))
     return (start if isinstance(start, int) else 0), (frames if isinstance(frames, int) else None)
 

@@ -106,16 +106,22 @@ def people_in(result: Result, frame: int) -> list[Person]:
         {} if table is None else {int(table.persons[row]): row for row in np.flatnonzero(table.frames == frame)}
         for table in (result.poses, result.tracks, result.states)
     )
-    return [
-        Person(
-            number=number,
-            landmarks=result.poses.positions[poses[number]] if result.poses is not None and number in poses else None,
-            position=result.tracks.positions[tracks[number]] if result.tracks is not None and number in tracks else None,
-            state=result.states.states[states[number]] if result.states is not None and number in states else None,
-            body=(result.bodies or {}).get(number),
+    people = []
+    for number in sorted(set(poses) | set(tracks)):
+        points = result.poses.positions[poses[number]] if result.poses is not None and number in poses else None
+        if points is not None and np.isnan(points).all():
+            points = None  # there, but not fitted; then the state means nothing either
+        fitted = points is not None and result.states is not None and number in states
+        people.append(
+            Person(
+                number=number,
+                landmarks=points,
+                position=result.tracks.positions[tracks[number]] if result.tracks is not None and number in tracks else None,
+                state=result.states.states[states[number]] if fitted and result.states is not None else None,
+                body=(result.bodies or {}).get(number),
+            )
         )
-        for number in sorted(set(poses) | set(tracks))
-    ]
+    return people
 
 
 def make_layout(sizes: Iterable[tuple[int, int]], max_size: tuple[int, int] = MAX_SIZE) -> Layout:
