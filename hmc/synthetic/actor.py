@@ -142,7 +142,7 @@ def make_actor(
     _, each = distances(sweeps, mesh.vertices)
     nearest = each.argmin(axis=1)
     start = _first_weights(names, sweeps, nearest, mesh.vertices, joints)
-    weights = _spread(start, mesh.triangles, steps=int(round(14 * (0.014 / cell_m) ** 2)))
+    weights = _spread(start, mesh.triangles, steps=int(round(6 * (0.014 / cell_m) ** 2)))
     bones = weights.argmax(axis=1)
     part_of_bone = np.array([next(p for p, members in enumerate(PARTS.values()) if name in members) for name in BONE_NAMES])
     albedo = _albedo(names, nearest, mesh.vertices, joints, frames, skeleton, clothes, rng)
@@ -177,6 +177,13 @@ def _spread(weights: np.ndarray, triangles: np.ndarray, steps: int) -> np.ndarra
     average = sparse.diags(1 / np.asarray(neighbours.sum(axis=1)).ravel()) @ neighbours
     for _ in range(steps):
         weights = average @ weights
+    # Elbows and knees bend sharply; shoulders, hips and the trunk over a longer stretch.
+    wide = weights
+    for _ in range(2 * steps):
+        wide = average @ wide
+    trunk = [BONE_NAMES.index(name) for name in PARTS["trunk"]]
+    share = np.clip(3 * wide[:, trunk].sum(axis=1, keepdims=True), 0, 1)
+    weights = share * wide + (1 - share) * weights
     weights = np.where(weights < 0.01, 0, weights)
     return weights / weights.sum(axis=1, keepdims=True)
 
@@ -221,13 +228,13 @@ def _albedo(
 
     trunk_height = joints[BONE_NAMES.index("neck"), 2] - joints[0, 2]
     height = (vertices[:, 2] - joints[0, 2]) / trunk_height
-    shirt = ((region == "trunk") & (height > 0.10) & (height < 0.965)) | (region == "clavicle")
+    shirt = ((region == "trunk") & (height > 0.20) & (height < 0.965)) | (region == "clavicle")
     arm_length = skeleton.length("l_forearm")
     if clothes.sleeves == "long":
         shirt |= (region == "upper_arm") | (region == "forearm")
     else:
         shirt |= (region == "upper_arm") & (along("upper_arm")[:, 1] < 0.62 * arm_length)
-    trousers = ((region == "trunk") & (height <= 0.10)) | (region == "thigh")
+    trousers = ((region == "trunk") & (height <= 0.20)) | (region == "thigh")
     if clothes.legs == "long":
         trousers |= region == "shank"
     else:
@@ -239,7 +246,7 @@ def _albedo(
     for mask, value in ((shirt, clothes.shirt), (trousers, clothes.trousers), (hair, clothes.hair), (np.isin(region, ["foot", "toes"]), clothes.shoes)):
         colour[mask] = value
     colour[shirt & _pattern(clothes.pattern, vertices)] = clothes.pattern_colour
-    colour[trousers & (height > 0.07) & (height <= 0.10)] *= 0.5  # a belt
+    colour[trousers & (height > 0.165) & (height <= 0.20)] *= 0.5  # a belt
     face = (region == "head") & (head[:, 0] > 0.07)
     scale = skeleton.height_m / 1.75
     eyes = face & (np.abs(head[:, 2] - 0.040 * scale) < 0.010) & (np.abs(np.abs(vertices[:, 1]) - 0.031 * scale) < 0.014)

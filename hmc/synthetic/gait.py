@@ -30,14 +30,14 @@ def walk(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator, speed_
     Motion
         From the origin, facing X.
     """
-    stride = skeleton.height_m * (0.52 + 0.24 * speed_m_s) * rng.normal(1, 0.02)
+    stride = skeleton.height_m * (0.50 + 0.215 * speed_m_s) * rng.normal(1, 0.02)
     return _gait(skeleton, times, rng, speed_m_s, turn_radius_m, stride, stance=0.62, bounce=0.0)
 
 
 def jog(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator, speed_m_s: float = 2.2, turn_radius_m: float = 0.0) -> Motion:
     """Jog, with a phase of flight; arguments as for `walk`."""
     stride = skeleton.height_m * (0.50 + 0.30 * speed_m_s) * rng.normal(1, 0.02)
-    return _gait(skeleton, times, rng, speed_m_s, turn_radius_m, stride, stance=0.38, bounce=0.035)
+    return _gait(skeleton, times, rng, speed_m_s, turn_radius_m, stride, stance=0.38, bounce=0.03)
 
 
 def _path(distance: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray]:
@@ -68,12 +68,12 @@ def _gait(
     fps = 1 / np.median(np.diff(times)) if len(times) > 1 else 25.0
     if running:
         # Lowest in the middle of each stance, highest in flight.
-        base = skeleton.hip_height - 0.055 * skeleton.height_m / 1.75
+        base = skeleton.hip_height - 0.035 * skeleton.height_m / 1.75
         height = base - bounce * np.cos(4 * np.pi * (cycles - stance / 2))
     else:
-        height = pelvis_height(skeleton, middle, pelvis_yaw, feet, slack=0.995, smooth=0.035 * fps) - 0.004
+        height = pelvis_height(skeleton, middle, pelvis_yaw, feet, slack=0.995, smooth=0.025 * fps) - 0.002
         # Knees give way a little in the middle of stance, so that the pelvis rises less than straight legs would lift it.
-        height = height.min() + 0.55 * (height - height.min())
+        height = height.min() + 0.8 * (height - height.min())
     upper = Upper(
         pelvis=np.stack([0.045 * sway, lean * 0.5 + zero, pelvis_yaw], axis=-1),
         abdomen=np.stack([-0.03 * sway, lean * 0.5 + zero, yaw_size * twist], axis=-1),
@@ -113,7 +113,7 @@ def _feet(
 
         def print_of(k: np.ndarray, s: int = s, offset: float = offset) -> tuple[np.ndarray, np.ndarray]:
             # The body passes over the foot a little before the middle of stance.
-            centre, heading = _path((k + offset + 0.43 * stance) * stride - origin, radius)
+            centre, heading = _path((k + offset + 0.40 * stance) * stride - origin, radius)
             side = (1 - 2 * s) * width
             return centre + side * np.stack([-np.sin(heading), np.cos(heading)], axis=-1), heading + (1 - 2 * s) * np.radians(5)
 

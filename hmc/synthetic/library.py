@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from hmc.synthetic.actions import box, gesture, pick_up, sit, stand, throw_catch
+from hmc.synthetic.bvh import bvh_motion, read_bvh
 from hmc.synthetic.gait import jog, walk
 from hmc.synthetic.motions import Motion, place
 from hmc.synthetic.recipe import ActorRecipe
@@ -11,10 +13,34 @@ from hmc.synthetic.skeleton import Skeleton
 
 __all__ = ["make_motion"]
 
+_ACTIONS = {"stand": stand, "box": box, "gesture": gesture, "throw_catch": throw_catch, "sit": sit, "pick_up": pick_up}
+
 
 def make_motion(actor: ActorRecipe, skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator) -> Motion:
-    """The motion that a recipe asks for, in the world."""
-    if actor.motion in ("walk", "jog"):
+    """The motion that a recipe asks for, in the world.
+
+    Parameters
+    ----------
+    actor : ActorRecipe
+    skeleton : Skeleton
+    times : ndarray, shape (n,)
+        Seconds.
+    rng : Generator
+
+    Returns
+    -------
+    Motion
+
+    Raises
+    ------
+    InputError
+        When a motion file is missing or cannot be read.
+    """
+    if actor.motion == "bvh":
+        motion = bvh_motion(read_bvh(actor.bvh), skeleton, times, actor.bvh_start_s)
+    elif actor.motion in _ACTIONS:
+        motion = _ACTIONS[actor.motion](skeleton, times, rng)
+    else:
         gait, speed = {"walk": (walk, 1.25), "jog": (jog, 2.2)}[actor.motion]
         motion = gait(skeleton, times, rng, actor.speed_m_s or speed, actor.turn_radius_m)
     return place(motion, actor.start_m, actor.heading_deg)

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from hmc.synthetic.skeleton import BONE_NAMES, PARENTS, Skeleton, limb_orientations, reach, unit
 
-__all__ = ["Feet", "Motion", "Upper", "angles", "arms_by_angles", "arms_by_hands", "assemble", "keyframes", "place", "pelvis_height"]
+__all__ = ["Feet", "Motion", "Upper", "angles", "arms_by_angles", "arms_by_hands", "assemble", "keyframes", "lift_clavicle", "place", "pelvis_height"]
 
 
 @dataclass(frozen=True)
@@ -92,8 +92,8 @@ def assemble(skeleton: Skeleton, root: np.ndarray, upper: Upper, feet: Feet, arm
     upper : Upper
     feet : Feet
     arms : callable
-        ``arms(side, chest, shoulders) -> (upper_direction, forearm_direction, pole, hand)`` in the world, from the chest's orientation (n, 3, 3) and the
-        shoulder's place (n, 3); ``hand`` is an orientation of the hand against the forearm, (n, 3, 3), or None.
+        ``arms(side, chest, shoulders) -> (upper_direction, forearm_direction, pole)``, each (n, 3) in the world, from the side (0 left, 1 right), the
+        chest's orientation (n, 3, 3) and the shoulder's place (n, 3); the elbow points to the pole.
 
     Returns
     -------
@@ -124,17 +124,14 @@ def assemble(skeleton: Skeleton, root: np.ndarray, upper: Upper, feet: Feet, arm
         put(f"{side}_clavicle", chest)
         locate(f"{side}_clavicle")
         shoulder = locate(f"{side}_upper_arm")
-        first, second, pole, hand = arms(s, chest, shoulder)
-        # The shoulder girdle lifts with the arm, about a quarter of what the arm rises above hanging.
-        rise = np.arccos(np.clip(-np.einsum("ni,ni->n", first, chest[:, :, 2]), -1, 1))
-        lift = np.clip(rise - np.radians(35), 0, None) * 0.18
-        put(f"{side}_clavicle", chest @ Rotation.from_rotvec(lift[:, None] * [sign, 0, 0]).as_matrix())
+        first, second, pole = arms(s, chest, shoulder)
+        put(f"{side}_clavicle", lift_clavicle(chest, first, sign))
         shoulder = locate(f"{side}_upper_arm")
-        first, second, pole, hand = arms(s, chest, shoulder)
+        first, second, pole = arms(s, chest, shoulder)
         a, b = limb_orientations(f"{side}_arm", first, second, pole)
         put(f"{side}_upper_arm", a)
         put(f"{side}_forearm", b)
-        put(f"{side}_hand", b if hand is None else b @ hand)
+        put(f"{side}_hand", b)
         hip = locate(f"{side}_thigh")
         facing = euler(np.column_stack([np.zeros((n, 2)), feet.yaw[:, s]]))
         pole = unit(0.5 * facing[:, :, 0] + 0.5 * frames[:, 0, :, 0])
@@ -145,6 +142,22 @@ def assemble(skeleton: Skeleton, root: np.ndarray, upper: Upper, feet: Feet, arm
         for bone, pitch in (("foot", feet.pitch), ("toes", feet.toe_pitch)):
             put(f"{side}_{bone}", euler(np.column_stack([np.zeros(n), -pitch[:, s], feet.yaw[:, s]])))
     return Motion(np.asarray(root, float), frames)
+
+
+def lift_clavicle(chest: np.ndarray, upper_arm: np.ndarray, sign: int) -> np.ndarray:
+    """Orientations of a clavicle, (n, 3, 3): the shoulder girdle lifts with the arm, by about a fifth of its rise beyond 35 degrees.
+
+    Parameters
+    ----------
+    chest : ndarray, shape (n, 3, 3)
+    upper_arm : ndarray, shape (n, 3)
+        Its direction.
+    sign : int
+        1 left, -1 right.
+    """
+    rise = np.arccos(np.clip(-np.einsum("ni,ni->n", upper_arm, chest[:, :, 2]), -1, 1))
+    lift = np.clip(rise - np.radians(35), 0, None) * 0.18
+    return chest @ Rotation.from_rotvec(lift[:, None] * [sign, 0, 0]).as_matrix()
 
 
 def arms_by_angles(swing: np.ndarray, flex: np.ndarray, out: np.ndarray):
@@ -160,35 +173,32 @@ def arms_by_angles(swing: np.ndarray, flex: np.ndarray, out: np.ndarray):
 
         first, second = direction(swing[:, s]), direction(swing[:, s] + flex[:, s])
         pole = np.tile([-1.0, 0.0, 0.0], (len(swing), 1))
-        turn = chest
-        return _turned(turn, first), _turned(turn, second), _turned(turn, pole), None
+        return _turned(chest, first), _turned(chest, second), _turned(chest, pole)
 
     return arms
 
 
-def arms_by_hands(skeleton: Skeleton, targets: np.ndarray, in_chest: bool = True, elbow_out: float = 0.5, hand: np.ndarray | None = None):
-    """Arms that carry the wrists to ``targets``, (n, 2, 3): in arm's lengths from the shoulder along the chest's axes, or world metres.
+def arms_by_hands(skeleton: Skeleton, targets: np.ndarray, frame: str = "chest", elbow_out: float = 0.5):
+    """Arms that carry the wrists to ``targets``.
 
     Parameters
     ----------
     skeleton : Skeleton
     targets : ndarray, shape (n, 2, 3)
         The y of the right wrist too is positive to the left.
-    in_chest : bool
-        False takes targets as places in the world.
+    frame : {"chest", "world"}
+        Targets are arm's lengths from the shoulder along the chest's axes, or places in metres.
     elbow_out : float
         How much the elbow points outwards rather than down and back.
-    hand : ndarray, shape (3, 3), optional
-        Orientation of the hands against the forearms.
     """
     upper, fore = skeleton.length("l_forearm"), skeleton.length("l_hand")
 
     def arms(s: int, chest: np.ndarray, shoulder: np.ndarray):
         sign = 1 - 2 * s
-        goal = shoulder + _turned(chest, targets[:, s]) * (upper + fore) if in_chest else targets[:, s]
+        goal = targets[:, s] if frame == "world" else shoulder + (upper + fore) * _turned(chest, targets[:, s])
         pole = _turned(chest, np.tile(unit(np.array([-0.5, sign * elbow_out, -0.8])), (len(chest), 1)))
         first, second = reach(shoulder, goal, upper, fore, pole)
-        return first, second, pole, None if hand is None else np.tile(hand, (len(chest), 1, 1))
+        return first, second, pole
 
     return arms
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from hmc.synthetic.rasterise import rasterise
 
-__all__ = ["Light", "ShadowMap", "contact_map", "irradiance", "look_up", "make_lights", "shadow_map"]
+__all__ = ["Light", "ShadowMap", "contact_map", "flat_index", "irradiance", "look_up", "make_lights", "shadow_map", "soft_shadow"]
 
 #: Width and height of a shadow map, pixels; some 2 cm on the floor below a ceiling light.
 MAP_SIZE = 768
@@ -125,13 +125,18 @@ def soft_shadow(shadows: ShadowMap, index: np.ndarray, distance: np.ndarray, mar
     margin : float
         Metres by which the hiding surface must be nearer to the light.
     """
-    column, row = index % MAP_SIZE, index // MAP_SIZE
+    # Only where the neighbourhood holds something nearer to the light is there anything to compare.
+    nearest = np.append(cv2.erode(shadows.distance, np.ones((7, 7), np.uint8)).ravel(), _FAR)
+    some = np.flatnonzero(distance > nearest[index] + margin)
+    column, row = index[some] % MAP_SIZE, index[some] // MAP_SIZE
+    total = np.zeros(len(some), np.float32)
     offsets = [(dx, dy) for dx in (-3, -1, 1, 3) for dy in (-3, -1, 1, 3)]
-    total = np.zeros(len(index), np.float32)
     for dx, dy in offsets:
         near = shadows.distance[np.clip(row + dy, 0, MAP_SIZE - 1), np.clip(column + dx, 0, MAP_SIZE - 1)]
-        total += distance > near + margin
-    return np.where(index >= 0, total / len(offsets), 0)
+        total += distance[some] > near + margin
+    share = np.zeros(len(index), np.float32)
+    share[some] = total / len(offsets)
+    return share
 
 
 def irradiance(light: Light, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
