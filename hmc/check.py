@@ -17,12 +17,15 @@ from hmc.camera.calibration import CalibrationEntry, build_camera, read_entries
 from hmc.camera.coverage import estimate_room, in_view
 from hmc.camera.model import Camera, Rig, undistort
 from hmc.errors import InputError
-from hmc.footage import IMAGE_SUFFIXES, VIDEO_SUFFIXES, Footage
-from hmc.recording import Frame, Recording, find_views, iterate_frames, open_recording, wrong_sizes, wrong_units
+from hmc.footage import IMAGE_SUFFIXES, VIDEO_SUFFIXES, Footage, read_footage
+from hmc.recording import Frame, Recording, find_views, gaps, iterate_frames, open_recording, wrong_sizes, wrong_units
 from hmc.settings import read_settings
 from hmc.silhouette_check import disagreements
 
 __all__ = ["Finding", "Inspection", "check_recording", "inspect_recording"]
+
+#: Takes a severity and sentences.
+Say = Callable[[str, Iterable[str]], None]
 
 #: Frames that are read unless all are asked for, and how many of them the silhouettes are compared in.
 PROBE_FRAMES = 90
@@ -103,9 +106,10 @@ def inspect_recording(path: str | Path, cameras: Sequence[str] | None = None, re
         say("error", [f"{path}: no camera named '{unknown[0]}' in the calibration; it has {', '.join(entry.name for entry in entries)}"])
     if cameras is None:
         say("note", unused_views(path, [entry.name for entry in entries]))
+    everyone = [entry.name for entry in entries]
     entries = [entry for entry in entries if cameras is None or entry.name in cameras]
 
-    views = _views_by_camera(path, entries, say)
+    views = _views_by_camera(path, [entry.name for entry in entries], everyone, say)
     rig = _usable_rig(entries, {name: view.size for name, view in views.items()}, say)
     if rig is None:
         return Inspection(_sorted(found))
@@ -122,7 +126,7 @@ def inspect_recording(path: str | Path, cameras: Sequence[str] | None = None, re
         say(*coverage(rig, room))
 
     recording = None
-    images: tuple[np.ndarray | None, ...] = (None,) * len(rig)
+    images = tuple(None if view is None else next(read_footage(view, 0, 1, lambda line: None, ""), None) for view in own)
     if not any(finding.severity == "error" for finding in found):
         try:
             recording = open_recording(path, cameras=cameras)
@@ -134,9 +138,7 @@ def inspect_recording(path: str | Path, cameras: Sequence[str] | None = None, re
             low, high = recording.room.round(1).tolist()
             say("note", [f"recording.toml gives no `room`; estimated from the rig: {low} to {high} m"])
         say("note", background(recording))
-        first, sentences = _read(recording, read_all)
-        say("warning", sentences)
-        images = first.images if recording.has_images else _as_pictures(first)
+        say("warning", _read(recording, read_all))
     return Inspection(_sorted(found), rig, room, images, recording)
 
 
@@ -145,24 +147,23 @@ def _sorted(found: Sequence[Finding]) -> tuple[Finding, ...]:
     return tuple(sorted(dict.fromkeys(found), key=lambda finding: order.index(finding.severity)))
 
 
-def _views_by_camera(path: Path, entries: Sequence[CalibrationEntry], say: Callable[[str, Iterable[str]], None]) -> dict[str, Footage]:
-    """The first of images and silhouettes that can be had, a camera; errors are told one by one."""
-    views: dict[str, Footage] = {}
-    for entry in entries:
-        try:
-            footage, silhouettes = find_views(path, [entry.name], count=False)
-        except InputError as error:
-            say("error", [str(error)])
-            continue
-        view = footage[0] or silhouettes[0]
-        if view is None:
-            say("error", [f"{path}: camera '{entry.name}' has no video, images or silhouettes; name them {entry.name}.* or use --cameras"])
-        else:
-            views[entry.name] = view
-    return views
+def _views_by_camera(path: Path, names: Sequence[str], everyone: Sequence[str], say: Say) -> dict[str, Footage]:
+    """The images, or else the silhouettes, of each camera that has some; what is wrong with the others is told."""
+    unreadable = set()
+
+    def on_error(name: str, sentence: str) -> None:
+        unreadable.add(name)
+        say("error", [sentence])
+
+    footage, silhouettes = find_views(path, names, everyone, count=False, on_error=on_error)
+    views = {name: image or mask for name, image, mask in zip(names, footage, silhouettes, strict=True)}
+    for name in names:
+        if views[name] is None and name not in unreadable:
+            say("error", [f"{path}: camera '{name}' has no video, images or silhouettes; name them {name}.* or leave it out: --cameras"])
+    return {name: view for name, view in views.items() if view is not None}
 
 
-def _usable_rig(entries: Sequence[CalibrationEntry], sizes: dict, say: Callable[[str, Iterable[str]], None]) -> Rig | None:
+def _usable_rig(entries: Sequence[CalibrationEntry], sizes: dict, say: Say) -> Rig | None:
     cameras: list[Camera] = []
     for entry in entries:
         try:
@@ -187,18 +188,6 @@ def unused_views(path: Path, names: Sequence[str]) -> list[str]:
         for item in sorted(folder.iterdir())
         if (item.is_dir() or item.suffix.lower() in suffixes) and item.stem not in names
     ]
-
-
-def gaps(views: Sequence[Footage | None]) -> list[str]:
-    """A sentence for each camera whose numbered images have holes."""
-    sentences = []
-    for view in views:
-        if view is None or view.images is None:
-            continue
-        missing = sorted(set(range(min(view.images), view.n_frames)) - view.images.keys())
-        if missing:
-            sentences.append(f"{view.path}: {len(missing)} of {view.n_frames} images are missing, the first is number {missing[0]}")
-    return sentences
 
 
 def rates(fps: Sequence[float | None]) -> list[str]:
@@ -288,8 +277,8 @@ def background(recording: Recording) -> list[str]:
     return sentences
 
 
-def _read(recording: Recording, read_all: bool) -> tuple[Frame, list[str]]:
-    """The first frame, and sentences on what turned up while reading."""
+def _read(recording: Recording, read_all: bool) -> list[str]:
+    """Sentences on what turns up while reading."""
     sentences: list[str] = []
     n = min(recording.n_frames, PROBE_FRAMES)
     wanted = {recording.start + round(i) for i in np.linspace(0, n - 1, COMPARED_FRAMES)}
@@ -303,9 +292,4 @@ def _read(recording: Recording, read_all: bool) -> tuple[Frame, list[str]]:
             dark.add(camera.name)
     sentences.extend(f"camera '{name}': its first image is black" for name in sorted(dark))
     sentences.extend(disagreements(recording, probes))
-    return probes[0], sentences
-
-
-def _as_pictures(frame: Frame) -> tuple[np.ndarray | None, ...]:
-    masks = frame.silhouettes or ()
-    return tuple(None if mask is None else np.repeat(mask[..., None], 3, axis=2).astype(np.uint8) * 255 for mask in masks)
+    return sentences

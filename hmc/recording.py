@@ -135,14 +135,16 @@ def open_recording(path: str | Path, cameras: Sequence[str] | None = None, start
         raise InputError(f"{path}: no such folder; a recording is a folder with calibration.toml and videos/ or images/")
     settings = read_settings(path)
     entries = read_entries(path)
+    everyone = [entry.name for entry in entries]
     if cameras is not None:
+        cameras = [cameras] if isinstance(cameras, str) else cameras
         by_name = {entry.name: entry for entry in entries}
         unknown = [name for name in cameras if name not in by_name]
         if unknown or not cameras:
             raise InputError(f"{path}: no camera named '{', '.join(unknown)}' in the calibration; it has {', '.join(by_name)}")
         entries = [by_name[name] for name in cameras]
     names = [entry.name for entry in entries]
-    footage, silhouettes = find_views(path, names)
+    footage, silhouettes = find_views(path, names, everyone)
     both = [image or mask for image, mask in zip(footage, silhouettes, strict=True)]
     sizes = {name: view.size for name, view in zip(names, both, strict=True) if view is not None}
     try:
@@ -154,7 +156,7 @@ def open_recording(path: str | Path, cameras: Sequence[str] | None = None, start
 
     lengths = {view.path.name: view.n_frames for view in both if view is not None}
     total = common_length(list(lengths.values()))
-    problems = [note for view in (*footage, *silhouettes) if view is not None for note in view.notes]
+    problems = [*gaps(footage), *(note for view in (*footage, *silhouettes) if view is not None for note in view.notes)]
     if len(set(lengths.values())) > 1:
         problems.append(
             f"{path}: cameras differ in length ({', '.join(f'{name} {n}' for name, n in lengths.items())}); {total} frames are used"
@@ -168,17 +170,7 @@ def open_recording(path: str | Path, cameras: Sequence[str] | None = None, start
             f"{path}: nothing to read from frame {start} on ({'all' if frames is None else frames} frames); it has {total} frames"
         )
 
-    background = []
-    for camera in rig:
-        try:
-            found = find_footage(path / "background", camera.name, count=False)
-        except InputError as error:
-            found = None
-            problems.append(f"{error}; going on without this background")
-        if found is not None and found.size != camera.size:
-            problems.append(f"{found.path}: background is {_by(found.size)} and the camera {_by(camera.size)}; going on without it")
-            found = None
-        background.append(found)
+    background = _find_background(path, rig, problems)
     fps = settings.get("fps") or next((view.fps for view in footage if view is not None and view.fps), DEFAULT_FPS)
     room = settings.get("room")
     return Recording(
@@ -269,19 +261,71 @@ def background_frames(recording: Recording, camera_index: int, limit: int | None
         yield from (image for image in reader if image is not None)
 
 
-def find_views(path: Path, names: Sequence[str], count: bool = True) -> tuple[list[Footage | None], list[Footage | None]]:
-    """The images (``videos/`` first, else ``images/``) and the silhouettes of each camera; ``count`` as `hmc.footage.open_video`."""
-    folder = path / "videos" if (path / "videos").is_dir() else path / "images"
-    first = _first_number(folder, names)
-    footage = [find_footage(folder, name, first, count) for name in names]
+def find_views(
+    path: Path, names: Sequence[str], everyone: Sequence[str], count: bool = True, on_error: Callable[[str, str], None] | None = None
+) -> tuple[list[Footage | None], list[Footage | None]]:
+    """The images (in ``videos/``, else in ``images/``) and the silhouettes of each camera.
+
+    Parameters
+    ----------
+    path : Path
+        Folder of the recording.
+    names : sequence of str
+        The cameras wanted.
+    everyone : sequence of str
+        All cameras of the calibration: numbered images count from the smallest number of all, whichever are wanted.
+    count : bool
+        As `hmc.footage.open_video`.
+    on_error : callable, optional
+        Called with a camera's name and what is wrong with its files, which then count as missing; by default that is raised.
+    """
+
+    def find(folder: Path, name: str, first: int) -> Footage | None:
+        try:
+            return find_footage(folder, name, first, count)
+        except InputError as error:
+            if on_error is None:
+                raise
+            on_error(name, str(error))
+            return None
+
+    images = path / "images"
+    first = _first_number(images, everyone)
+    footage = [find(path / "videos", name, 0) or find(images, name, first) for name in names]
     if not any(footage):
-        first = _first_number(path / "silhouettes", names)
-    return footage, [find_footage(path / "silhouettes", name, first, count) for name in names]
+        first = _first_number(path / "silhouettes", everyone)
+    return footage, [find(path / "silhouettes", name, first) for name in names]
 
 
 def _first_number(folder: Path, names: Sequence[str]) -> int:
     numbers = [min(number_images(folder / name), default=0) for name in names if (folder / name).is_dir()]
     return min(numbers, default=0)
+
+
+def _find_background(path: Path, rig: Rig, problems: list[str]) -> list[Footage | None]:
+    """The empty scene of each camera; what cannot be used is left out and added to the problems."""
+    background: list[Footage | None] = []
+    for camera in rig:
+        found = None
+        try:
+            found = find_footage(path / "background", camera.name, count=False)
+        except InputError as error:
+            problems.append(f"{error}; going on without this background")
+        if found is not None and found.size != camera.size:
+            problems.append(f"{found.path}: background is {_by(found.size)} and the camera {_by(camera.size)}; going on without it")
+            found = None
+        background.append(found)
+    return background
+
+
+def gaps(views: Sequence[Footage | None]) -> list[str]:
+    """A sentence for each camera whose numbered images have holes."""
+    sentences = []
+    for view in views:
+        missing = [] if view is None or view.images is None else sorted(set(range(view.n_frames)) - view.images.keys())
+        if view is not None and missing:
+            sentences.append(f"{view.path}: {len(missing)} of {view.n_frames} images are missing, the first is frame {missing[0]}")
+    return sentences
 
 
 def common_length(lengths: Sequence[int]) -> int:

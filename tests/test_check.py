@@ -146,7 +146,7 @@ def test_lengths_rates_gaps_and_dark_images(recording_folder, ring):
         write_images(recording_folder / "images" / camera.name, [0, 1, 3, 4], (160, 120))
     (recording_folder / "images" / "cam_01" / "000001.png").write_bytes(b"")
     warnings = sentences(check_recording(recording_folder), "warning")
-    assert any("1 of 5 images are missing, the first is number 2" in warning for warning in warnings)
+    assert any("1 of 5 images are missing, the first is frame 2" in warning for warning in warnings)
     assert "cam_01: frame 1 cannot be read; left out" in warnings
 
 

@@ -98,7 +98,40 @@ def test_images_and_silhouettes_by_number(tmp_path, ring):
     assert all(mask is not None and mask[1] is None for mask in masks)
     assert masks[0][0] is None and not masks[1][0].any() and masks[2][0].all() and masks[2][0].dtype == bool
     assert masks[2][0].shape == (120, 160)
-    assert len(problems) == 1 and "cameras differ in length (cam_00 5, cam_01 11); 5 frames are used" in problems[0]
+    assert len(problems) == 2 and "cam_00: 1 of 5 images are missing, the first is frame 3" in problems[0]
+    assert "cameras differ in length (cam_00 5, cam_01 11); 5 frames are used" in problems[1]
+
+
+def test_numbers_count_from_the_first_of_all_cameras(tmp_path, ring):
+    """cam_01 starts two frames late; that is so too when it is read alone."""
+    write_calibration(tmp_path / "calibration.toml", ring.select(["cam_00", "cam_01"]))
+    write_images(tmp_path / "images" / "cam_00", range(100, 106), (160, 120), lambda n: 40 + 5 * (n - 100))
+    write_images(tmp_path / "images" / "cam_01", range(102, 106), (160, 120), lambda n: 40 + 5 * (n - 100))
+    _, frames, problems = read_all(tmp_path)
+    assert [indices(frame) for frame in frames] == [[0, None], [1, None], [2, 2], [3, 3], [4, 4], [5, 5]]
+    assert len(problems) == 1 and "cam_01: 2 of 6 images are missing, the first is frame 0" in problems[0]
+    _, frames, _ = read_all(tmp_path, cameras="cam_01")
+    assert [indices(frame) for frame in frames] == [[None], [None], [2], [3], [4], [5]]
+
+
+def test_videos_and_images_may_be_mixed(recording_folder):
+    (recording_folder / "videos" / "cam_01.avi").unlink()
+    write_images(recording_folder / "images" / "cam_01", range(12), (160, 120))
+    _, frames, problems = read_all(recording_folder)
+    assert all(indices(frame) == [frame.index] * 5 for frame in frames) and problems == []
+
+
+def test_calibration_in_another_format(recording_folder, ring):
+    """HumanEva's form, without sizes, in a folder of its own; sizes come from the videos."""
+    (recording_folder / "calibration.toml").unlink()
+    (recording_folder / "calibration").mkdir()
+    for camera in ring:
+        k, t = camera.matrix, 1000 * camera.translation
+        numbers = [k[0, 0], k[1, 1], k[0, 2], k[1, 2], 0, *camera.distortions, *camera.rotation.ravel(), *t]
+        (recording_folder / "calibration" / f"{camera.name}.cal").write_text(" ".join(map(repr, map(float, numbers))))
+    recording = open_recording(recording_folder)
+    assert recording.rig.names == ring.names and recording.rig[3].size == (160, 120)
+    assert_allclose(recording.rig.centres, ring.centres, atol=1e-9)
 
 
 def test_silhouettes_alone(tmp_path, ring):
@@ -228,7 +261,7 @@ def edit(file, old, new):
         ),
         (lambda f: edit(f / "calibration.toml", "translation = [", "translation = [nan, "), "camera 'cam_00': `translation`"),
         (lambda f: edit(f / "calibration.toml", "rotation = [", "rotation = [nan, 0, 0]\n#"), "camera 'cam_00': `rotation` holds"),
-        (lambda f: (f / "images" / "cam_01").mkdir(parents=True) or (f / "videos").rename(f / "x"), "no image in this folder"),
+        (lambda f: (f / "images" / "cam_01").mkdir(parents=True) or (f / "videos" / "cam_01.avi").unlink(), "no image in this folder"),
     ],
 )
 def test_what_cannot_be_used_is_refused(recording_folder, spoil, message):
