@@ -11,6 +11,7 @@ cache.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import cv2
@@ -40,8 +41,8 @@ __all__ = [
 
 #: Columns of every score array.
 SCORES = ("out", "double_occupancy", "empty", "surface")
-#: Elements of a chunk: its coordinates and indices stay in a core's second-level cache.
-CHUNK_ELEMENTS = 40_000
+#: Elements of a chunk: its coordinates and indices stay in a core's second-level cache, and calls are few.
+CHUNK_ELEMENTS = 60_000
 #: Room left around the occupied voxels in the maps, metres. Flesh farther out is clamped to the empty border.
 MARGIN_M = 0.3
 
@@ -81,8 +82,8 @@ class ScoreTable:
         Homogeneous, metres, segment's frame; sorted by part, within a part the surface first.
     blocks : tuple of (part, segment, is_surface, start, stop)
         Runs of rows of `points`.
-    reach : ndarray, shape (11,)
-        Farthest point of each segment from its joint, metres.
+    corners : ndarray of float32, shape (11, 8, 4)
+        Homogeneous corners of the box around each segment's points, metres, segment's frame.
     counts : ndarray of int, shape (n_parts, 4)
         Points behind each score: the surface's for ``surface``, all for the others.
     overlap : OverlapTable
@@ -92,7 +93,7 @@ class ScoreTable:
     body: BodyModel
     points: np.ndarray
     blocks: tuple[tuple[int, int, bool, int, int], ...]
-    reach: np.ndarray
+    corners: np.ndarray
     counts: np.ndarray
     overlap: OverlapTable
     flesh: FleshTable
@@ -206,11 +207,14 @@ def make_score_table(body: BodyModel, flesh: FleshTable) -> ScoreTable:
     blocks = tuple((int(p), int(s), bool(f), int(a), int(b)) for (p, s, f), a, b in zip(keys[starts], starts, stops, strict=True))
     points = np.ones((len(order), 4), np.float32)
     points[:, :3] = flesh.points[order]
-    reach = np.zeros(len(SEGMENTS))
-    np.maximum.at(reach, flesh.segment, np.linalg.norm(flesh.points, axis=1))
+    corners = np.ones((len(SEGMENTS), 8, 4), np.float32)
+    sides = np.array(list(itertools.product((False, True), repeat=3)))
+    for segment in range(len(SEGMENTS)):
+        members = flesh.points[flesh.segment == segment]
+        corners[segment, :, :3] = np.where(sides, members.max(0), members.min(0))
     counts = np.repeat(np.bincount(flesh.part, minlength=len(PARTS))[:, None], 4, axis=1)
     counts[:, 3] = np.bincount(flesh.part[flesh.is_surface], minlength=len(PARTS))
-    return ScoreTable(body, points, blocks, reach, counts, make_overlap_table(body, flesh), flesh)
+    return ScoreTable(body, points, blocks, corners, counts, make_overlap_table(body, flesh), flesh)
 
 
 def scores(table: ScoreTable, states: np.ndarray, maps: ScoreMaps, exact: bool = False) -> np.ndarray:
@@ -258,60 +262,59 @@ def map_scores(table: ScoreTable, placed: np.ndarray, maps: ScoreMaps) -> tuple[
     """
     n = placed.shape[-1]
     size = maps.voxel_size_m
-    nx, ny, nz = maps.occupancy.shape
     occupancy, closeness = maps.occupancy.ravel(), maps.surface.ravel()
     columns = placed * np.float32(1 / size)  # points @ columns[segment, axis] is a coordinate in voxels
-    # A segment whose sphere of reach leaves the crop (the room) for some particle has its points clamped (tested).
-    reach = table.reach[:, None] / size + 0.01
-    low, high = columns[:, :, 3].min(2) - reach, columns[:, :, 3].max(2) + reach
+    # A segment whose box leaves the crop (the room) in some particle has its points clamped (tested).
+    at = table.corners[:, None] @ columns
+    low, high = at.min((2, 3)) - 0.01, at.max((2, 3)) + 0.01
     clamped = np.any((low < 0) | (high > maps.occupancy.shape), axis=1)
     room = (maps.room - maps.origin) / size
     crossed = np.stack([low < room[0], high > room[1]], axis=2)  # (segment, axis, side)
 
-    totals = np.zeros((3, len(PARTS), n))
-    rows = max(8, CHUNK_ELEMENTS // max(n, 1))
-    coordinate = np.empty((3, rows, n), np.float32)
-    flat, whole = np.empty((rows, n), np.int32), np.empty((rows, n), np.int32)
-    index, found = np.empty((rows, n), np.int64), np.empty((rows, n), np.uint8)
+    totals = np.zeros((3, len(PARTS), n), np.int32)
+    rows = max(8, CHUNK_ELEMENTS // n)
+    axis_buffer = np.empty((rows, n), np.float32)
+    flat_buffer, voxel_buffer = np.empty((rows, n), np.int32), np.empty((rows, n), np.int32)
+    index_buffer, found_buffer = np.empty((rows, n), np.int64), np.empty((rows, n), np.uint8)
     for part, segment, is_surface, start, stop in table.blocks:
         for first in range(start, stop, rows):
             points = table.points[first : min(first + rows, stop)]
             m = len(points)
-            xyz = coordinate[:, :m]
-            i, j, where, values = flat[:m], whole[:m], index[:m], found[:m]
-            np.matmul(points, columns[segment], out=xyz)
-            if crossed[segment].any():
-                totals[0, part] += _sum_rows(_outside(xyz, room, crossed[segment]).view(np.uint8))
-            if clamped[segment]:
-                for axis, extent in enumerate((nx, ny, nz)):
-                    np.clip(xyz[axis], 0.5, extent - 0.5, out=xyz[axis])
+            along, flat, voxel, index, found = (
+                buffer[:m] for buffer in (axis_buffer, flat_buffer, voxel_buffer, index_buffer, found_buffer)
+            )
             # Each coordinate is cut to a whole number before they are joined: the other way round is wrong at rounding.
-            np.copyto(i, xyz[0], casting="unsafe")
-            i *= ny
-            np.copyto(j, xyz[1], casting="unsafe")
-            i += j
-            i *= nz
-            np.copyto(j, xyz[2], casting="unsafe")
-            i += j
-            np.copyto(where, i)
-            occupancy.take(where, out=values, mode="wrap")
-            totals[1, part] += _sum_rows(values)
+            for axis, extent in enumerate(maps.occupancy.shape):
+                np.matmul(points, columns[segment, axis], out=along)
+                if clamped[segment]:
+                    np.clip(along, 0.5, extent - 0.5, out=along)
+                if axis == 0:
+                    np.copyto(flat, along, casting="unsafe")
+                else:
+                    flat *= extent
+                    np.copyto(voxel, along, casting="unsafe")
+                    flat += voxel
+            np.copyto(index, flat)
+            occupancy.take(index, out=found, mode="wrap")
+            totals[1, part] += _sum_rows(found)
             if is_surface:
-                closeness.take(where, out=values, mode="wrap")
-                totals[2, part] += _sum_rows(values)
-    totals[2] /= 255
+                closeness.take(index, out=found, mode="wrap")
+                totals[2, part] += _sum_rows(found)
+            if crossed[segment].any():
+                totals[0, part] += _sum_rows(_outside(points, columns[segment], room, crossed[segment]).view(np.uint8))
     out, occupied, close = totals / table.counts.T[[0, 2, 3], :, None]
-    return out.T, 1 - occupied.T, 1 - close.T
+    return out.T, 1 - occupied.T, 1 - close.T / 255
 
 
-def _outside(xyz: np.ndarray, room: np.ndarray, crossed: np.ndarray) -> np.ndarray:
+def _outside(points: np.ndarray, columns: np.ndarray, room: np.ndarray, crossed: np.ndarray) -> np.ndarray:
     """Which points lie beyond the sides of the room that are in question; bool, shape (m, n)."""
-    outside = np.zeros(xyz.shape[1:], bool)
-    for axis in range(3):
+    outside = np.zeros((len(points), columns.shape[-1]), bool)
+    for axis in np.flatnonzero(crossed.any(axis=1)):
+        along = points @ columns[axis]
         if crossed[axis, 0]:
-            outside |= xyz[axis] < np.float32(room[0, axis])
+            outside |= along < np.float32(room[0, axis])
         if crossed[axis, 1]:
-            outside |= xyz[axis] > np.float32(room[1, axis])
+            outside |= along > np.float32(room[1, axis])
     return outside
 
 
