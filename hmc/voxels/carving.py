@@ -117,7 +117,7 @@ def make_tables(grid: VoxelGrid, rig: Rig) -> CarvingTables:
             places = [bottom * stride + right, top * stride + left, top * stride + right, bottom * stride + left]
             corners[c, :, part] = np.where(some, places, 0)
     first = starts @ np.array([grid.shape[1] * grid.shape[2], grid.shape[2], 1])
-    sticks_out = (starts + BLOCK > grid.shape).any(axis=1)
+    sticks_out = np.any(starts + BLOCK > grid.shape, axis=1)
     return CarvingTables(grid, rig, (nx, ny, nz), pixels, corners, areas, seen_whole, first, sticks_out)
 
 

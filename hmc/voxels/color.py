@@ -1,0 +1,185 @@
+"""Colours of voxels: plain average over the cameras, or over the cameras that have direct sight of the voxel.
+
+Source: Canton (2009), section 2.2.4 (line from the voxel to the optical centre, drawn in the discrete space by Bresenham's algorithm; the
+voxel is seen when all of the line is empty) and Kehl (2006), section 4.1. The plain average mixes the colours of front and back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+
+from hmc.camera.model import Camera, Rig, project
+from hmc.errors import InputError
+from hmc.voxels.carving import pixel_of_voxel
+from hmc.voxels.grid import VoxelGrid
+from hmc.voxels.surface import surface
+
+__all__ = ["color_voxels", "visibility"]
+
+#: Quick mode: a voxel is hidden when something is nearer to the camera by more than this many voxels.
+DEPTH_SLACK = 3.0
+#: Quick mode: width of what a voxel hides, and half of the largest width of the depth image, in cells of a voxel's size.
+SPLAT_CELLS = 2
+MOST_CELLS = 2000
+EMPTY, SOLID, BEYOND = 0, 1, 2
+
+
+def color_voxels(
+    grid: VoxelGrid, rig: Rig, images: Sequence[np.ndarray | None], voxels: np.ndarray, seen: np.ndarray | None = None
+) -> np.ndarray:
+    """Average colour of each voxel in the images.
+
+    Parameters
+    ----------
+    grid : VoxelGrid
+    rig : Rig
+    images : sequence of ndarray of uint8, shape (height, width, 3), or None
+        One a camera; a camera without an image tells nothing.
+    voxels : ndarray of int, shape (n, 3)
+    seen : ndarray of bool, shape (n_cameras, n), optional
+        Which camera has direct sight of which voxel (`visibility`). All have where left out: the plain average.
+
+    Returns
+    -------
+    ndarray of float32, shape (n, 3)
+        BGR, 0 to 255; NaN where no camera tells anything.
+    """
+    points = grid.centres(voxels)
+    total = np.zeros((len(voxels), 3), np.float32)
+    count = np.zeros(len(voxels), np.float32)
+    for c, (camera, image) in enumerate(zip(rig, images, strict=True)):
+        if image is None:
+            continue
+        column, row, inside = pixel_of_voxel(camera, points)
+        tells = np.flatnonzero(inside if seen is None else inside & seen[c])
+        total[tells] += image[row[tells], column[tells]]
+        count[tells] += 1
+    with np.errstate(invalid="ignore"):
+        return total / np.where(count > 0, count, np.nan)[:, None]
+
+
+def visibility(occupied: np.ndarray, grid: VoxelGrid, rig: Rig, voxels: np.ndarray, mode: str = "exact") -> np.ndarray:
+    """Which camera has direct sight of which voxel; whether it lies inside the camera's image is not asked.
+
+    Parameters
+    ----------
+    occupied : ndarray of bool, shape grid.shape
+        What may stand in the way.
+    grid : VoxelGrid
+    rig : Rig
+    voxels : ndarray of int, shape (n, 3)
+        Occupied voxels (i, j, k).
+    mode : {"exact", "quick"}
+        "exact" walks the 3-D Bresenham line from the voxel to the camera's voxel, both ends left out; "quick" looks at
+        the line's first voxel only and then compares depths in a coarse depth image of the surface; it agrees on nearly all.
+
+    Returns
+    -------
+    ndarray of bool, shape (n_cameras, n)
+
+    Raises
+    ------
+    InputError
+        When there is no such mode.
+    """
+    if mode not in ("exact", "quick"):
+        raise InputError(f"`mode` must be exact or quick; got {mode!r}")
+    voxels = np.asarray(voxels, np.int64).reshape(-1, 3)
+    solid = np.stack(np.unravel_index(np.flatnonzero(occupied), occupied.shape), axis=-1)
+    if len(solid) == 0:
+        return np.ones((len(rig), len(voxels)), bool)
+    # Beyond the box around all that is occupied, nothing stands in the way.
+    low = np.minimum(solid.min(axis=0), voxels.min(axis=0, initial=np.iinfo(np.int64).max)) - 1
+    high = np.maximum(solid.max(axis=0), voxels.max(axis=0, initial=-1)) + 2
+    room = np.full(high - low, BEYOND, np.uint8)
+    room[1:-1, 1:-1, 1:-1] = EMPTY
+    room[tuple((solid - low).T)] = SOLID
+    targets = [grid.index_of(camera.centre) - low for camera in rig]
+    if mode == "exact":
+        return np.stack([_walk(room, voxels - low, target) for target in targets])
+    seen = np.zeros((len(rig), *room.shape), bool)
+    skin = surface(room == SOLID)
+    points = grid.centres(skin + low)
+    for c, (camera, target) in enumerate(zip(rig, targets, strict=True)):
+        near = np.flatnonzero(_faces(room, skin, target))
+        near = near[_splat(camera, points[near], grid.voxel_size_m)]
+        seen[(c, *skin[near].T)] = True
+    return seen[(slice(None), *(voxels - low).T)]
+
+
+def _walk(room: np.ndarray, starts: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """Walk from all voxels to one target at once, one step along each line's longest axis at a time.
+
+    Bresenham (1965) in 3-D: each of the two shorter axes steps when its error term is not negative.
+    """
+    strides = np.array([room.shape[1] * room.shape[2], room.shape[2], 1])
+    delta = target - starts
+    length = np.abs(delta)
+    axes = np.argsort(-length, axis=1, kind="stable")  # the longest first; of equals x before y before z
+    length = np.take_along_axis(length, axes, axis=1)
+    step = np.take_along_axis(np.sign(delta) * strides, axes, axis=1)
+    # Rows: line, place, steps to the target, the three steps, twice the lengths, the two error terms.
+    state = np.stack(
+        [
+            np.arange(len(starts)),
+            starts @ strides,
+            length[:, 0],
+            *step.T,
+            *(2 * length).T,
+            2 * length[:, 1] - length[:, 0],
+            2 * length[:, 2] - length[:, 0],
+        ]
+    )
+    flat = room.ravel()
+    seen = np.zeros(len(starts), bool)
+    while state.shape[1]:
+        _, place, left, main, first, second, double_main, double_first, double_second, error_first, error_second = state
+        place += main
+        left -= 1
+        for step_aside, double, error in ((first, double_first, error_first), (second, double_second, error_second)):
+            over = error >= 0
+            place += step_aside * over
+            error += double - double_main * over
+        # The target may lie outside the room; one step past the border is inside the array, and lines end there.
+        arrived = left <= 0
+        found = np.where(arrived, BEYOND, flat.take(place, mode="clip"))
+        seen[state[0, found == BEYOND]] = True
+        going = np.flatnonzero(found == EMPTY)
+        if going.size < state.shape[1]:
+            state = state.take(going, axis=1)
+    return seen
+
+
+def _faces(room: np.ndarray, starts: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """Whether the first voxel on each Bresenham line is empty: that alone tells the side that faces the camera from the others."""
+    delta = (target - starts).astype(np.int32)
+    length = np.abs(delta)
+    longest = np.maximum(np.maximum(length[:, 0], length[:, 1]), length[:, 2])
+    step = np.sign(delta) * (2 * length >= longest[:, None])
+    strides = np.array([room.shape[1] * room.shape[2], room.shape[2], 1])
+    return room.ravel().take((starts + step) @ strides) != SOLID
+
+
+def _splat(camera: Camera, points: np.ndarray, voxel_size_m: float) -> np.ndarray:
+    """Which of the points no other one hides, by depth in an image whose pixels are about as large as a voxel looks."""
+    uv, valid = project(camera, points)
+    seen = np.ones(len(points), bool)
+    some = np.flatnonzero(valid)
+    if some.size == 0:
+        return seen
+    distance = ((points[some] - camera.centre) @ camera.rotation[2]).astype(np.float32)
+    cell = camera.matrix[0, 0] * voxel_size_m / distance.mean()
+    # Points far outside the image would make the depth image as large as the lens spreads them.
+    place = np.clip(np.floor(uv[some] / cell), -MOST_CELLS, MOST_CELLS).astype(np.int64)
+    place -= place.min(axis=0)
+    width, height = place.max(axis=0) + 1
+    place = place[:, 1] * width + place[:, 0]
+    depth = np.full(height * width, np.inf, np.float32)
+    order = np.argsort(-distance)
+    depth[place[order]] = distance[order]  # the nearest is written last, and stays
+    depth = cv2.erode(depth.reshape(height, width), np.ones((SPLAT_CELLS, SPLAT_CELLS), np.uint8)).ravel()
+    seen[some] = distance <= depth[place] + DEPTH_SLACK * voxel_size_m
+    return seen
