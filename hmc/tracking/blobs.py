@@ -68,6 +68,8 @@ class Observation:
     Attributes
     ----------
     voxel_size_m : float
+    room : ndarray, shape (2, 3)
+        Lowest and highest corner of the grid, metres.
     indices : ndarray of int, shape (n, 3)
         Occupied voxels of the grid, in C order.
     points : ndarray, shape (n, 3)
@@ -83,6 +85,7 @@ class Observation:
     """
 
     voxel_size_m: float
+    room: np.ndarray
     indices: np.ndarray
     points: np.ndarray
     labels: np.ndarray
@@ -113,7 +116,7 @@ def observe(grid: VoxelGrid, occupied: np.ndarray, certain: np.ndarray | None = 
     n_blobs = int(labels.max(initial=-1)) + 1
     blobs = blob_features(points, labels, n_blobs, grid.voxel_size_m)
     sure = np.ones(len(indices), bool) if certain is None else certain[tuple(indices.T)]
-    return Observation(grid.voxel_size_m, indices, points, labels, blobs, sure, views)
+    return Observation(grid.voxel_size_m, grid.bounds, indices, points, labels, blobs, sure, views)
 
 
 def blob_features(points: np.ndarray, labels: np.ndarray, n_blobs: int, voxel_size_m: float) -> Blobs:

@@ -51,11 +51,15 @@ class LifecycleSettings:
     most_side_m, least_side_m : float
         Longest horizontal side (arms stretched out) and least value of the longer side (a ghost is a thin column).
     keep_volume_m3, keep_top_m : float
-        What is enough for a person who is tracked already.
+        What is enough of the strict hull for a person who is tracked already.
+    keep_share : float
+        And what share of the person's usual volume.
     confirm_s, confirm_frames : float, int
         A candidate becomes a person after this time and at least this many frames.
-    patience_s : float
-        A track is deleted after this time without support.
+    patience_s, edge_patience_s : float
+        A track is deleted after this time without support; the second holds for people who were last seen at the edge of the room.
+    edge_m : float
+        Width of that edge.
     least_distance_m : float
         No candidate nearer to a track than this, horizontally.
     same_place_m, same_place_s : float
@@ -75,9 +79,12 @@ class LifecycleSettings:
     least_side_m: float = 0.25
     keep_volume_m3: float = 0.012
     keep_top_m: float = 0.4
+    keep_share: float = 0.2
     confirm_s: float = 0.3
     confirm_frames: int = 4
     patience_s: float = 1.0
+    edge_patience_s: float = 0.3
+    edge_m: float = 0.3
     least_distance_m: float = 0.45
     same_place_m: float = 0.2
     same_place_s: float = 0.5
@@ -162,9 +169,26 @@ def looks_like_person(blobs: Blobs, settings: LifecycleSettings) -> np.ndarray:
     )
 
 
-def still_a_person(blobs: Blobs, settings: LifecycleSettings) -> np.ndarray:
-    """Which sets of voxels, owned by tracks, are enough to keep the track; shape (n,) bool."""
-    return (blobs.volume_m3 >= settings.keep_volume_m3) & (blobs.top_m >= settings.keep_top_m)
+def still_a_person(owned: Blobs, certain: Blobs, tracks: tuple[Track, ...], settings: LifecycleSettings) -> np.ndarray:
+    """Which tracks the voxels that they own keep alive.
+
+    Enough of the strict hull does, or a set that looks like a person as a whole (whom one camera cannot see), but not a remnant of what
+    the track was: remnants stay behind where somebody leaves the room.
+
+    Parameters
+    ----------
+    owned, certain : Blobs
+        Features of each track's voxels, and of those in the strict hull.
+    tracks : tuple of Track
+    settings : LifecycleSettings
+
+    Returns
+    -------
+    ndarray of bool, shape (n_tracks,)
+    """
+    solid = (certain.volume_m3 >= settings.keep_volume_m3) & (certain.top_m >= settings.keep_top_m)
+    usual = np.array([track.volume_m3 for track in tracks])
+    return (solid | looks_like_person(owned, settings)) & (owned.volume_m3 >= settings.keep_share * usual)
 
 
 def unowned_blobs(observation: Observation, owners: np.ndarray, settings: LifecycleSettings) -> tuple[np.ndarray, Blobs]:
@@ -318,11 +342,27 @@ def confirm(
     return tuple(left), tuple(tracks), rows
 
 
-def delete(tracks: tuple[Track, ...], frame: int, fps: float, settings: LifecycleSettings) -> tuple[Track, ...]:
-    """The tracks that stay: supported lately, and not standing where an older one stands."""
+def delete(tracks: tuple[Track, ...], frame: int, fps: float, room: np.ndarray, settings: LifecycleSettings) -> tuple[Track, ...]:
+    """The tracks that stay: supported lately, and not standing where an older one stands.
+
+    Parameters
+    ----------
+    tracks : tuple of Track
+    frame : int
+    fps : float
+    room : ndarray, shape (2, 3)
+        Lowest and highest corner of the grid, metres.
+    settings : LifecycleSettings
+
+    Returns
+    -------
+    tuple of Track
+        By person.
+    """
     kept: list[Track] = []
     for track in sorted(tracks, key=lambda track: track.person):
-        if frame - track.last_frame > settings.patience_s * fps:
+        inside = np.all((track.position > room[0] + settings.edge_m)[:2] & (track.position < room[1] - settings.edge_m)[:2])
+        if frame - track.last_frame > (settings.patience_s if inside else settings.edge_patience_s) * fps:
             continue
         near = any(_gap(track.position, older.position) < settings.same_place_m for older in kept)
         crowded = track.crowded + 1 if near else 0

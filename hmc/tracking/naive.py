@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hmc.errors import InputError
-from hmc.tracking.blobs import Blobs, Observation, blob_features
+from hmc.tracking.blobs import Observation, blob_features
 from hmc.tracking.ghosts import real_people
 from hmc.tracking.lifecycle import (
     Candidate,
@@ -32,6 +32,9 @@ from hmc.tracking.region import person_radii, region_distance
 
 __all__ = ["NaiveInfo", "NaiveSettings", "NaiveState", "assign_voxels", "finish", "head_centre", "init", "step"]
 
+#: Share of the room beyond which what is occupied cannot be people.
+MOST_FILLED = 0.5
+
 
 @dataclass(frozen=True)
 class NaiveSettings:
@@ -49,6 +52,8 @@ class NaiveSettings:
         Time constant of the velocity's smoothing.
     most_speed_m_s : float
         Nobody is faster.
+    most_reach_m : float
+        A person who was lost is not looked for further away than this.
     shared_gain : float
         Share of the measured correction that is believed while persons share one component.
     least_certain_m3 : float
@@ -62,6 +67,7 @@ class NaiveSettings:
     reach: float = 2.0
     velocity_time_s: float = 0.3
     most_speed_m_s: float = 4.0
+    most_reach_m: float = 1.2
     shared_gain: float = 0.5
     least_certain_m3: float = 0.03
     lifecycle: LifecycleSettings = field(default_factory=LifecycleSettings)
@@ -138,7 +144,8 @@ def step(
     frame : int
         Absolute number; frames come in order.
     observation : Observation or None
-        None where the frame tells nothing (a light switch): every track waits. An observation without voxels means that nobody is there.
+        None where the frame tells nothing: every track waits. So it does when most of the room is occupied (a light switch). An
+        observation without voxels means that nobody is there.
     settings : NaiveSettings, optional
 
     Returns
@@ -147,28 +154,31 @@ def step(
     info : NaiveInfo
     """
     settings = NaiveSettings() if settings is None else settings
-    if observation is None:
+    if observation is None or len(observation.points) * observation.voxel_size_m**3 > MOST_FILLED * np.ptp(observation.room, axis=0).prod():
         waiting = tuple(replace(track, last_frame=track.last_frame + 1, velocity=track.velocity * 0.5) for track in state.tracks)
-        return replace(state, tracks=waiting), NaiveInfo((), np.zeros(0, int))
+        return replace(state, tracks=waiting), NaiveInfo((), np.full(0 if observation is None else len(observation.points), -1))
     predicted = _predict(state.tracks, frame, state.fps)
     owners, shared = assign_voxels(observation, predicted, settings)
     owners = _find_again(state.tracks, frame, state.fps, observation, owners, settings)
     owned = blob_features(observation.points, owners, len(predicted), observation.voxel_size_m)
-    supported = still_a_person(owned, settings.lifecycle)
     best = locating_voxels(observation, owners, len(predicted), settings)
     located = blob_features(observation.points, np.where(best, owners, -1), len(predicted), observation.voxel_size_m)
+    certain = blob_features(observation.points, np.where(observation.certain, owners, -1), len(predicted), observation.voxel_size_m)
+    supported = still_a_person(owned, certain, state.tracks, settings.lifecycle)
     tracks, rows = [], []
     for k, track in enumerate(state.tracks):
         if supported[k]:
             head = head_centre(observation.points[best & (owners == k)])
-            tracks.append(_update(track, frame, predicted[k], located, k, head, bool(shared[k]), state.fps, settings))
+            tracks.append(
+                _update(track, frame, predicted[k], located.centroid[k], owned.volume_m3[k], head, bool(shared[k]), state.fps, settings)
+            )
             rows.append(Row(frame, track.person, located.centroid[k], head))
         else:
             tracks.append(replace(track, position=predicted[k], velocity=track.velocity * 0.8))
 
     candidates = propose(state.candidates, _newcomers(observation, owners, frame, settings), tuple(tracks), settings.lifecycle)
     candidates, fresh, earlier = confirm(candidates, state.next_person, state.fps, settings.lifecycle)
-    kept = delete((*tracks, *fresh), frame, state.fps, settings.lifecycle)
+    kept = delete((*tracks, *fresh), frame, state.fps, observation.room, settings.lifecycle)
     numbers = np.array([*(track.person for track in state.tracks), -1])
     info = NaiveInfo((*rows, *earlier), numbers[owners], tuple(int(n) for n in numbers[:-1][shared]))
     return NaiveState(state.fps, kept, candidates, state.next_person + len(fresh)), info
@@ -301,23 +311,22 @@ def _update(
     track: Track,
     frame: int,
     predicted: np.ndarray,
-    owned: Blobs,
-    k: int,
+    measured: np.ndarray,
+    volume_m3: float,
     head: np.ndarray,
     shared: bool,
     fps: float,
     settings: NaiveSettings,
 ) -> Track:
-    """The track with the measurement in row `k`; while components are shared, the prediction keeps some weight."""
+    """The track after a measurement; while a component is shared, the prediction keeps some weight."""
     gain = settings.shared_gain if shared else 1.0
-    position = predicted + gain * (owned.centroid[k] - predicted)
+    position = predicted + gain * (measured - predicted)
     blend = gain * (1 - np.exp(-1 / (fps * settings.velocity_time_s)))
     velocity = track.velocity + blend * ((position - track.position) * fps - track.velocity)
-    speed = float(np.linalg.norm(velocity))
-    velocity = velocity * min(1.0, settings.most_speed_m_s / max(speed, 1e-9))
-    volume = float(owned.volume_m3[k])
+    velocity = velocity * min(1.0, settings.most_speed_m_s / max(float(np.linalg.norm(velocity)), 1e-9))
+    volume = float(volume_m3)
     if track.volume_m3 > 0:
-        volume = track.volume_m3 if shared else track.volume_m3 + blend * (volume - track.volume_m3)
+        volume = track.volume_m3 if shared else track.volume_m3 + blend * (min(volume, 2 * track.volume_m3) - track.volume_m3)
     return replace(track, position=position, head=head, velocity=velocity, volume_m3=volume, last_frame=frame)
 
 
@@ -333,7 +342,8 @@ def _find_again(
     labels, blobs = unowned_blobs(observation, owners, settings.lifecycle)
     free = list(np.flatnonzero(looks_like_person(blobs, settings.lifecycle)))
     for k in lost:
-        reach = settings.lifecycle.least_distance_m + settings.most_speed_m_s * (frame - tracks[k].last_frame) / fps
+        way = settings.most_speed_m_s * (frame - tracks[k].last_frame) / fps
+        reach = min(settings.lifecycle.least_distance_m + way, settings.most_reach_m)
         gaps = [np.hypot(*(blobs.centroid[b] - tracks[k].position)[:2]) for b in free]
         if gaps and min(gaps) <= reach:
             owners[labels == free.pop(int(np.argmin(gaps)))] = k
