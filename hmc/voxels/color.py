@@ -100,14 +100,18 @@ def visibility(occupied: np.ndarray, grid: VoxelGrid, rig: Rig, voxels: np.ndarr
     targets = [grid.index_of(camera.centre) - low for camera in rig]
     if mode == "exact":
         return np.stack([_walk(room, voxels - low, target) for target in targets])
-    seen = np.zeros((len(rig), *room.shape), bool)
     skin = surface(room == SOLID)
     points = grid.centres(skin + low)
+    strides = np.array([room.shape[1] * room.shape[2], room.shape[2], 1])
+    skin_place, place = skin @ strides, (voxels - low) @ strides
+    seen = np.empty((len(rig), len(voxels)), bool)
     for c, (camera, target) in enumerate(zip(rig, targets, strict=True)):
         near = np.flatnonzero(_faces(room, skin, target))
         near = near[_splat(camera, points[near], grid.voxel_size_m)]
-        seen[(c, *skin[near].T)] = True
-    return seen[(slice(None), *(voxels - low).T)]
+        lit = np.zeros(room.size, bool)
+        lit[skin_place[near]] = True
+        seen[c] = lit.take(place)
+    return seen
 
 
 def _walk(room: np.ndarray, starts: np.ndarray, target: np.ndarray) -> np.ndarray:

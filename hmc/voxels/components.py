@@ -70,23 +70,29 @@ def components(occupied: np.ndarray, grid: VoxelGrid, min_voxels: int = 1) -> Co
     Components
         With no blobs where nothing is occupied.
     """
-    voxels, labels = label_voxels(occupied)
-    sizes = np.bincount(labels) if labels.size else np.zeros(0, np.int64)
+    runs, labels = _label_runs(occupied)
+    sizes = np.bincount(labels, weights=runs.length).astype(np.int64)
     ranks = np.argsort(-sizes, kind="stable")
-    rank_of = np.empty(len(sizes), np.int64)
-    rank_of[ranks] = np.arange(len(sizes))
-    order = np.argsort(rank_of[labels], kind="stable")
+    ranks = ranks[sizes[ranks] >= min_voxels]
     sizes = sizes[ranks]
-    sizes = sizes[sizes >= min_voxels]
     starts = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
-    voxels = voxels[order[: starts[-1]]]
+    rank_of = np.full(labels.max(initial=-1) + 1, len(ranks))
+    rank_of[ranks] = np.arange(len(ranks))
+    order = np.argsort(rank_of[labels], kind="stable")
+    order = order[: np.count_nonzero(rank_of[labels] < len(ranks))]
+    runs = Runs(*(column[order] for column in (runs.x, runs.y, runs.z, runs.length)))
+    voxels = runs.voxels()
     if len(sizes) == 0:
         return Components(voxels, starts, np.zeros((0, 3)), np.zeros((0, 2, 3)), np.zeros(0))
+    first = np.searchsorted(np.cumsum(runs.length), starts[:-1], side="right")  # first run of each blob
+    last = runs.z + runs.length - 1
+    middle = np.stack([runs.x, runs.y, (runs.z + last) / 2], axis=-1) * runs.length[:, None]
     size_m = grid.voxel_size_m
-    centroids = grid.origin + size_m * (np.add.reduceat(voxels, starts[:-1], axis=0) / sizes[:, None] + 0.5)
-    lowest = grid.origin + size_m * np.minimum.reduceat(voxels, starts[:-1], axis=0)
-    highest = grid.origin + size_m * (np.maximum.reduceat(voxels, starts[:-1], axis=0) + 1)
-    return Components(voxels, starts, centroids, np.stack([lowest, highest], axis=1), sizes * size_m**3)
+    centroids = grid.origin + size_m * (np.add.reduceat(middle, first, axis=0) / sizes[:, None] + 0.5)
+    lowest = [np.minimum.reduceat(column, first) for column in (runs.x, runs.y, runs.z)]
+    highest = [np.maximum.reduceat(column, first) + 1 for column in (runs.x, runs.y, last)]
+    bounds = grid.origin + size_m * np.stack([np.stack(lowest, axis=-1), np.stack(highest, axis=-1)], axis=1)
+    return Components(voxels, starts, centroids, bounds, sizes * size_m**3)
 
 
 def label_voxels(occupied: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -103,22 +109,49 @@ def label_voxels(occupied: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     labels : ndarray of int32, shape (n,)
         From 0, numbered by each component's first voxel.
     """
-    index = np.flatnonzero(occupied)
-    voxels = np.stack(np.unravel_index(index, occupied.shape), axis=-1)
-    if index.size == 0:
-        return voxels, np.zeros(0, np.int32)
-    # Padded in y and z, a flat step cannot run over the end of a row into the next one.
+    runs, labels = _label_runs(occupied)
+    return runs.voxels(), np.repeat(labels, runs.length)
+
+
+@dataclass(frozen=True)
+class Runs:
+    """Vertical runs of occupied voxels: (x, y, z) to (x, y, z + length - 1); arrays of one length."""
+
+    x: np.ndarray
+    y: np.ndarray
+    z: np.ndarray
+    length: np.ndarray
+
+    def voxels(self) -> np.ndarray:
+        """All voxels of the runs, run after run, shape (n, 3)."""
+        ends = np.cumsum(self.length)
+        z = np.arange(ends[-1] if len(ends) else 0) + np.repeat(self.z - ends + self.length, self.length)
+        return np.stack([np.repeat(self.x, self.length), np.repeat(self.y, self.length), z], axis=-1)
+
+
+def _label_runs(occupied: np.ndarray) -> tuple[Runs, np.ndarray]:
+    """Runs in C order, and the component of each. A person is some thousand voxels but some hundred runs."""
     _, ny, nz = occupied.shape
-    stride_y, stride_x = nz + 1, (ny + 1) * (nz + 1)
-    flat = voxels @ np.array([stride_x, stride_y, 1])
+    index = np.flatnonzero(occupied)
+    column = index // nz
+    breaks = np.flatnonzero((np.diff(index) != 1) | (np.diff(column) != 0)) + 1
+    first = np.concatenate([[0], breaks]) if index.size else breaks
+    length = np.diff(np.concatenate([first, [index.size]])) if index.size else breaks
+    start = index[first]
+    column = start // nz
+    runs = Runs(column // ny, column % ny, start - column * nz, length)
+    # Keys that grow with (x, y, z), with a gap between columns, so that a neighbour beyond a border is nobody's.
+    stride_y = nz + 2
+    stride_x = (ny + 1) * stride_y
+    low = runs.x * stride_x + runs.y * stride_y + runs.z
+    high = low + length - 1
     rows, columns = [], []
-    # The 13 forward neighbours are one voxel along z and four runs of three voxels.
-    steps = [1] + [step + k for step in (stride_y, stride_x - stride_y, stride_x, stride_x + stride_y) for k in (-1, 0, 1)]
-    for step in steps:
-        place = np.searchsorted(flat, flat + step)
-        hit = np.flatnonzero(flat.take(place, mode="clip") == flat + step)
-        rows.append(hit)
-        columns.append(place[hit])
-    row, column = np.concatenate(rows), np.concatenate(columns)
-    graph = coo_array((np.ones(row.size, bool), (row, column)), shape=(index.size, index.size))
-    return voxels, connected_components(graph, directed=False)[1]
+    for step in (stride_y, stride_x - stride_y, stride_x, stride_x + stride_y):  # the four neighbouring columns that lie ahead
+        begin = np.searchsorted(high, low + (step - 1))
+        count = np.maximum(np.searchsorted(low, high + (step + 1), side="right") - begin, 0)
+        row = np.repeat(np.arange(len(low)), count)
+        rows.append(row)
+        columns.append(np.arange(row.size) + np.repeat(begin - np.cumsum(count) + count, count))
+    row, other = np.concatenate(rows), np.concatenate(columns)
+    graph = coo_array((np.ones(row.size, bool), (row, other)), shape=(len(low), len(low)))
+    return runs, connected_components(graph, directed=False)[1] if len(low) else np.zeros(0, np.int32)
