@@ -5,14 +5,16 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, is_dataclass
 from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
 
-__all__ = ["atomic_write", "to_toml", "write_toml"]
+from hmc.errors import InputError
+
+__all__ = ["atomic_write", "sibling", "to_toml", "write_toml"]
 
 
 @contextmanager
@@ -29,17 +31,41 @@ def atomic_write(path: str | Path, mode: str = "w") -> Iterator[IO[Any]]:
     ------
     file
         A sibling of `path`; renamed to `path` on success, removed when the block raises.
+
+    Raises
+    ------
+    InputError
+        When the file system does not let it be written: no permission, no space, a file where a folder should be.
     """
     path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     text: dict[str, Any] = {} if "b" in mode else {"encoding": "utf-8", "newline": ""}
+    with sibling(path) as temporary, open(temporary, mode, **text) as file:
+        yield file
+
+
+@contextmanager
+def sibling(path: str | Path) -> Iterator[Path]:
+    """The name of a file beside `path` (same suffix) to be written in the block; renamed to `path` on success, removed when it raises.
+
+    For writers that want a name and no open file; otherwise `atomic_write`.
+
+    Raises
+    ------
+    InputError
+        As for `atomic_write`.
+    """
+    path = Path(path)
+    temporary = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
     try:
-        with open(temporary, mode, **text) as file:
-            yield file
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            yield temporary
+            os.replace(temporary, path)
+        finally:
+            with suppress(OSError):
+                temporary.unlink()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from error
 
 
 def write_toml(path: str | Path, values: Mapping[str, Any]) -> None:

@@ -25,7 +25,7 @@ from hmc.landmarks import LANDMARKS
 
 __all__ = [
     "PoseStates", "PoseTable", "TrackTable", "library_versions", "read_centroids", "read_joints", "read_pose", "read_run",
-    "read_tracks", "write_joints", "write_pose", "write_run", "write_tracks",
+    "read_tracks", "run_selection", "write_joints", "write_pose", "write_run", "write_tracks",
 ]  # fmt: skip
 
 JOINT_COLUMNS = ("frame", "person", "joint", "x", "y", "z")
@@ -377,3 +377,18 @@ def read_run(path: str | Path) -> dict[str, Any]:
         raise InputError(f"{path}: cannot read it ({error.strerror})") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: not a TOML file ({error})") from error
+
+
+def run_selection(directory: str | Path) -> tuple[int, int | None]:
+    """Which frames the run of a result was about, by its `run.toml`: the first, and how many (None: all that follow).
+
+    Raises
+    ------
+    InputError
+        When there is a `run.toml` that is not TOML.
+    """
+    path = Path(directory) / "run.toml"
+    parameters = read_run(path).get("parameters") if path.exists() else None
+    values = [parameters.get(name) if isinstance(parameters, dict) else None for name in ("start", "frames")]
+    start, frames = (value if isinstance(value, int) else None for value in values)
+    return start or 0, frames

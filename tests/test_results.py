@@ -25,6 +25,7 @@ from hmc.results import (
     read_pose,
     read_run,
     read_tracks,
+    run_selection,
     write_joints,
     write_pose,
     write_run,
@@ -216,6 +217,24 @@ def test_a_write_that_fails_leaves_the_old_file_and_nothing_else(tmp_path):
         file.write("half")
         raise RuntimeError("midway")
     assert path.read_text() == "old" and list(path.parent.iterdir()) == [path]
+
+
+def test_what_cannot_be_written_is_one_line(tmp_path):
+    (tmp_path / "file").write_text("in the way")
+    with pytest.raises(InputError, match=r"x\.toml: cannot be written"):
+        write_run(tmp_path / "file" / "x.toml", "x", {}, 0)
+    (tmp_path / "tracks.csv").mkdir()
+    with pytest.raises(InputError, match=r"tracks\.csv: cannot be written"):
+        write_tracks(tmp_path / "tracks.csv", TrackTable(np.zeros(1, int), np.zeros(1, int), np.zeros((1, 3))))
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "tracks.csv"]
+
+
+def test_the_frames_of_a_run(tmp_path):
+    assert run_selection(tmp_path) == (0, None)
+    write_run(tmp_path / "run.toml", "x", {"start": 3, "frames": 7}, 0)
+    assert run_selection(tmp_path) == (3, 7)
+    (tmp_path / "run.toml").write_text("parameters = 3\n")
+    assert run_selection(tmp_path) == (0, None)
 
 
 def test_a_journal_survives_a_run_that_dies_while_it_writes(tmp_path):

@@ -18,7 +18,7 @@ from hmc.pose.body.kinematics import landmarks, segment_transforms
 from hmc.pose.body.model import neutral_state
 from hmc.pose.body.proportions import default_body
 from hmc.recording import open_recording
-from hmc.results import PoseStates, PoseTable, TrackTable, write_joints, write_pose, write_tracks
+from hmc.results import PoseStates, PoseTable, TrackTable, write_joints, write_pose, write_run, write_tracks
 from hmc.view.mosaic import make_layout, people_in, read_result, stream_mosaics
 from hmc.view.overlay import LEFT, RIGHT, draw_outline, draw_paths, draw_sticks, draw_track, person_colour
 from hmc.view.scene import BACKGROUND, draw_floor, draw_rig, draw_voxels, viewpoint
@@ -244,6 +244,16 @@ def test_view_writes_pictures_and_videos(recording, result, tmp_path, capsys):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["all.mp4", "new", "two.png"]
 
 
+def test_a_video_shows_the_frames_of_the_run(recording, result, tmp_path):
+    for path in result.iterdir():
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+    write_run(tmp_path / "run.toml", "x", {"start": 1, "frames": 1}, 0)
+    assert main(["view", str(tmp_path), str(recording), "--quiet", "--no-voxels", "--out", str(tmp_path / "x.avi")]) == 0
+    video = cv2.VideoCapture(str(tmp_path / "x.avi"))
+    assert video.read()[0] and not video.read()[0]
+    video.release()
+
+
 def test_a_result_of_nobody_shows_the_room(recording, tmp_path):
     write_joints(tmp_path / "joints.csv", PoseTable(np.zeros(0, int), np.zeros(0, int), np.zeros((0, 15, 3))))
     assert main(["view", str(tmp_path), str(recording), "--quiet", "--no-voxels", "--out", str(tmp_path / "x.png")]) == 0
@@ -256,8 +266,10 @@ def test_wrong_input_is_one_line_and_exit_code_2(recording, result, tmp_path, ca
         ([str(result), str(recording), "--out", "x.mp4", "--frame", "1"], "--frame is for pictures"),
         ([str(result), str(recording), "--out", "x.png", "--frame", "7"], "frame 7 is not among the selected frames 0 to 2"),
         ([str(tmp_path / "none"), str(recording), "--out", "x.png"], "none: no such folder"),
+        ([str(result), str(recording), "--no-voxels", "--out", str(result / "joints.csv" / "x.png")], "x.png: cannot be written"),
+        ([str(result), str(recording), "--no-voxels", "--out", str(result / "joints.csv" / "x.mp4")], "x.mp4: cannot be written"),
         ([str(tmp_path), str(recording), "--out", "x.png"], "neither joints.csv nor tracks.csv"),
     ]:
-        assert main(["view", *arguments]) == 2
+        assert main(["view", "--quiet", *arguments]) == 2
         captured = capsys.readouterr()
         assert says in captured.err and captured.err.count("\n") == 1

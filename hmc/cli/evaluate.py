@@ -33,13 +33,13 @@ def run(args: argparse.Namespace) -> int:
     from hmc.evaluation import PoseEvaluation, evaluate_pose, evaluate_tracks, pelvis_tracks
     from hmc.files import write_toml
     from hmc.metrics.mot import MotScores
-    from hmc.results import read_centroids, read_joints, read_tracks
+    from hmc.results import read_centroids, read_joints, read_tracks, run_selection
 
     if not args.directory.is_dir():
         raise InputError(f"{args.directory}: no such folder; a result is the folder that `hmc pose` or `hmc track` wrote")
     truth_joints, truth_centroids = find_truth(args.recording, args.truth)
     joints_file, tracks_file = args.directory / "joints.csv", args.directory / "tracks.csv"
-    start, frames = selection(args)
+    start, frames = run_selection(args.directory) if args.start is None and args.frames is None else (args.start or 0, args.frames)
 
     def selected(table):
         return table.where((table.frames >= start) & (table.frames < (float("inf") if frames is None else start + frames)))
@@ -99,16 +99,6 @@ def find_truth(recording: Path | None, truth: Path | None) -> tuple[Path | None,
     if not joints.exists() and not centroids.exists():
         raise InputError(f"{recording}: no truth/joints.csv and no truth/centroids.csv to compare with; give another table by --truth FILE")
     return (joints if joints.exists() else None), (centroids if centroids.exists() else None)
-
-
-def selection(args: argparse.Namespace) -> tuple[int, int | None]:
-    """First frame and number of frames that count: of the command line, else of the run that made the result, else everything."""
-    from hmc.results import read_run
-
-    run_file = args.directory / "run.toml"
-    made = read_run(run_file).get("parameters", {}) if run_file.exists() else {}
-    start, frames = (made.get(key) if getattr(args, key) is None else getattr(args, key) for key in ("start", "frames"))
-    return (start if isinstance(start, int) else 0), (frames if isinstance(frames, int) else None)
 
 
 def print_pose(poses, quiet: bool) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import functools
 from collections.abc import Iterable
-from contextlib import suppress
 from pathlib import Path
 
 from hmc.cli.common import add_selection_options, open_selected, positive_float, print_problems, progress, whole_number
@@ -23,7 +22,8 @@ def add_parser(subparsers) -> None:
         help="draw a result over its recording",
         description="Draw the fitted bodies into every camera's image, beside a 3-D panel with the voxels; left limbs orange, right "
         "limbs blue. "
-        "A video shows all selected frames, a picture one of them (the middle one) or those of --frame, one below the other.",
+        "A video shows all selected frames (by default those of the run), a picture one of them (the middle one) or those of --frame, one "
+        "below the other.",
     )
     parser.add_argument("directory", type=Path, metavar="DIR", help="folder of the result, with joints.csv or tracks.csv")
     add_selection_options(parser)
@@ -39,6 +39,8 @@ def run(args: argparse.Namespace) -> int:
     import cv2
     import numpy as np
 
+    from hmc.files import atomic_write
+    from hmc.results import run_selection
     from hmc.view.mosaic import read_result, stream_mosaics
 
     suffix = args.out.suffix.lower()
@@ -49,6 +51,8 @@ def run(args: argparse.Namespace) -> int:
     if not args.directory.is_dir():
         raise InputError(f"{args.directory}: no such folder; a result is the folder that `hmc pose` or `hmc track` wrote")
     result = read_result(args.directory)
+    if not args.start and args.frames is None:
+        args.start, args.frames = run_selection(args.directory)
     recording = open_selected(args)
     frames = choose_frames(args.frame, recording.start, recording.n_frames, result.frames)
     problems = list(recording.problems)
@@ -60,12 +64,11 @@ def run(args: argparse.Namespace) -> int:
         outlines=not args.no_outlines,
         on_problem=problems.append,
     )
-    args.out.parent.mkdir(parents=True, exist_ok=True)
     if suffix in PICTURES:
         mosaics = [next(draw(first=frame, last=frame + 1)) for frame in frames]
         pictures = [picture for _, picture in mosaics]
-        if not cv2.imwrite(str(args.out), np.concatenate(pictures)):
-            raise InputError(f"{args.out}: cannot be written")
+        with atomic_write(args.out, "wb") as file:
+            file.write(cv2.imencode(suffix, np.concatenate(pictures))[1].tobytes())
     else:
         stream = (picture for _, picture in draw())
         write_video(args.out, progress(stream, recording.n_frames, "view", args.quiet), recording.fps)
@@ -98,23 +101,21 @@ def write_video(path: Path, pictures: Iterable, fps: float) -> None:
     """
     import cv2
 
-    temporary = path.with_name(f".{path.stem}.part{path.suffix}")
+    from hmc.files import sibling
+
     codec = "mp4v" if path.suffix.lower() == ".mp4" else "MJPG"
     writer = None
-    try:
-        for picture in pictures:
-            if writer is None:
-                height, width = picture.shape[:2]
-                writer = cv2.VideoWriter(str(temporary), cv2.VideoWriter.fourcc(*codec), fps, (width, height))
-                if not writer.isOpened():
-                    raise InputError(f"{path}: cannot be written as a video")
-            writer.write(picture)
+    with sibling(path) as temporary:
+        try:
+            for picture in pictures:
+                if writer is None:
+                    height, width = picture.shape[:2]
+                    writer = cv2.VideoWriter(str(temporary), cv2.VideoWriter.fourcc(*codec), fps, (width, height))
+                    if not writer.isOpened():
+                        raise InputError(f"{path}: cannot be written as a video")
+                writer.write(picture)
+        finally:
+            if writer is not None:
+                writer.release()
         if writer is None:
             raise InputError(f"{path}: there are no frames to show")
-        writer.release()
-        temporary.replace(path)
-    finally:
-        if writer is not None:
-            writer.release()
-        with suppress(FileNotFoundError):
-            temporary.unlink()

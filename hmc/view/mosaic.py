@@ -194,7 +194,7 @@ def render(
         y, x = row * cell_height + (cell_height - small.size[1]) // 2, column * cell_width + (cell_width - small.size[0]) // 2
         out[y : y + small.size[1], x : x + small.size[0]] = picture[: height - y, : width - x]
     panel = panel.copy()
-    draw_people(panel, panel_camera, people, outlines=False)
+    draw_people(panel, panel_camera, people, outlines)
     draw_label(panel, f"{recording.name}, frame {frame.index}, {frame.index / recording.fps:.2f} s", (8, 18))
     if any(person.landmarks is not None for person in people):
         draw_label(panel, "left", (8, panel.shape[0] - 10), LEFT)
