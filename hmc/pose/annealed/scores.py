@@ -55,8 +55,9 @@ class ScoreMaps:
     ----------
     occupancy : ndarray of uint8, shape (nx, ny, nz)
         1 where a voxel is occupied.
-    surface : ndarray of uint8, shape (nx, ny, nz)
-        Closeness to the surface (Eq. 6.16), 0 to 1 as 0 to 255.
+    both : ndarray of uint8, shape (nx, ny, nz, 2)
+        Closeness to the surface (Eq. 6.16), 0 to 1 as 0 to 255, and again the occupancy: side by side, so that one look-up of
+        16 bits finds both.
     origin : ndarray, shape (3,)
         Lowest corner of the crop, world, metres.
     voxel_size_m : float
@@ -65,10 +66,15 @@ class ScoreMaps:
     """
 
     occupancy: np.ndarray
-    surface: np.ndarray
+    both: np.ndarray
     origin: np.ndarray
     voxel_size_m: float
     room: np.ndarray
+
+    @property
+    def surface(self) -> np.ndarray:
+        """Closeness to the surface, shape (nx, ny, nz)."""
+        return self.both[..., 0]
 
 
 @dataclass(frozen=True)
@@ -173,10 +179,11 @@ def observe(occupied: np.ndarray, grid: VoxelGrid, room: np.ndarray | None = Non
     shell = surface(occupancy[near].astype(bool))
     smooth[tuple(shell.T)] = 1
     smooth = ndimage.gaussian_filter(smooth, sigma_vox, truncate=4, mode="constant")
-    closeness = np.zeros(occupancy.shape, np.uint8)
+    both = np.zeros((*occupancy.shape, 2), np.uint8)
+    both[..., 1] = occupancy
     if len(shell):
-        closeness[near] = np.rint(smooth * (255 / smooth.max()))
-    return ScoreMaps(occupancy, closeness, grid.origin + size * (low - margin), size, room)
+        both[(*near, 0)] = np.rint(smooth * (255 / smooth.max()))
+    return ScoreMaps(occupancy, both, grid.origin + size * (low - margin), size, room)
 
 
 def _bounds(occupied: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -262,7 +269,7 @@ def map_scores(table: ScoreTable, placed: np.ndarray, maps: ScoreMaps) -> tuple[
     """
     n = placed.shape[-1]
     size = maps.voxel_size_m
-    occupancy, closeness = maps.occupancy.ravel(), maps.surface.ravel()
+    occupancy, both = maps.occupancy.ravel(), maps.both.view(np.uint16).ravel()
     columns = placed * np.float32(1 / size)  # points @ columns[segment, axis] is a coordinate in voxels
     # A segment whose box leaves the crop (the room) in some particle has its points clamped (tested).
     at = table.corners[:, None] @ columns
@@ -273,9 +280,10 @@ def map_scores(table: ScoreTable, placed: np.ndarray, maps: ScoreMaps) -> tuple[
 
     totals = np.zeros((3, len(PARTS), n), np.int32)
     rows = max(8, CHUNK_ELEMENTS // n)
-    axis_buffer = np.empty((rows, n), np.float32)
-    flat_buffer, voxel_buffer = np.empty((rows, n), np.int32), np.empty((rows, n), np.int32)
-    index_buffer, found_buffer = np.empty((rows, n), np.int64), np.empty((rows, n), np.uint8)
+    axis_buffer, flat_buffer = np.empty((rows, n), np.float32), np.empty((rows, n), np.int32)
+    index_buffer, found_buffer, pair_buffer = (np.empty((rows, n), kind) for kind in (np.int64, np.uint8, np.uint16))
+    # Memory in use at a time decides the speed: whole coordinates live where the indices will be written last.
+    voxel_buffer = index_buffer.view(np.int32).reshape(-1)[: rows * n].reshape(rows, n)
     for part, segment, is_surface, start, stop in table.blocks:
         for first in range(start, stop, rows):
             points = table.points[first : min(first + rows, stop)]
@@ -295,11 +303,16 @@ def map_scores(table: ScoreTable, placed: np.ndarray, maps: ScoreMaps) -> tuple[
                     np.copyto(voxel, along, casting="unsafe")
                     flat += voxel
             np.copyto(index, flat)
-            occupancy.take(index, out=found, mode="wrap")
-            totals[1, part] += _sum_rows(found)
             if is_surface:
-                closeness.take(index, out=found, mode="wrap")
-                totals[2, part] += _sum_rows(found)
+                pairs = pair_buffer[:m]
+                both.take(index, out=pairs, mode="wrap")
+                sums = _sum_rows(pairs.view(np.uint8))
+                totals[1, part] += sums[1::2]
+                totals[2, part] += sums[::2]
+            else:
+                found = found_buffer[:m]
+                occupancy.take(index, out=found, mode="wrap")
+                totals[1, part] += _sum_rows(found)
             if crossed[segment].any():
                 totals[0, part] += _sum_rows(_outside(points, columns[segment], room, crossed[segment]).view(np.uint8))
     out, occupied, close = totals / table.counts.T[[0, 2, 3], :, None]
