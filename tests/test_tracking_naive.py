@@ -15,8 +15,9 @@ FPS = 20.0
 
 def person(x, y, height=1.75, radius=0.24):
     """Voxels of an upright ellipsoid that stands on the floor at (x, y)."""
-    centre = np.array([x, y, height / 2])
-    return (((CENTRES - centre) / (radius, radius, height / 2)) ** 2).sum(axis=-1) <= 1
+    xs, ys, zs = (CENTRES[:, 0, 0, 0], CENTRES[0, :, 0, 1], CENTRES[0, 0, :, 2])
+    across = ((xs - x) / radius)[:, None] ** 2 + ((ys - y) / radius)[None] ** 2
+    return across[..., None] + ((zs - height / 2) / (height / 2)) ** 2 <= 1
 
 
 def box(lowest, highest):
