@@ -16,19 +16,22 @@ __all__ = ["disagreements", "silhouette_agreement"]
 
 #: Spacing of the points that the hull is made of (metres; wider in a room that would need more than MAX_POINTS).
 SPACING_M = 0.06
-MAX_POINTS = 200_000
+MAX_POINTS = 100_000
 #: Masks are compared on cells as large as this many times the points' spacing appears.
 CELL = 1.5
+#: A cell counts as silhouette from this share of its pixels on; a point may be somebody's from the lower one, so that thin limbs stay.
+COVERED = 0.5
+TOUCHED = 0.2
 #: Grey levels by which a pixel must differ from the empty scene; well above the noise of a camera, to need no model of it.
 DIFFERENCE = 40
 #: More than this share of an image in the foreground says that the light changed, not that somebody is there.
 FULL = 0.5
-#: Share of a silhouette that the others' hull explains: .95 or so in a good rig, .7 where furniture hides half of the person from a
-#: camera or two, .6 to .8 when one camera of five is turned by 5 degrees, below .3 when two videos are swapped.
-GOOD_AGREEMENT = 0.8
-LEAST_AGREEMENT = 0.5
+#: Share of a silhouette that the others' hull explains: .97 or so in a good rig, .83 where furniture hides half of the person from two
+#: cameras, .5 to .9 when one camera is turned by 5 degrees, below .4 when two videos are swapped.
+GOOD_AGREEMENT = 0.9
+LEAST_AGREEMENT = 0.6
 #: A camera is to blame if leaving it out lifts the others' mean share by this much.
-GAIN = 0.15
+GAIN = 0.07
 #: Cells of silhouette below which nothing is said.
 LEAST_CELLS = 10
 
@@ -59,6 +62,8 @@ def disagreements(recording: Recording, frames: Sequence[Frame]) -> list[str]:
     """
     empty = [None if recording.has_silhouettes else _empty_scene(recording, index) for index in range(len(recording.rig))]
     masks = [_masks(frame, empty) for frame in frames]
+    if all(len([mask for mask in frame if mask is not None]) < 3 for frame in masks):
+        return []
     views = _views(recording)
     everyone = list(range(len(views)))
     shares = silhouette_agreement(views, masks, everyone)
@@ -107,7 +112,7 @@ def silhouette_agreement(views: Sequence[_View], masks: Sequence[Sequence[np.nda
     explained, there = np.zeros(len(members)), np.zeros(len(members))
     for frame in masks:
         coarse = {index: _coarse(mask, views[index].shape) for index in members if (mask := frame[index]) is not None}
-        hits = {index: coarse[index][views[index].cell] & views[index].seen for index in coarse}
+        hits = {index: (coarse[index][views[index].cell] > TOUCHED) & views[index].seen for index in coarse}
         n_seen = np.sum([views[index].seen for index in coarse], axis=0, dtype=np.uint8)
         n_hits = np.sum([hits[index] for index in coarse], axis=0, dtype=np.uint8)
         for index in coarse:
@@ -115,7 +120,7 @@ def silhouette_agreement(views: Sequence[_View], masks: Sequence[Sequence[np.nda
             others = n_seen - view.seen
             judged = view.seen & (others >= 2)
             hull = judged & (n_hits - hits[index] == others)
-            silhouette = coarse[index] & _lit(view, judged)
+            silhouette = (coarse[index] > COVERED) & _lit(view, judged)
             covered = cv2.dilate(_lit(view, hull).reshape(view.shape).astype(np.uint8), np.ones((3, 3), np.uint8)).ravel() > 0
             place = members.index(index)
             there[place] += silhouette.sum()
@@ -149,7 +154,7 @@ def _lit(view: _View, points: np.ndarray) -> np.ndarray:
 
 
 def _coarse(mask: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-    return (cv2.resize(mask.astype(np.float32), shape[::-1], interpolation=cv2.INTER_AREA) > 0.5).ravel()
+    return cv2.resize(mask.astype(np.float32), shape[::-1], interpolation=cv2.INTER_AREA).ravel()
 
 
 def _masks(frame: Frame, empty: Sequence[np.ndarray | None]) -> list[np.ndarray | None]:

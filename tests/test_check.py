@@ -99,6 +99,7 @@ def test_a_room_elsewhere(recording_folder):
 
 
 def rig_findings(folder, cameras, severity="warning"):
+    """What is said of these cameras."""
     write_calibration(folder / "calibration.toml", cameras)
     return sentences(check_recording(folder), severity)
 
