@@ -16,11 +16,11 @@ import numpy as np
 from hmc.camera.calibration import CalibrationEntry, build_camera, read_entries
 from hmc.camera.coverage import estimate_room, in_view
 from hmc.camera.model import Camera, Rig, undistort
+from hmc.check.silhouettes import disagreements
 from hmc.errors import InputError
 from hmc.footage import IMAGE_SUFFIXES, VIDEO_SUFFIXES, Footage, read_footage
 from hmc.recording import Frame, Recording, find_views, gaps, iterate_frames, open_recording, wrong_sizes, wrong_units
 from hmc.settings import read_settings
-from hmc.silhouette_check import disagreements
 
 __all__ = ["Finding", "Inspection", "check_recording", "inspect_recording"]
 
