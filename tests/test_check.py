@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from hmc.camera.calibration import write_calibration
 from hmc.camera.model import Camera, Rig, look_at, project
 from hmc.check import check_recording, inspect_recording
-from hmc.check.picture import draw_rig, draw_view, save_rig_picture, view_cone
+from hmc.rig_picture import draw_rig, draw_view, save_rig_picture, view_cone
 
 
 def sentences(findings, severity):
