@@ -135,20 +135,21 @@ def blob_features(points: np.ndarray, labels: np.ndarray, n_blobs: int, voxel_si
     -------
     Blobs
     """
-    points, labels = points[labels >= 0], labels[labels >= 0]
-    counts = np.bincount(labels, minlength=n_blobs)
-    sums = np.stack([np.bincount(labels, points[:, axis], n_blobs) for axis in range(3)], axis=1)
-    lowest = np.full((n_blobs, 3), np.inf)
-    highest = np.full((n_blobs, 3), -np.inf)
-    np.minimum.at(lowest, labels, points)
-    np.maximum.at(highest, labels, points)
-    some = counts[:, None] > 0
+    order = np.argsort(labels, kind="stable")[np.count_nonzero(labels < 0) :]
+    counts = np.bincount(labels[order], minlength=n_blobs)
+    some = counts > 0
+    sums, lowest, highest = np.zeros((3, n_blobs, 3))
+    if order.size:
+        points, starts = points[order], (np.cumsum(counts) - counts)[some]
+        sums[some] = np.add.reduceat(points, starts)
+        lowest[some] = np.minimum.reduceat(points, starts) - voxel_size_m / 2
+        highest[some] = np.maximum.reduceat(points, starts) + voxel_size_m / 2
     volume = counts * voxel_size_m**3
     return Blobs(
         counts=counts,
         volume_m3=volume,
         weight_kg=volume * DENSITY,
         centroid=sums / np.maximum(counts, 1)[:, None],
-        lowest=np.where(some, lowest - voxel_size_m / 2, 0.0),
-        highest=np.where(some, highest + voxel_size_m / 2, 0.0),
+        lowest=lowest,
+        highest=highest,
     )
