@@ -28,9 +28,9 @@ LEAST_DEVIATION = (1.5, 0.8)
 ASSUMED_DEVIATION = (3.0, 1.2)
 FEWEST_FRAMES = 5
 #: Where people are, the foreground holds squares of this side, pixels.
-SOLID_PX = 5
+SOLID_PX = 4
 #: How far around those squares the image is looked at, pixels of a 640 x 480 image.
-MARGIN_PX = 40
+MARGIN_PX = 24
 #: Share of the new image when everything changed at once, and in the frames after that.
 SWITCH_RATE = 0.5
 SETTLING_RATE = 0.2
@@ -297,4 +297,4 @@ def _luma_chroma(image: np.ndarray) -> np.ndarray:
 
 def _as_image(mean: np.ndarray) -> np.ndarray:
     """The background as a BGR image."""
-    return cv2.cvtColor(np.clip(mean + 0.5, 0, 255).astype(np.uint8), cv2.COLOR_YCrCb2BGR)
+    return cv2.cvtColor(cv2.convertScaleAbs(mean), cv2.COLOR_YCrCb2BGR)

@@ -122,7 +122,7 @@ def fill_gaps(
     n, labels = cv2.connectedComponents(mask, connectivity=8)
     counts = np.bincount(labels[seeds.view(bool)], minlength=n)
     counts[0] = 0
-    return (counts >= least * scale**2).view(np.uint8)[np.asarray(labels)]
+    return np.take((counts >= least * scale**2).view(np.uint8), np.asarray(labels))
 
 
 def cut_halo(mask: np.ndarray, seen: Evidence, share: float, scale: float) -> np.ndarray:

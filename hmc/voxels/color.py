@@ -83,20 +83,20 @@ def visibility(occupied: np.ndarray, grid: VoxelGrid, rig: Rig, voxels: np.ndarr
     Raises
     ------
     InputError
-        When there is no such mode.
+        When there is no such mode, or when a voxel is not occupied.
     """
     if mode not in ("exact", "quick"):
         raise InputError(f"`mode` must be exact or quick; got {mode!r}")
     voxels = np.asarray(voxels, np.int64).reshape(-1, 3)
-    solid = np.stack(np.unravel_index(np.flatnonzero(occupied), occupied.shape), axis=-1)
-    if len(solid) == 0:
-        return np.ones((len(rig), len(voxels)), bool)
+    if len(voxels) == 0:
+        return np.zeros((len(rig), 0), bool)
+    if not occupied[tuple(voxels.T)].all():
+        raise InputError("visibility is asked of occupied voxels; some of `voxels` are empty")
     # Beyond the box around all that is occupied, nothing stands in the way.
-    low = np.minimum(solid.min(axis=0), voxels.min(axis=0, initial=np.iinfo(np.int64).max)) - 1
-    high = np.maximum(solid.max(axis=0), voxels.max(axis=0, initial=-1)) + 2
-    room = np.full(high - low, BEYOND, np.uint8)
-    room[1:-1, 1:-1, 1:-1] = EMPTY
-    room[tuple((solid - low).T)] = SOLID
+    solid = np.unravel_index(np.flatnonzero(occupied), occupied.shape)
+    low = np.array([axis.min() for axis in solid]) - 1
+    room = np.full([axis.max() + 2 - start for axis, start in zip(solid, low, strict=True)], BEYOND, np.uint8)
+    room[1:-1, 1:-1, 1:-1] = occupied[tuple(slice(start + 1, start + n - 1) for start, n in zip(low, room.shape, strict=True))]
     targets = [grid.index_of(camera.centre) - low for camera in rig]
     if mode == "exact":
         return np.stack([_walk(room, voxels - low, target) for target in targets])

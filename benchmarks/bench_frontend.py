@@ -1,0 +1,105 @@
+"""The front end: everything after the mixture of Gaussians against the mixture itself, and frames a second. Row 4 of README.md.
+
+    python benchmarks/bench_frontend.py
+
+Images are made here: people of ellipsoids in clothes of their own, walking before textured walls, with sensor noise.
+"""
+
+from __future__ import annotations
+
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+import cv2
+import numpy as np
+from _scene import ROOM, people, ring_rig, silhouette
+from _timing import report
+
+from hmc.camera.segmentation import SegmentationSettings, segment_views, train_background
+from hmc.voxels.carving import carve_levels, make_tables
+from hmc.voxels.components import components
+from hmc.voxels.grid import VoxelGrid
+from hmc.voxels.surface import surface
+
+VOXEL_M = 0.04
+N_FRAMES = 30
+
+
+def make_images(rig, n_people: int, rng) -> tuple[list, list]:
+    """Twenty empty images of each camera, and `N_FRAMES` sets of images with people."""
+    width, height = rig[0].size
+    walls = [cv2.resize(rng.integers(90, 170, (12, 16, 3)).astype(np.uint8), (width, height)) for _ in rig]
+
+    def noisy(image):
+        return np.clip(image + rng.normal(0, 2, image.shape), 0, 255).astype(np.uint8)
+
+    empty = [[noisy(wall) for _ in range(20)] for wall in walls]
+    clothes = rng.integers(20, 235, (n_people, 3))
+    starts = np.array([(0.1, 0.0), (-0.75, 0.55), (0.7, -0.6)])[:n_people]
+    frames = []
+    for t in range(N_FRAMES):
+        images = []
+        for camera, wall in zip(rig, walls, strict=True):
+            image = wall.copy()
+            for start, colour in zip(starts + np.array([0.01 * t, 0]), clothes, strict=True):
+                image[silhouette(camera, people([start]))] = colour
+            images.append(noisy(image))
+        frames.append(images)
+    return empty, frames
+
+
+def measure(n_people: int) -> tuple[float, float, float]:
+    """Time of all but the mixture over the mixture's, on one thread; frames a second on two threads; voxels of the tolerant hull.
+
+    The ratio is of frames in which the background does not learn, since learning is the mixture's; the frames a second are of all.
+    """
+    still, learning = SegmentationSettings(learn_every=10**9), SegmentationSettings()
+    rig, rng = ring_rig(), np.random.default_rng(0)
+    empty, frames = make_images(rig, n_people, rng)
+    grid = VoxelGrid.from_room(ROOM, VOXEL_M)
+    tables = make_tables(grid, rig)
+    models = tuple(train_background(images) for images in empty)
+    mixture, whole, voxels = [], [], 0
+
+    def front_end(images, settings, pool=None):
+        nonlocal models
+        masks, models = segment_views(models, images, settings, pool)
+        strict, tolerant = carve_levels(tables, masks, (0, 1))
+        blobs = components(tolerant, grid, 50)
+        surface(strict)
+        return blobs
+
+    for images in frames:
+        start = time.perf_counter()
+        for model, image in zip(models, images, strict=True):
+            model.mixture.apply(image, learningRate=0)
+        middle = time.perf_counter()
+        voxels += len(front_end(images, still).voxels)
+        mixture.append(middle - start)
+        whole.append(time.perf_counter() - middle)
+    ratio = (np.sum(whole) - np.sum(mixture)) / np.sum(mixture)
+    with ThreadPoolExecutor(2) as pool:
+        start = time.perf_counter()
+        for images in frames:
+            front_end(images, learning, pool)
+        speed = len(frames) / (time.perf_counter() - start)
+    return ratio, speed, voxels / len(frames)
+
+
+def main() -> int:
+    cv2.setNumThreads(1)
+    good = True
+    for n_people, most, least in ((1, 0.5, 25), (3, 1.5, 15)):
+        ratio, speed, voxels = measure(n_people)
+        note = f"tolerant hull of {voxels:.0f} voxels"
+        good &= report("4", f"after the mixture / mixture, {n_people} people", ratio, most, note=note)
+        good &= report("4", f"frames a second on two threads, {n_people} people", speed, least, at_least=True)
+    return 0 if good else 1
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
