@@ -18,7 +18,9 @@ def add_parser(subparsers) -> None:
         description="Render people in a room, seen by a rig of cameras, into a recording with exact truth.",
     )
     parser.add_argument("recipe", metavar="RECIPE", help="a TOML file, or the name of a shipped recipe (data/synthetic), such as demo")
-    parser.add_argument("--out", type=Path, required=True, metavar="RECORDING", help="folder to make; a rendered recording there is replaced")
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="RECORDING", help="folder to make; a rendered recording there is replaced"
+    )
     parser.add_argument("--seed", type=whole_number, default=None, metavar="N", help="in place of the recipe's seed")
     parser.add_argument("--workers", type=whole_number, default=None, metavar="N", help="processes (default: one a core)")
     parser.add_argument("--quiet", action="store_true", help="no progress bar")

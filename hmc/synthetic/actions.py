@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from hmc.synthetic.motions import Feet, Motion, Upper, arms_by_angles, arms_by_hands, assemble, keyframes, pelvis_height
+from hmc.synthetic.motions import Feet, Motion, Upper, arms_by_angles, arms_by_hands, assemble, keyframes, pelvis_height, roll_foot
 from hmc.synthetic.skeleton import Skeleton
 
 __all__ = ["box", "gesture", "pick_up", "sit", "stand", "throw_catch"]
@@ -16,7 +16,9 @@ def stand(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator) -> Mo
     n = len(times)
     feet = _planted(skeleton, n, [(0.0, 0.10, 8), (0.0, -0.10, -8)])
     look = _sway(times, rng, 0.25, 2.5)
-    upper = _upper(n, chest=_columns(n, pitch=0.03 + _sway(times, rng, 0.01, 3), yaw=0.3 * look), head=_columns(n, pitch=-0.02, yaw=0.7 * look))
+    upper = _upper(
+        n, chest=_columns(n, pitch=0.03 + _sway(times, rng, 0.01, 3), yaw=0.3 * look), head=_columns(n, pitch=-0.02, yaw=0.7 * look)
+    )
     swing = 0.05 + np.stack([_sway(times, rng, 0.02, 2), _sway(times, rng, 0.02, 2)], axis=-1)
     arms = arms_by_angles(swing, np.full((n, 2), 0.25), np.full((n, 2), 0.14))
     return _on_feet(skeleton, times, feet, upper, arms, 0.012 * _shift(times, rng), np.zeros(n))
@@ -34,19 +36,19 @@ def box(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator) -> Moti
         "hook": (np.array([0.62, -0.42, 0.12]), 0, -0.60),
     }
     stance = 0.55  # the body stands turned to the right, radians
-    at, hands, turn = [0.0], [guard], [0.0]
+    at, poses, turns = [0.0], [guard], [0.0]
     now = rng.uniform(0.1, 0.4)
     while now < times[-1] + 1:
         blow, side, twist = blows[str(rng.choice(list(blows)))]
         out = np.array(guard)
         out[side] = Rotation.from_euler("z", stance - twist).apply(blow)  # from the direction of the fight to the chest's axes
-        for wait, pose, yaw in ((0.0, guard, 0.0), (0.18, out, twist), (0.26, guard, 0.0)):
+        for wait, pose, turn in ((0.0, guard, 0.0), (0.18, out, twist), (0.26, guard, 0.0)):
             now += wait
             at.append(now)
-            hands.append(pose)
-            turn.append(yaw)
+            poses.append(pose)
+            turns.append(turn)
         now += rng.uniform(0.08, 0.55)
-    hands, yaw = keyframes(times, np.array(at), np.array(hands)), keyframes(times, np.array(at), np.array(turn))
+    hands, yaw = keyframes(times, np.array(at), np.array(poses)), keyframes(times, np.array(at), np.array(turns))
     hands = hands + 0.02 * np.stack([[_sway(times, rng, 1, 0.8) for _ in range(3)] for _ in range(2)]).transpose(2, 0, 1)
     weave = _sway(times, rng, 1.0, 1.1)
     upper = _upper(
@@ -59,7 +61,9 @@ def box(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator) -> Moti
     heel = np.radians(-12 - 22 * np.clip(yaw, 0, 1))
     feet = _raise_heel(skeleton, feet, 1, heel)
     xy = np.stack([0.03 * yaw, 0.03 * weave], axis=-1)
-    return _on_feet(skeleton, times, feet, upper, arms_by_hands(skeleton, hands, elbow_out=0.35), xy, 0.05 + 0.015 * (1 + _sway(times, rng, 1, 0.9)))
+    return _on_feet(
+        skeleton, times, feet, upper, arms_by_hands(skeleton, hands, elbow_out=0.35), xy, 0.05 + 0.015 * (1 + _sway(times, rng, 1, 0.9))
+    )
 
 
 def gesture(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator) -> Motion:
@@ -67,37 +71,42 @@ def gesture(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator) -> 
     n = len(times)
     feet = _planted(skeleton, n, [(0.02, 0.11, 10), (-0.02, -0.11, -12)])
     rest = np.array([[0.12, 0.10, -0.93], [0.12, -0.10, -0.93]])
-    poses = {
+    gestures = {
         "wave": [np.array([rest[0], [0.18, y, 0.72]]) for y in (-0.45, -0.05, -0.45, -0.05, -0.45)],
         "point": [np.array([[0.92, 0.08, 0.12], rest[1]])] * 2,
         "spread": [np.array([[0.25, 0.90, 0.02], [0.25, -0.90, 0.02]])] * 2,
         "raise": [np.array([[0.15, 0.30, 0.90], [0.15, -0.30, 0.90]])] * 2,
         "explain": [np.array([[0.55, 0.10, -0.25], [0.55, -0.10, -0.05]]), np.array([[0.55, 0.25, -0.05], [0.55, -0.25, -0.30]])] * 2,
     }
-    at, hands = [0.0], [rest]
+    at, poses = [0.0], [rest]
     now = rng.uniform(0.1, 0.3)
     names: list[str] = []
     while now < times[-1] + 1:
-        names = names or [str(name) for name in rng.permutation(list(poses))]
-        pose = poses[names.pop()]
+        names = names or [str(name) for name in rng.permutation(list(gestures))]
+        pose = gestures[names.pop()]
         if rng.random() < 0.5:  # with the other hand
             pose = [p[::-1] * [1, -1, 1] for p in pose]
         for k, p in enumerate(pose):
             now += 0.55 if k == 0 else rng.uniform(0.22, 0.32)
             at.append(now)
-            hands.append(p)
+            poses.append(p)
         now += 0.55
         at.append(now)
-        hands.append(rest)
+        poses.append(rest)
         now += rng.uniform(0.05, 0.3)
-    hands = _clear(keyframes(times, np.array(at), np.array(hands)))
+    hands = _clear(keyframes(times, np.array(at), np.array(poses)))
     look = _sway(times, rng, 0.3, 2.0)
     lean = hands[:, 1, 2] - hands[:, 0, 2]
     upper = _upper(
-        n, pelvis=_columns(n, yaw=0.15 * look), abdomen=_columns(n, roll=-0.02 * lean, yaw=0.15 * look), chest=_columns(n, roll=-0.03 * lean, pitch=0.02),
+        n,
+        pelvis=_columns(n, yaw=0.15 * look),
+        abdomen=_columns(n, roll=-0.02 * lean, yaw=0.15 * look),
+        chest=_columns(n, roll=-0.03 * lean, pitch=0.02),
         head=_columns(n, pitch=-0.03 + _sway(times, rng, 0.05, 1.2), yaw=0.6 * look),
-    )  # fmt: skip
-    return _on_feet(skeleton, times, feet, upper, arms_by_hands(skeleton, hands, elbow_out=0.7), 0.02 * _shift(times, rng), np.full(n, 0.004))
+    )
+    return _on_feet(
+        skeleton, times, feet, upper, arms_by_hands(skeleton, hands, elbow_out=0.7), 0.02 * _shift(times, rng), np.full(n, 0.004)
+    )
 
 
 def throw_catch(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator) -> Motion:
@@ -133,7 +142,9 @@ def throw_catch(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator)
         head=_columns(n, pitch=-0.7 * lean, yaw=0.15 - 0.8 * turn),
     )
     feet = _raise_heel(skeleton, feet, 1, np.radians(-4 - 35 * np.clip(turn, 0, 1)))
-    return _on_feet(skeleton, times, feet, upper, arms_by_hands(skeleton, hands), np.stack([shift, 0 * shift], axis=-1), 0.02 + 0.4 * np.abs(shift))
+    return _on_feet(
+        skeleton, times, feet, upper, arms_by_hands(skeleton, hands), np.stack([shift, 0 * shift], axis=-1), 0.02 + 0.4 * np.abs(shift)
+    )
 
 
 def sit(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator, seat_m: float = 0.45) -> Motion:
@@ -153,9 +164,13 @@ def sit(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator, seat_m:
     curve = keyframes(times, at, np.array([up, bent, seated, settled, settled, seated, bent, up]))
     back, drop, tilt, spine, nod, x, z = curve.T
     upper = _upper(
-        n, pelvis=_columns(n, pitch=tilt), abdomen=_columns(n, pitch=0.5 * spine), chest=_columns(n, pitch=0.5 * spine),
-        neck=_columns(n, pitch=0.4 * nod), head=_columns(n, pitch=0.6 * nod, yaw=_sway(times, rng, 0.2, 1.7)),
-    )  # fmt: skip
+        n,
+        pelvis=_columns(n, pitch=tilt),
+        abdomen=_columns(n, pitch=0.5 * spine),
+        chest=_columns(n, pitch=0.5 * spine),
+        neck=_columns(n, pitch=0.4 * nod),
+        head=_columns(n, pitch=0.6 * nod, yaw=_sway(times, rng, 0.2, 1.7)),
+    )
     y = np.interp(x, [0.1, 0.5], [0.10, -0.06])
     hands = np.stack([np.stack([x, y, z], axis=-1), np.stack([x, -y, z], axis=-1)], axis=1)
     root = np.column_stack([-back, np.zeros(n), stretch - drop])
@@ -178,9 +193,13 @@ def pick_up(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator) -> 
     curve[:, 5:] *= size
     back, drop, tilt, spine, nod, x, y, z = curve.T
     upper = _upper(
-        n, pelvis=_columns(n, pitch=tilt), abdomen=_columns(n, pitch=0.45 * spine), chest=_columns(n, pitch=0.55 * spine, yaw=_sway(times, rng, 0.04, 1.5)),
-        neck=_columns(n, pitch=0.4 * nod), head=_columns(n, pitch=0.6 * nod),
-    )  # fmt: skip
+        n,
+        pelvis=_columns(n, pitch=tilt),
+        abdomen=_columns(n, pitch=0.45 * spine),
+        chest=_columns(n, pitch=0.55 * spine, yaw=_sway(times, rng, 0.04, 1.5)),
+        neck=_columns(n, pitch=0.4 * nod),
+        head=_columns(n, pitch=0.6 * nod),
+    )
     hands = np.stack([np.stack([x, y, z], axis=-1), np.stack([x, -y, z], axis=-1)], axis=1)
     root = np.column_stack([-back, np.zeros(n), skeleton.hip_height - drop])
     return assemble(skeleton, root, upper, feet, arms_by_hands(skeleton, hands, frame="world", elbow_out=0.6))
@@ -196,13 +215,12 @@ def _planted(skeleton: Skeleton, n: int, prints) -> Feet:
 
 def _raise_heel(skeleton: Skeleton, feet: Feet, side: int, pitch: np.ndarray) -> Feet:
     """Lift one heel, turning the foot about its ball; ``pitch`` (n,) is negative, radians."""
-    ball, sole = 0.073 * skeleton.height_m, skeleton.ankle_height
     ankles, pitches = feet.ankles.copy(), feet.pitch.copy()
-    forward = ball - np.cos(pitch) * ball - np.sin(pitch) * sole
+    forward, height = roll_foot(skeleton, pitch)
     heading = feet.yaw[:, side]
     ankles[:, side, 0] += forward * np.cos(heading)
     ankles[:, side, 1] += forward * np.sin(heading)
-    ankles[:, side, 2] = sole * np.cos(pitch) - ball * np.sin(pitch)
+    ankles[:, side, 2] = height
     pitches[:, side] = pitch
     return Feet(ankles, feet.yaw, pitches, feet.toe_pitch)
 

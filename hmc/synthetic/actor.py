@@ -9,11 +9,12 @@ from scipy import sparse
 from scipy.spatial.transform import Rotation
 
 from hmc.errors import InputError
+from hmc.synthetic.clothes import Clothes, dress
 from hmc.synthetic.physique import body_sweeps, girth_of
 from hmc.synthetic.skeleton import BONE_NAMES, Skeleton, joint_positions, make_skeleton
 from hmc.synthetic.surface import Sweep, distances, mesh_of
 
-__all__ = ["PARTS", "Actor", "Clothes", "bind_orientations", "make_actor", "pose_mesh"]
+__all__ = ["PARTS", "Actor", "bind_orientations", "make_actor", "pose_mesh"]
 
 #: Body parts that a surface point can belong to, and the bones of each.
 PARTS: dict[str, tuple[str, ...]] = {
@@ -24,37 +25,6 @@ PARTS: dict[str, tuple[str, ...]] = {
     "l_leg": ("l_thigh", "l_shank", "l_foot", "l_toes"),
     "r_leg": ("r_thigh", "r_shank", "r_foot", "r_toes"),
 }
-
-PATTERNS = ("plain", "stripes", "checks", "dots")
-
-
-@dataclass(frozen=True)
-class Clothes:
-    """What an actor wears; colours are sRGB triples in [0, 1].
-
-    Parameters
-    ----------
-    shirt, trousers, skin, hair, shoes : tuple of float
-    pattern : {"plain", "stripes", "checks", "dots"}
-        Of the shirt.
-    pattern_colour : tuple of float
-    sleeves, legs : {"long", "short"}
-    long_hair : bool
-    loose_m : float
-        How far clothes stand off the body, metres.
-    """
-
-    shirt: tuple[float, float, float] = (0.16, 0.32, 0.55)
-    trousers: tuple[float, float, float] = (0.25, 0.24, 0.22)
-    skin: tuple[float, float, float] = (0.82, 0.62, 0.50)
-    hair: tuple[float, float, float] = (0.22, 0.15, 0.10)
-    shoes: tuple[float, float, float] = (0.10, 0.10, 0.11)
-    pattern: str = "plain"
-    pattern_colour: tuple[float, float, float] = (0.85, 0.85, 0.80)
-    sleeves: str = "short"
-    legs: str = "long"
-    long_hair: bool = False
-    loose_m: float = 0.007
 
 
 @dataclass(frozen=True)
@@ -142,12 +112,21 @@ def make_actor(
     _, each = distances(sweeps, mesh.vertices)
     nearest = each.argmin(axis=1)
     start = _first_weights(names, sweeps, nearest, mesh.vertices, joints)
-    weights = _spread(start, mesh.triangles, steps=int(round(6 * (0.014 / cell_m) ** 2)))
+    weights = _spread(start, mesh.triangles, steps=round(6 * (0.014 / cell_m) ** 2))
     bones = weights.argmax(axis=1)
     part_of_bone = np.array([next(p for p, members in enumerate(PARTS.values()) if name in members) for name in BONE_NAMES])
-    albedo = _albedo(names, nearest, mesh.vertices, joints, frames, skeleton, clothes, rng)
+    albedo = dress(names, nearest, mesh.vertices, joints, frames, skeleton, clothes, rng)
     return Actor(
-        skeleton, mesh.vertices, mesh.normals, mesh.triangles, sparse.csr_matrix(weights), bones, part_of_bone[bones], albedo, joints, frames
+        skeleton,
+        mesh.vertices,
+        mesh.normals,
+        mesh.triangles,
+        sparse.csr_matrix(weights),
+        bones,
+        part_of_bone[bones],
+        albedo,
+        joints,
+        frames,
     )
 
 
@@ -212,61 +191,3 @@ def pose_mesh(actor: Actor, root: np.ndarray, orientations: np.ndarray) -> tuple
     vertices = np.einsum("nij,nj->ni", matrices, actor.vertices) + blended[:, 9:]
     normals = np.einsum("nij,nj->ni", matrices, actor.normals)
     return vertices, normals / np.linalg.norm(normals, axis=1, keepdims=True)
-
-
-def _albedo(
-    names: list[str], nearest: np.ndarray, vertices: np.ndarray, joints: np.ndarray, frames: np.ndarray, skeleton: Skeleton, clothes: Clothes,
-    rng: np.random.Generator,
-) -> np.ndarray:  # fmt: skip
-    """Linear reflectance of every vertex: skin, hair and clothes, with the weave and folds of cloth."""
-    region = np.array(names)[nearest]
-
-    def along(bone: str) -> np.ndarray:
-        k = BONE_NAMES.index(f"l_{bone}")
-        mirrored = vertices * [1, -1, 1] * (vertices[:, 1:2] < 0) + vertices * (vertices[:, 1:2] >= 0)
-        return (mirrored - joints[k]) @ frames[k]
-
-    trunk_height = joints[BONE_NAMES.index("neck"), 2] - joints[0, 2]
-    height = (vertices[:, 2] - joints[0, 2]) / trunk_height
-    shirt = ((region == "trunk") & (height > 0.20) & (height < 0.965)) | (region == "clavicle")
-    arm_length = skeleton.length("l_forearm")
-    if clothes.sleeves == "long":
-        shirt |= (region == "upper_arm") | (region == "forearm")
-    else:
-        shirt |= (region == "upper_arm") & (along("upper_arm")[:, 1] < 0.62 * arm_length)
-    trousers = ((region == "trunk") & (height <= 0.20)) | (region == "thigh")
-    if clothes.legs == "long":
-        trousers |= region == "shank"
-    else:
-        trousers &= (region != "thigh") | (along("thigh")[:, 2] > -0.85 * skeleton.length("l_shank"))
-    head = vertices - joints[BONE_NAMES.index("head")]
-    scalp = np.isin(region, ["head"]) & ((head[:, 2] > 0.095) | ((head[:, 0] < -0.005) & (head[:, 2] > 0.0)))
-    hair = scalp | np.isin(region, ["hair", "long_hair"])
-    colour = np.tile(np.array(clothes.skin, float), (len(vertices), 1))
-    for mask, value in ((shirt, clothes.shirt), (trousers, clothes.trousers), (hair, clothes.hair), (np.isin(region, ["foot", "toes"]), clothes.shoes)):
-        colour[mask] = value
-    colour[shirt & _pattern(clothes.pattern, vertices)] = clothes.pattern_colour
-    colour[trousers & (height > 0.165) & (height <= 0.20)] *= 0.5  # a belt
-    face = (region == "head") & (head[:, 0] > 0.07)
-    scale = skeleton.height_m / 1.75
-    eyes = face & (np.abs(head[:, 2] - 0.040 * scale) < 0.010) & (np.abs(np.abs(vertices[:, 1]) - 0.031 * scale) < 0.014)
-    mouth = face & (np.abs(head[:, 2] + 0.035 * scale) < 0.007) & (np.abs(vertices[:, 1]) < 0.024 * scale)
-    colour[eyes] *= 0.45
-    colour[mouth] *= [0.85, 0.55, 0.55]
-    cloth = shirt | trousers
-    folds = sum(np.sin(vertices @ rng.normal(0, 45, 3) + rng.uniform(0, 2 * np.pi)) for _ in range(6)) / 6
-    linear = colour[:, ::-1] ** 2.2
-    return linear * np.where(cloth, 1 + 0.16 * folds, 1 + 0.04 * folds)[:, None]
-
-
-def _pattern(name: str, vertices: np.ndarray) -> np.ndarray:
-    if name == "plain":
-        return np.zeros(len(vertices), bool)
-    x, y, z = (np.sin(vertices[:, k] * 2 * np.pi / period) for k, period in ((0, 0.11), (1, 0.11), (2, 0.09)))
-    if name == "stripes":
-        return z > 0.3
-    if name == "checks":
-        return (x * y > 0) == (z > 0)
-    if name == "dots":
-        return y * z > 0.55
-    raise InputError(f"pattern must be one of {', '.join(PATTERNS)}; got {name!r}")

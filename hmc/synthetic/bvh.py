@@ -62,7 +62,10 @@ def read_bvh(path: str | Path) -> Bvh:
     tokens = head.split()
     if not found or not tokens or tokens[0].upper() != "HIERARCHY":
         raise InputError(f"{path}: not a BVH file; it has no HIERARCHY and MOTION")
-    names, parents, offsets, channels = [], [], [], []
+    names: list[str] = []
+    parents: list[int] = []
+    offsets: list[list[float]] = []
+    channels: list[tuple[str, ...]] = []
     stack: list[int] = []
     current = -1
     k = 1
@@ -167,7 +170,9 @@ def _find_joints(motion: Bvh) -> dict[str, int]:
     for joint, names in wanted.items():
         place = next((plain.index(name) for name in names if name in plain), None)
         if place is None:
-            raise InputError(f"the motion file has no joint that could be the {joint}; names tried: {', '.join(names)}; it has {', '.join(motion.names)}")
+            raise InputError(
+                f"the motion file has no joint that could be the {joint}; names tried: {', '.join(names)}; it has {', '.join(motion.names)}"
+            )
         found[joint] = place
     return found
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from hmc.synthetic.motions import Feet, Motion, Upper, arms_by_angles, assemble, keyframes, pelvis_height
-from hmc.synthetic.skeleton import BONE_NAMES, Skeleton
+from hmc.synthetic.motions import Feet, Motion, Upper, arms_by_angles, assemble, keyframes, pelvis_height, roll_foot
+from hmc.synthetic.skeleton import Skeleton
 
 __all__ = ["jog", "walk"]
 
@@ -49,7 +49,14 @@ def _path(distance: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _gait(
-    skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator, speed: float, radius: float, stride: float, stance: float, bounce: float
+    skeleton: Skeleton,
+    times: np.ndarray,
+    rng: np.random.Generator,
+    speed: float,
+    radius: float,
+    stride: float,
+    stance: float,
+    bounce: float,
 ) -> Motion:
     running = bounce > 0
     cycles = times * speed / stride + rng.uniform(0, 1)  # of the left foot; the right is half a cycle later
@@ -101,8 +108,6 @@ def _feet(
 ) -> Feet:
     """Feet that stay where they are put while they bear weight, and swing on to the next footprint."""
     curve = np.array(_RUN_PITCH if running else _WALK_PITCH, float)
-    foot = skeleton.offsets[BONE_NAMES.index("l_toes")]
-    heel, ball, sole = -0.035 * skeleton.height_m / 1.75, foot[0], skeleton.ankle_height
     n = len(cycles)
     ankles, yaw, pitch, toe = np.zeros((n, 2, 3)), np.zeros((n, 2)), np.zeros((n, 2)), np.zeros((n, 2))
     for s, offset in enumerate((0.0, 0.5)):
@@ -121,9 +126,7 @@ def _feet(
         there, yaw_there = print_of(step + 1)
 
         def ankle(flat: np.ndarray, heading: np.ndarray, tilt: np.ndarray) -> np.ndarray:
-            pivot = np.where(tilt > 0, heel, ball)
-            forward = pivot - np.cos(tilt) * pivot - np.sin(tilt) * sole
-            height = sole * np.cos(tilt) - pivot * np.sin(tilt)
+            forward, height = roll_foot(skeleton, tilt)
             place = flat + forward[:, None] * np.stack([np.cos(heading), np.sin(heading)], axis=-1)
             return np.column_stack([place, height])
 

@@ -104,7 +104,9 @@ def make_backdrop(scene: Scene, camera: Camera, furniture: tuple[ShadowMap, ...]
         hits = cast_rays(scene.room, camera.centre, rays)
         points = camera.centre + hits.distance[:, None] * rays
         shares, index, distance = _light_surfaces(scene, points, hits.normal, furniture)
-        light = ambient * _open_sky(hits.normal)[:, None] + sum(share[:, None] * lamp.power for share, lamp in zip(shares, scene.lights, strict=True))
+        light = ambient * _open_sky(hits.normal)[:, None] + sum(
+            share[:, None] * lamp.power for share, lamp in zip(shares, scene.lights, strict=True)
+        )
         radiance += hits.albedo * light / 4
     depth = (points @ camera.rotation.T + camera.translation)[:, 2]
     corners = scene.room.corners
@@ -201,7 +203,9 @@ def picture(scene: Scene, camera: Camera, backdrop: Backdrop, lit: LitCrowd) -> 
         coverage = np.bincount(place, minlength=len(touched)) * share
         added = np.stack([np.bincount(place, colour[:, c], len(touched)) for c in range(3)], axis=1) * share
         radiance[touched] = radiance[touched] * (1 - coverage)[:, None] + added * backdrop.vignette[touched, None]
-        counts = np.stack([np.bincount(place[crowd.persons[triangles[:, 0]] == k], minlength=len(touched)) for k in range(len(scene.actors))])
+        counts = np.stack(
+            [np.bincount(place[crowd.persons[triangles[:, 0]] == k], minlength=len(touched)) for k in range(len(scene.actors))]
+        )
         labels[touched] = np.where(coverage >= 0.5, counts.argmax(axis=0) + 1, 0)
     return radiance, labels.reshape(height, width)
 

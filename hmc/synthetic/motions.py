@@ -15,7 +15,20 @@ from scipy.spatial.transform import Rotation
 
 from hmc.synthetic.skeleton import BONE_NAMES, PARENTS, Skeleton, limb_orientations, reach, unit
 
-__all__ = ["Feet", "Motion", "Upper", "angles", "arms_by_angles", "arms_by_hands", "assemble", "keyframes", "lift_clavicle", "place", "pelvis_height"]
+__all__ = [
+    "Feet",
+    "Motion",
+    "Upper",
+    "angles",
+    "arms_by_angles",
+    "arms_by_hands",
+    "assemble",
+    "keyframes",
+    "lift_clavicle",
+    "pelvis_height",
+    "place",
+    "roll_foot",
+]
 
 
 @dataclass(frozen=True)
@@ -92,8 +105,8 @@ def assemble(skeleton: Skeleton, root: np.ndarray, upper: Upper, feet: Feet, arm
     upper : Upper
     feet : Feet
     arms : callable
-        ``arms(side, chest, shoulders) -> (upper_direction, forearm_direction, pole)``, each (n, 3) in the world, from the side (0 left, 1 right), the
-        chest's orientation (n, 3, 3) and the shoulder's place (n, 3); the elbow points to the pole.
+        ``arms(side, chest, shoulders) -> (upper_direction, forearm_direction, pole)``, each (n, 3) in the world, from the side
+        (0 left, 1 right), the chest's orientation (n, 3, 3) and the shoulder's place (n, 3); the elbow points to the pole.
 
     Returns
     -------
@@ -203,7 +216,9 @@ def arms_by_hands(skeleton: Skeleton, targets: np.ndarray, frame: str = "chest",
     return arms
 
 
-def pelvis_height(skeleton: Skeleton, pelvis_xy: np.ndarray, yaw: np.ndarray, feet: Feet, slack: float = 0.996, smooth: float = 2.0) -> np.ndarray:
+def pelvis_height(
+    skeleton: Skeleton, pelvis_xy: np.ndarray, yaw: np.ndarray, feet: Feet, slack: float = 0.996, smooth: float = 2.0
+) -> np.ndarray:
     """As high as the legs allow: the height of the pelvis at which the more stretched leg is straight to a fraction ``slack``, (n,).
 
     Parameters
@@ -225,6 +240,29 @@ def pelvis_height(skeleton: Skeleton, pelvis_xy: np.ndarray, yaw: np.ndarray, fe
     smoothed = gaussian_filter1d(lowest, smooth, mode="nearest")
     # Smoothing lifts the pelvis where the limit dips; pull it back under the limit there, smoothly.
     return smoothed - gaussian_filter1d(np.maximum(smoothed - lowest, 0), smooth, mode="nearest")
+
+
+def roll_foot(skeleton: Skeleton, pitch: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where the ankle goes when a foot on the floor rolls over its heel (toes up, positive) or over the joint of its toes (negative).
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    pitch : ndarray, shape (n,)
+        Radians.
+
+    Returns
+    -------
+    forward : ndarray, shape (n,)
+        From where the ankle is with the foot flat, metres.
+    height : ndarray, shape (n,)
+        Above the floor, metres.
+    """
+    toes = skeleton.offsets[BONE_NAMES.index("l_toes")]
+    ahead = np.where(pitch > 0, -0.020 * skeleton.height_m, toes[0])
+    below = np.where(pitch > 0, skeleton.ankle_height, -toes[2])
+    forward = ahead - np.cos(pitch) * ahead - np.sin(pitch) * below
+    return forward, skeleton.ankle_height - below + below * np.cos(pitch) - ahead * np.sin(pitch)
 
 
 def keyframes(times: np.ndarray, at: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -58,7 +58,9 @@ _LIMBS: dict[str, list[list[float]]] = {
         [-0.064, 0.022, 0.024, 0, -0.057], [-0.048, 0.033, 0.038, 0, -0.044], [0.0, 0.037, 0.046, 0, -0.036],
         [0.05, 0.039, 0.038, 0, -0.044], [0.10, 0.045, 0.029, 0, -0.053], [0.135, 0.047, 0.025, 0, -0.057],
     ],
-    "toes": [[-0.02, 0.046, 0.0255, 0, 0], [0.03, 0.045, 0.022, 0, -0.004], [0.06, 0.037, 0.019, 0, -0.007], [0.076, 0.022, 0.015, 0, -0.011]],
+    "toes": [
+        [-0.02, 0.046, 0.0255, 0, 0], [0.03, 0.045, 0.022, 0, -0.004], [0.06, 0.037, 0.019, 0, -0.007], [0.076, 0.022, 0.015, 0, -0.011],
+    ],
     "neck": [[-0.05, 0.062, 0.062, 0, 0.0], [0.04, 0.057, 0.059, 0, 0.012], [0.12, 0.054, 0.058, 0, 0.016], [0.15, 0.045, 0.050, 0, 0.018]],
     "head": [
         [-0.074, 0.024, 0.022, 0, 0.066], [-0.056, 0.044, 0.042, 0, 0.049], [-0.02, 0.058, 0.072, 0, 0.024], [0.02, 0.068, 0.087, 0, 0.012],
@@ -69,7 +71,9 @@ _LIMBS: dict[str, list[list[float]]] = {
         [0.035, 0.068, 0.062, 0, -0.040], [0.07, 0.081, 0.092, 0, -0.012], [0.11, 0.076, 0.090, 0, -0.004], [0.14, 0.050, 0.062, 0, -0.004],
         [0.152, 0.024, 0.030, 0, -0.004],
     ],
-    "long_hair": [[-0.15, 0.045, 0.016, 0, -0.070], [-0.08, 0.066, 0.030, 0, -0.062], [0.0, 0.078, 0.052, 0, -0.044], [0.08, 0.078, 0.080, 0, -0.020]],
+    "long_hair": [
+        [-0.15, 0.045, 0.016, 0, -0.070], [-0.08, 0.066, 0.030, 0, -0.062], [0.0, 0.078, 0.052, 0, -0.044], [0.08, 0.078, 0.080, 0, -0.020],
+    ],
 }  # fmt: skip
 
 
@@ -91,7 +95,14 @@ def girth_of(build: str | float) -> float:
 
 
 def body_sweeps(
-    skeleton: Skeleton, sex: str, girth: float, loose_m: float, long_hair: bool, joints: np.ndarray, orientations: np.ndarray, rng: np.random.Generator
+    skeleton: Skeleton,
+    sex: str,
+    girth: float,
+    loose_m: float,
+    long_hair: bool,
+    joints: np.ndarray,
+    orientations: np.ndarray,
+    rng: np.random.Generator,
 ) -> list[tuple[str, Sweep]]:
     """The body's sweeps in a given pose, each with the name of its table.
 
@@ -153,10 +164,32 @@ def body_sweeps(
         down = [0.0, 0.0, -1.0]
         arm, end = factor["arm"] * limb, factor["end"] * (1 + 0.04 * girth - 0.08 * woman)
         add("clavicle", f"{side}_clavicle", [forward, up, out], table("clavicle", arm, skeleton.length("l_upper_arm") / 0.17), 2, 0.06)
-        add("upper_arm", f"{side}_upper_arm", [forward, up, out], table("upper_arm", arm, skeleton.length("l_forearm") / 0.285, 0.6 * loose_m), 2, 0.035)
-        add("forearm", f"{side}_forearm", [forward, up, out], table("forearm", arm, skeleton.length("l_hand") / 0.26, 0.4 * loose_m), 2, 0.02)
+        add(
+            "upper_arm",
+            f"{side}_upper_arm",
+            [forward, up, out],
+            table("upper_arm", arm, skeleton.length("l_forearm") / 0.285, 0.6 * loose_m),
+            2,
+            0.035,
+        )
+        add(
+            "forearm",
+            f"{side}_forearm",
+            [forward, up, out],
+            table("forearm", arm, skeleton.length("l_hand") / 0.26, 0.4 * loose_m),
+            2,
+            0.02,
+        )
         add("hand", f"{side}_hand", [forward, up, out], table("hand", end), 2.2, 0.012)
-        add("thumb", f"{side}_hand", [up, [0.8, -0.6 * sign, 0], [0.6, 0.8 * sign, -0.25]], table("thumb", end), 2, 0.012, (0.022 * scale, sign * 0.025 * scale, 0))
+        add(
+            "thumb",
+            f"{side}_hand",
+            [up, [0.8, -0.6 * sign, 0], [0.6, 0.8 * sign, -0.25]],
+            table("thumb", end),
+            2,
+            0.012,
+            (0.022 * scale, sign * 0.025 * scale, 0),
+        )
         thigh = table("thigh", factor["leg"] * (limb + 0.10 * woman), thigh_scale, loose_m)
         add("thigh", f"{side}_thigh", [left, forward, down], thigh, 2, 0.035)
         add("shank", f"{side}_shank", [left, forward, down], trousers, 2, 0.025)
@@ -167,7 +200,7 @@ def body_sweeps(
         for rows, drop in ((shoe, sole), (toes, sole + skeleton.offsets[BONE_NAMES.index("l_toes"), 2])):
             rows[:, 1] *= foot
             rows[:, 2] *= scale
-            rows[:, 4] = np.where(rows[:, 0] < -0.055 * scale, rows[:, 4], rows[:, 2] - drop)
+            rows[:, 4] = np.where(rows[:, 0] < -0.055 * scale, rows[:, 4], rows[:, 2] - drop + 0.003)
         add("foot", f"{side}_foot", [left, up, forward], shoe, 3, 0.02)
         add("toes", f"{side}_toes", [left, up, forward], toes, 3, 0.015)
     head = skeleton.head_top[2] / 0.154

@@ -6,16 +6,26 @@ import difflib
 import tomllib
 from dataclasses import MISSING, dataclass, fields, replace
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Any, get_args, get_origin, get_type_hints
 
 from hmc.errors import InputError
-from hmc.synthetic.actor import PATTERNS
+from hmc.synthetic.clothes import PATTERNS
 from hmc.synthetic.physique import girth_of
 from hmc.synthetic.rigs import RIGS
 from hmc.synthetic.room import FURNITURE
 from hmc.synthetic.textures import TEXTURES
 
-__all__ = ["ActorRecipe", "FurnitureRecipe", "ImageRecipe", "LightRecipe", "Recipe", "RigRecipe", "RoomRecipe", "load_recipe", "shipped_recipes"]
+__all__ = [
+    "ActorRecipe",
+    "FurnitureRecipe",
+    "ImageRecipe",
+    "LightRecipe",
+    "Recipe",
+    "RigRecipe",
+    "RoomRecipe",
+    "load_recipe",
+    "shipped_recipes",
+]
 
 Colour = tuple[float, float, float]
 
@@ -163,7 +173,11 @@ def load_recipe(source: str | Path) -> Recipe:
         path = RECIPE_FOLDER / f"{source}.toml"
     if not path.is_file():
         near = difflib.get_close_matches(str(source), shipped_recipes(), 1)
-        hint = f"did you mean {near[0]!r}?" if near else f"shipped recipes are {', '.join(shipped_recipes()) or 'missing from this installation'}"
+        hint = (
+            f"did you mean {near[0]!r}?"
+            if near
+            else f"shipped recipes are {', '.join(shipped_recipes()) or 'missing from this installation'}"
+        )
         raise InputError(f"recipe {str(source)!r} is neither a file nor a shipped recipe; {hint}")
     try:
         content = tomllib.loads(path.read_text())
@@ -193,6 +207,8 @@ def recipe_from(content: dict[str, Any], where: str = "recipe") -> Recipe:
     for key, kind in (("furniture", FurnitureRecipe), ("actors", ActorRecipe)):
         if key in content:
             label = key.removesuffix("s")
+            if not isinstance(content[key], list):
+                raise InputError(f"{where}: '{label}' must be tables, each under its own line [[{label}]]")
             content[key] = tuple(_fill(kind, item, f"{where}: [[{label}]] number {k + 1}") for k, item in enumerate(content[key]))
     recipe = _fill(Recipe, content, where)
     _check(recipe, where)
@@ -207,15 +223,16 @@ def _fill(kind: type, table: Any, where: str) -> Any:
     for key in table:
         if key not in hints:
             near = difflib.get_close_matches("actor" if key == "actors" else key, [*hints, "actor"], 1, cutoff=0.4)
-            raise InputError(f"{where}: unknown key '{key}'" + (f"; did you mean '{near[0]}'?" if near else f"; keys are {', '.join(hints)}"))
+            raise InputError(
+                f"{where}: unknown key '{key}'" + (f"; did you mean '{near[0]}'?" if near else f"; keys are {', '.join(hints)}")
+            )
     for field in fields(kind):
         if field.default is MISSING and field.name not in table:
             raise InputError(f"{where}: '{field.name}' is missing")
     values = {}
     for key, value in table.items():
         value = _tuples(value)
-        default = next(field.default for field in fields(kind) if field.name == key)
-        if not _fits(value, hints[key], default):
+        if not _fits(value, hints[key]):
             raise InputError(f"{where}: '{key}' has a value of the wrong kind: {value!r}")
         values[key] = value
     return kind(**values)
@@ -225,30 +242,19 @@ def _tuples(value: Any) -> Any:
     return tuple(_tuples(item) for item in value) if isinstance(value, list) else value
 
 
-def _fits(value: Any, hint: Any, default: Any) -> bool:
-    text = str(hint)
-    number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    if hint is bool:
-        return isinstance(value, bool)
-    if hint is int:
-        return isinstance(value, int) and not isinstance(value, bool)
-    if hint is float:
-        return number
-    if hint is str:
-        return isinstance(value, str)
-    if "str | float" in text or text == "str | float":
-        return number or isinstance(value, str)
-    if text.startswith("tuple[hmc") or isinstance(value, (RigRecipe, RoomRecipe, LightRecipe, ImageRecipe)):
-        return True
-    if text == "tuple[str, ...]":
-        return isinstance(value, tuple) and bool(value) and all(isinstance(v, str) for v in value)
-    if "..." in text:
-        return isinstance(value, tuple) and bool(value) and all(_numbers(v, 3) for v in value)
-    return _numbers(value, text.count("float") + text.count("int"))
-
-
-def _numbers(value: Any, count: int) -> bool:
-    return isinstance(value, tuple) and len(value) == count and all(isinstance(v, (int, float)) and not isinstance(v, bool) for v in value)
+def _fits(value: Any, hint: Any) -> bool:
+    """Whether a value is of a kind: bool, int, float, str, a table, None, a union of kinds, or a tuple of them."""
+    kinds = get_args(hint)
+    if get_origin(hint) is tuple:
+        if not isinstance(value, tuple):
+            return False
+        kinds = kinds[:1] * len(value) if kinds[-1] is Ellipsis else kinds
+        return len(value) == len(kinds) and all(_fits(item, kind) for item, kind in zip(value, kinds, strict=True))
+    if kinds:
+        return any(_fits(value, kind) for kind in kinds)
+    if isinstance(value, bool):
+        return hint is bool
+    return isinstance(value, (int, float) if hint is float else hint)
 
 
 def _check(recipe: Recipe, where: str) -> None:
@@ -257,7 +263,9 @@ def _check(recipe: Recipe, where: str) -> None:
     def among(value: str, names, what: str) -> None:
         if value not in names:
             near = difflib.get_close_matches(value, list(names), 1)
-            raise InputError(f"{where}: {what} '{value}' is unknown; " + (f"did you mean '{near[0]}'?" if near else f"use one of {', '.join(names)}"))
+            raise InputError(
+                f"{where}: {what} '{value}' is unknown; " + (f"did you mean '{near[0]}'?" if near else f"use one of {', '.join(names)}")
+            )
 
     def within(value: float, low: float, high: float, what: str) -> None:
         if not low <= value <= high:

@@ -65,7 +65,9 @@ def render_recording(
     """
     recipe = recipe if isinstance(recipe, Recipe) else load_recipe(recipe)
     out = Path(out)
-    if out.exists() and not (out.is_dir() and (not any(out.iterdir()) or ((out / "calibration.toml").is_file() and (out / "truth").is_dir()))):
+    if out.exists() and not (
+        out.is_dir() and (not any(out.iterdir()) or ((out / "calibration.toml").is_file() and (out / "truth").is_dir()))
+    ):
         raise InputError(f"{out}: exists and is no rendered recording; choose another folder or remove it")
     workers = workers or os.cpu_count() or 1
     scene = build_scene(recipe, seed)
@@ -125,7 +127,9 @@ def _write_pictures(scene: Scene, folder: Path, workers: int, on_progress: Calla
                     for camera, writer, (image, labels) in zip(scene.rig, writers, pictures, strict=True):
                         writer.write(image)
                         if labels is not None:
-                            _write_silhouette(folder / "truth" / "silhouettes" / camera.name / f"{frame:06d}.png", labels, len(scene.actors))
+                            _write_silhouette(
+                                folder / "truth" / "silhouettes" / camera.name / f"{frame:06d}.png", labels, len(scene.actors)
+                            )
                     done += 1
                     if on_progress is not None:
                         on_progress(done, total)

@@ -72,7 +72,7 @@ def make_rig(
     for sx, sy in ((-1, -1), (1, -1), (1, 1), (-1, 1))[:corners]:
         places.append((np.append(middle + 0.93 * half * [sx, sy], camera_height_m + 0.25), 80.0))
     for _ in range(overhead):
-        places.append((np.append(middle + [0.05, 0.03], high[2] - 0.08), 95.0))
+        places.append((np.array([middle[0] + 0.05, middle[1] + 0.03, high[2] - 0.08]), 95.0))
     cameras = []
     for k, (position, fov) in enumerate(places):
         down = k >= ring + corners

@@ -12,6 +12,7 @@ from hmc.synthetic.textures import colour_of, poster_colour
 __all__ = ["FURNITURE", "Box", "Hits", "Room", "box_mesh", "cast_rays", "furnish"]
 
 Colour = tuple[float, float, float]
+Point = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -77,32 +78,43 @@ class Hits:
     albedo: np.ndarray
 
 
-def _table(width, depth, height, colour):
-    legs = [((sx * (width / 2 - 0.05), sy * (depth / 2 - 0.05), (height - 0.04) / 2), (0.025, 0.025, (height - 0.04) / 2)) for sx in (-1, 1) for sy in (-1, 1)]
-    return [((0, 0, height - 0.02), (width / 2, depth / 2, 0.02)), *legs]
+def _legs(x: float, y: float, height: float, thickness: float) -> list[tuple[Point, Point]]:
+    half = thickness / 2
+    corners = [(sx * (x / 2 - half), sy * (y / 2 - half)) for sx in (-1, 1) for sy in (-1, 1)]
+    return [((cx, cy, height / 2), (half, half, height / 2)) for cx, cy in corners]
 
 
-def _chair(width, depth, height, colour):
+def _table(width: float, depth: float, height: float) -> list[tuple[Point, Point]]:
+    return [((0, 0, height - 0.02), (width / 2, depth / 2, 0.02)), *_legs(width - 0.05, depth - 0.05, height - 0.04, 0.05)]
+
+
+def _chair(width: float, depth: float, height: float) -> list[tuple[Point, Point]]:
     seat = 0.45
-    legs = [((sx * (width / 2 - 0.02), sy * (depth / 2 - 0.02), (seat - 0.04) / 2), (0.02, 0.02, (seat - 0.04) / 2)) for sx in (-1, 1) for sy in (-1, 1)]
     back = ((-(depth / 2 - 0.02), 0, (seat + height) / 2), (0.02, width / 2, (height - seat) / 2))
-    return [((0, 0, seat - 0.02), (depth / 2, width / 2, 0.02)), back, *[((y, x, z), (b, a, c)) for (x, y, z), (a, b, c) in legs]]
+    return [((0, 0, seat - 0.02), (depth / 2, width / 2, 0.02)), back, *_legs(depth, width, seat - 0.04, 0.04)]
 
 
-def _box(width, depth, height, colour):
+def _box(width: float, depth: float, height: float) -> list[tuple[Point, Point]]:
     return [((0, 0, height / 2), (width / 2, depth / 2, height / 2))]
 
 
-def _stool(width, depth, height, colour):
+def _stool(width: float, depth: float, height: float) -> list[tuple[Point, Point]]:
     seat = ((0, 0, height - 0.03), (width / 2, depth / 2, 0.03))
     return [seat, ((0, 0, (height - 0.06) / 2), (0.04, 0.04, (height - 0.06) / 2)), ((0, 0, 0.01), (width / 2.4, depth / 2.4, 0.01))]
 
 
 #: Furniture by name: its boxes, and the default width (along its y for a chair), depth and height in metres. A chair faces its own x.
-FURNITURE = {"table": (_table, (1.4, 0.7, 0.74)), "chair": (_chair, (0.44, 0.44, 0.88)), "box": (_box, (0.5, 0.4, 0.5)), "stool": (_stool, (0.38, 0.38, 0.45))}
+FURNITURE = {
+    "table": (_table, (1.4, 0.7, 0.74)),
+    "chair": (_chair, (0.44, 0.44, 0.88)),
+    "box": (_box, (0.5, 0.4, 0.5)),
+    "stool": (_stool, (0.38, 0.38, 0.45)),
+}
 
 
-def furnish(kind: str, at_m, heading_deg: float = 0.0, size_m=None, colour: Colour = (0.55, 0.42, 0.30), texture: str = "wood") -> tuple[Box, ...]:
+def furnish(
+    kind: str, at_m, heading_deg: float = 0.0, size_m=None, colour: Colour = (0.55, 0.42, 0.30), texture: str = "wood"
+) -> tuple[Box, ...]:
     """The boxes of a piece of furniture.
 
     Parameters
@@ -132,9 +144,9 @@ def furnish(kind: str, at_m, heading_deg: float = 0.0, size_m=None, colour: Colo
     yaw = float(np.radians(heading_deg))
     turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
     boxes = []
-    for centre, half in build(*(size_m or default), colour):
+    for centre, half in build(*(size_m or default)):
         place = np.append(turn @ np.array(centre[:2]) + np.array(at_m), centre[2])
-        boxes.append(Box(place, np.array(half), yaw, texture, tuple(colour)))
+        boxes.append(Box(place, np.array(half), yaw, texture, colour))
     return tuple(boxes)
 
 
@@ -176,7 +188,9 @@ def cast_rays(room: Room, origin: np.ndarray, rays: np.ndarray) -> Hits:
     return Hits(distance, normal, albedo)
 
 
-def _meet_box(box: Box, origin: np.ndarray, rays: np.ndarray, distance: np.ndarray, normal: np.ndarray, albedo: np.ndarray, seed: int) -> None:
+def _meet_box(
+    box: Box, origin: np.ndarray, rays: np.ndarray, distance: np.ndarray, normal: np.ndarray, albedo: np.ndarray, seed: int
+) -> None:
     """Overwrite, in place, what rays met with what they meet on a box, where that is nearer (slab method)."""
     # Rays that pass the box's bounding sphere far away are left out first.
     away = box.centre - origin

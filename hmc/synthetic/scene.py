@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from hmc.camera.model import Rig
-from hmc.synthetic.actor import Actor, Clothes, make_actor, pose_mesh
+from hmc.synthetic.actor import Actor, make_actor, pose_mesh
+from hmc.synthetic.clothes import Clothes
 from hmc.synthetic.library import make_motion
 from hmc.synthetic.motions import Motion
 from hmc.synthetic.recipe import Recipe
@@ -76,7 +77,9 @@ def build_scene(recipe: Recipe, seed: int | None = None) -> Scene:
     Scene
     """
     seed = recipe.seed if seed is None else seed
-    rng_rig, rng_room, rng_light, *rng_actors = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(3 + 2 * len(recipe.actors)))
+    rng_rig, rng_room, rng_light, *rng_actors = (
+        np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(3 + 2 * len(recipe.actors))
+    )
     x, y, z = recipe.room.size_m
     corners = np.array([[-x / 2, -y / 2, 0.0], [x / 2, y / 2, z]])
     rig = make_rig(
@@ -91,7 +94,12 @@ def build_scene(recipe: Recipe, seed: int | None = None) -> Scene:
         for k in range(recipe.room.posters)
     )
     room = Room(
-        corners, tuple(zip(walls, colours, strict=True)), (recipe.room.floor, recipe.room.floor_colour), boxes, posters, int(rng_room.integers(2**16))
+        corners,
+        tuple(zip(walls, colours, strict=True)),
+        (recipe.room.floor, recipe.room.floor_colour),
+        boxes,
+        posters,
+        int(rng_room.integers(2**16)),
     )
     lights = make_lights(corners, recipe.light.lamps, recipe.light.brightness, rng_light)
     times = np.arange(recipe.n_frames) / recipe.fps

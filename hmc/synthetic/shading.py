@@ -64,7 +64,7 @@ def make_lights(room: np.ndarray, count: int, brightness: float, rng: np.random.
     height = high[2] - 0.15
     for k in range(count):
         angle = 2 * np.pi * (k + rng.uniform(0.1, 0.9)) / count
-        spot = (low + high)[:2] / 2 + (high - low)[:2] * 0.27 * [np.cos(angle), np.sin(angle)]
+        spot = (low + high)[:2] / 2 + (high - low)[:2] * 0.20 * [np.cos(angle), np.sin(angle)]
         tint = 1 + rng.normal(0, 0.02) * np.array([1.0, 0.0, -1.0])
         power = 1.05 * brightness * height**2 * strengths[k] / strengths.sum() * tint
         lights.append(Light(np.append(spot, height), power, float(rng.uniform(1.5, 3.0))))
@@ -107,9 +107,8 @@ def shadow_map(light: Light, vertices: np.ndarray, triangles: np.ndarray) -> Sha
     """What a mesh hides from a light."""
     uv, distance = look_up(light, vertices)
     fragments = rasterise(uv, distance, triangles, (MAP_SIZE, MAP_SIZE), cull=False)
-    nearest = np.full(MAP_SIZE * MAP_SIZE, _FAR)
-    nearest[fragments.pixels] = fragments.depth
-    nearest = nearest.reshape(MAP_SIZE, MAP_SIZE)
+    nearest = np.full((MAP_SIZE, MAP_SIZE), _FAR)
+    nearest.ravel()[fragments.pixels] = fragments.depth
     taken = cv2.GaussianBlur((nearest < _FAR).astype(np.float32), (0, 0), light.softness)
     return ShadowMap(nearest, taken)
 
