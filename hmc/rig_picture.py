@@ -61,10 +61,17 @@ def draw_rig(rig: Rig, room: np.ndarray, ax=None):
         side = 1 if x < corners[:, 0].mean() else -1
         where = {"xytext": (7 * side, 7), "textcoords": "offset points", "ha": "left" if side > 0 else "right"}
         box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 1.5}
-        ax.annotate(f"{camera.name}, {z:.1f} m up", (x, y), color=colour, weight="bold", bbox=box, **where)
+        ax.annotate(f"{camera.name} ({z:.1f} m)", (x, y), color=colour, weight="bold", bbox=box, **where)
     ax.plot(0, 0, "k+", markersize=12)
     ax.annotate("origin", (0, 0), xytext=(4, -12), textcoords="offset points", fontsize=8)
-    ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel="x (m)", ylabel="y (m)", aspect="equal", title="rig from above")
+    ax.set(
+        xlim=(low[0], high[0]),
+        ylim=(low[1], high[1]),
+        xlabel="x (m)",
+        ylabel="y (m)",
+        aspect="equal",
+        title="rig from above (camera heights in brackets)",
+    )
     ax.legend(loc="lower right")
     return ax
 
