@@ -78,12 +78,13 @@ def systematic(rng: np.random.Generator, weights: np.ndarray, n: int) -> np.ndar
         When a weight is negative, infinite or NaN, or all are zero.
     """
     weights = np.asarray(weights, float)
-    cumulative = np.cumsum(weights)
-    total = cumulative[-1] if cumulative.size else 0.0
+    cumulative = weights.cumsum()
+    total = cumulative[-1] if weights.size else 0.0
     if not (0 < total < np.inf) or weights.min() < 0:
         raise ValueError("`weights` must be finite, non-negative and not all zero")
-    cumulative *= 1.0 / total
-    edges = np.ceil(cumulative * n - rng.random()).astype(np.int64)
+    teeth = np.empty(weights.size + 1, np.int64)  # how many lie below each edge
+    teeth[0] = 0
+    teeth[1:] = np.ceil(cumulative * (n / total) - rng.random())
     # Rounding must neither lose the last tooth nor give it to a particle of weight zero.
-    edges[np.searchsorted(cumulative, cumulative[-1]) :] = n
-    return np.repeat(np.arange(weights.size), np.diff(edges, prepend=0))
+    teeth[1 + cumulative.searchsorted(total) :] = n
+    return np.arange(weights.size).repeat(teeth[1:] - teeth[:-1])
