@@ -27,6 +27,10 @@ LEAST_DEVIATION = (1.5, 0.8)
 #: The same where too few frames were learnt from to know any.
 ASSUMED_DEVIATION = (3.0, 1.2)
 FEWEST_FRAMES = 5
+#: What OpenCV's mixture answers a pixel.
+SHADOW, FOREGROUND = 127, 255
+#: Share of the image that people's shadows may fill.
+MOST_SHADOW = 0.2
 #: Where people are, the foreground holds squares of this side, pixels.
 SOLID_PX = 4
 #: How far around those squares the image is looked at, pixels of a 640 x 480 image.
@@ -62,9 +66,9 @@ class SegmentationSettings:
         Pieces in which the mixture found fewer pixels are specks.
     learning_rate, learn_every : float, int
         Share of a new image in the background each time it learns, and frames from one time to the next. At 30 frames a second the
-        defaults follow the light with a time constant of 11 s.
+        defaults follow the light with a time constant of 7 s.
     keep_out_px : int
-        Nothing is learnt this near to a person.
+        Nothing is learnt this near to a person, nor in shadows.
     max_foreground : float
         Share of the image beyond which the foreground cannot be people: a light was switched.
     """
@@ -76,7 +80,7 @@ class SegmentationSettings:
     reach_threshold: float = 5.0
     halo_share: float = 0.4
     least_blob_px: int = 40
-    learning_rate: float = 0.03
+    learning_rate: float = 0.05
     learn_every: int = 10
     keep_out_px: int = 12
     max_foreground: float = 0.5
@@ -198,15 +202,15 @@ def segment(
         raise InputError(
             f"the image is {image.shape[1]} x {image.shape[0]} pixels, the background {model.mean.shape[1]} x {model.mean.shape[0]}"
         )
-    found = cv2.threshold(model.mixture.apply(image, learningRate=0), 254, 1, cv2.THRESH_BINARY)[1]
+    answer = model.mixture.apply(image, learningRate=0)
+    found = cv2.threshold(answer, FOREGROUND - 1, 1, cv2.THRESH_BINARY)[1]
     if cv2.countNonZero(found) > settings.max_foreground * found.size:
         return None, _adapt_to_switch(model, image, settings)
     mask = _complete(found, image, model, settings).view(bool)
     after = replace(model, people=mask, frame=model.frame + 1, settling=max(0, model.settling - 1))
-    if after.settling:
-        _learn(after, image, SETTLING_RATE, settings)
-    elif after.frame % settings.learn_every == 0:
-        _learn(after, image, settings.learning_rate, settings)
+    if after.settling or after.frame % settings.learn_every == 0:
+        rate = SETTLING_RATE if after.settling else settings.learning_rate
+        _learn(after, image, _hidden(mask, answer, settings), rate, settings)
     return mask, after
 
 
@@ -263,14 +267,37 @@ def _complete(found: np.ndarray, image: np.ndarray, model: BackgroundModel, sett
     return mask
 
 
-def _learn(model: BackgroundModel, image: np.ndarray, rate: float, settings: SegmentationSettings) -> None:
-    """Let the background take in a share of the image, in place, but for where people stand."""
-    side = 2 * round(settings.keep_out_px * max(image.shape[:2]) / 640) + 1
-    near = cv2.dilate(model.people.view(np.uint8), np.ones((side, side), np.uint8))
-    outside = 1 - near
-    cv2.accumulateWeighted(_luma_chroma(image), model.mean, rate, mask=outside)
-    empty = _as_image(model.mean)
-    cv2.copyTo(image, outside, empty)
+def _hidden(mask: np.ndarray, answer: np.ndarray, settings: SegmentationSettings) -> np.ndarray:
+    """Where the scene is not as it is when empty, 1 or 0: around people, and in their shadows."""
+    side = 2 * round(settings.keep_out_px * max(mask.shape) / 640) + 1
+    hidden = cv2.dilate(mask.view(np.uint8), np.ones((side, side), np.uint8))
+    shadow = cv2.inRange(answer, SHADOW, SHADOW)
+    shadow = cv2.dilate(cv2.morphologyEx(shadow, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)), np.ones((5, 5), np.uint8))
+    if cv2.countNonZero(shadow) < MOST_SHADOW * mask.size:  # more is no shadow but light that went down
+        hidden[shadow > 0] = 1
+    return hidden
+
+
+def _learn(model: BackgroundModel, image: np.ndarray, hidden: np.ndarray, rate: float, settings: SegmentationSettings) -> None:
+    """Let the background take in a share of the image, in place; where it is hidden, it changes as its surroundings do.
+
+    Left as it is while the light drifts, a hidden place would come out as foreground, be hidden for that, and never be learnt again.
+    """
+    mean = model.mean
+    seen = 1 - hidden
+    step = cv2.copyTo(cv2.subtract(_luma_chroma(image), mean, dtype=cv2.CV_32F), seen)
+    coarse = (max(1, mean.shape[1] // 8), max(1, mean.shape[0] // 8))
+    window = (coarse[0] // 2 + 1, coarse[1] // 2 + 1)
+    weight = cv2.blur(cv2.resize(seen.astype(np.float32), coarse, interpolation=cv2.INTER_AREA), window)
+    around = cv2.blur(cv2.resize(step, coarse, interpolation=cv2.INTER_AREA), window) / np.maximum(weight, 1e-3)[..., None]
+    cv2.copyTo(cv2.resize(around, mean.shape[1::-1]), hidden, step)
+    cv2.scaleAdd(step, rate, mean, dst=mean)
+    np.maximum(mean[..., 0], 1, out=mean[..., 0])
+    # There the mixture is shown the mean, one deviation up and down in turns: shown no noise at all, it would come to expect none.
+    turn = 1 if model.frame // settings.learn_every % 2 else -1
+    luma = cv2.addWeighted(mean[..., 0], 1, model.deviation[..., 0], turn, 0)
+    empty = _as_image(cv2.merge([luma, mean[..., 1], mean[..., 2]]))
+    cv2.copyTo(image, seen, empty)
     model.mixture.apply(empty, learningRate=rate)
 
 
