@@ -79,6 +79,22 @@ def one_by_one(table, states, maps):
     return values
 
 
+def report_correlation(table, rotations, positions, placed, voxel_m) -> bool:
+    """Row 5c's second half: the quick overlap against the exact count on voxels of 1 cm, over a layer's particles.
+
+    The count on the voxels of the run itself depends on where their lattice happens to lie, so how it correlates with itself
+    on a shifted lattice is the most that anything can reach against it; both are noted.
+    """
+    share = table.counts[:, 1] / table.counts[:, 1].sum()
+    shifted = [exact_overlap(table.flesh, rotations, positions, np.full(3, start), voxel_m) @ share for start in (0.0, 0.37 * voxel_m)]
+    fine = exact_overlap(flesh_points(table.body, 0.01), rotations, positions, np.zeros(3), 0.01)
+    quick = quick_overlap(table.overlap, placed)
+    same, itself = np.corrcoef([quick @ share, *shifted])[0, 1], np.corrcoef(shifted)[0, 1]
+    note = f"on voxels of {voxel_m * 100:.0f} cm {same:.3f}, these with themselves shifted {itself:.3f}"
+    what = f"correlation with the exact count, table of {voxel_m * 100:.0f} cm"
+    return report("5c", what, np.corrcoef(quick @ share, fine @ share)[0, 1], 0.98, at_least=True, note=note)
+
+
 def main() -> int:
     cv2.setNumThreads(1)
     good = True
@@ -110,10 +126,7 @@ def main() -> int:
             good &= report("5b", f"whole layer / gather, {size}, {name}", times["layer"] / gather, targets["5b"])
             good &= report("5c", f"overlap / likelihood, {size}, {name}", times["overlap"] / times["likelihood"], 0.35)
             if name == "layer 1":
-                exact, quick = exact_overlap(table.flesh, rotations, positions, maps.origin, voxel_m), quick_overlap(table.overlap, placed)
-                whole = [values @ table.counts[:, 1] / table.counts[:, 1].sum() for values in (exact, quick)]
-                note = f"part by part {np.corrcoef(exact.ravel(), quick.ravel())[0, 1]:.3f}"
-                good &= report("5c", f"correlation with the exact count, {size}", np.corrcoef(*whole)[0, 1], 0.98, at_least=True, note=note)
+                good &= report_correlation(table, rotations, positions, placed, voxel_m)
                 some = states[:60]
                 loop = interleaved(
                     {
