@@ -51,7 +51,7 @@ def test_a_walker_is_one_person_from_the_first_frame():
     assert list(table.frames) == list(range(60))
     assert errors(table, 0, path).max() < 0.03
     assert np.abs(table.positions[:, 2] - 0.875).max() < 0.03
-    cap = 0.25 / 0.875  # the head is the ellipsoid's cap of 25 cm, whose centroid is known
+    cap = 0.2 / 0.875  # the head is the ellipsoid's cap of 20 cm, whose centroid is known
     assert np.abs(table.heads[:, 2] - 0.875 * (1 + 3 * (2 - cap) ** 2 / (4 * (3 - cap)))).max() < 0.05
 
 

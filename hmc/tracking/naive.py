@@ -269,7 +269,7 @@ def locating_voxels(observation: Observation, owners: np.ndarray, n_persons: int
 
 
 def head_centre(points: np.ndarray) -> np.ndarray:
-    """Centre of a person's head: the voxels in the top 25 cm, near the axis on which the highest ones stand.
+    """Centre of a person's head: the voxels in the top 20 cm, within 15 cm of the axis on which the highest ones stand.
 
     Parameters
     ----------
@@ -283,7 +283,7 @@ def head_centre(points: np.ndarray) -> np.ndarray:
     """
     top = points[:, 2].max()
     crown = points[points[:, 2] >= top - 0.1].mean(axis=0)
-    near = (points[:, 2] >= top - 0.25) & (np.hypot(*(points - crown)[:, :2].T) <= 0.2)
+    near = (points[:, 2] >= top - 0.2) & (np.hypot(*(points - crown)[:, :2].T) <= 0.15)
     return points[near].mean(axis=0) if near.any() else crown
 
 
