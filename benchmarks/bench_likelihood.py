@@ -16,7 +16,8 @@ from _timing import interleaved, report
 
 from hmc.montecarlo import annealed_step, filter_layer, particle_init, truncated_drift, truncated_normal
 from hmc.pose.annealed.canton2009 import CANTON2009, first_drift, score_log_likelihood
-from hmc.pose.annealed.overlap import exact_overlap, particles_last, quick_overlap
+from hmc.pose.annealed.overlap import exact_overlap, quick_overlap
+from hmc.pose.annealed.placing import place_segments
 from hmc.pose.annealed.scores import make_score_table, map_scores, observe
 from hmc.pose.body.flesh import flesh_points, place_points
 from hmc.pose.body.kinematics import segment_transforms
@@ -107,7 +108,7 @@ def main() -> int:
             rng = np.random.default_rng(0)
             states = truncated_normal(rng, np.tile(pose, (PARTICLES, 1)), first_drift(30) * scale, low, high)
             rotations, positions = segment_transforms(body, states)
-            placed = particles_last(rotations, positions, maps.origin)
+            placed = place_segments(body, states, maps.origin)
             state, drift = particle_init(states), truncated_drift(first_drift(30), low, high, scale)
             likelihood = score_log_likelihood(table, maps)
             # The layer draws from one point, so that its particles spread as those of the likelihood do.

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hmc.pose.annealed.overlap import exact_overlap, make_overlap_table, particles_last, quick_overlap
+from hmc.pose.annealed.overlap import exact_overlap, make_overlap_table, quick_overlap
+from hmc.pose.annealed.placing import place_segments
 from hmc.pose.body.flesh import cone_distance, flesh_points, place_points
 from hmc.pose.body.joints import dof_index
 from hmc.pose.body.kinematics import segment_transforms
@@ -19,18 +20,28 @@ SPREAD = np.r_[[0.05] * 3, [0.1] * 3, [0.2] * 21]
 def particles(body, n, seed=0):
     pose = neutral_state("down", body.limits)
     states = pose + np.random.default_rng(seed).normal(0, 1, (n, 27)) * SPREAD
-    return segment_transforms(body, np.clip(states, body.limits.low, body.limits.high))
+    return np.clip(states, body.limits.low, body.limits.high)
 
 
-def quick(body, flesh, rotations, positions, **options):
-    return quick_overlap(make_overlap_table(body, flesh, **options), particles_last(rotations, positions, positions[0, 0]))
+def quick(body, flesh, states, **options):
+    return quick_overlap(make_overlap_table(body, flesh, **options), place_segments(body, states, states[0, :3]))
+
+
+def test_single_precision_places_segments_where_the_reference_does():
+    body = canton_body(1.75)
+    states = particles(body, 50)
+    rotations, positions = segment_transforms(body, states)
+    placed = place_segments(body, states, np.array([1.0, -2.0, 3.0]))
+    assert placed.dtype == np.float32
+    np.testing.assert_allclose(placed[:, :, :3].transpose(3, 0, 1, 2), rotations, atol=2e-6)
+    np.testing.assert_allclose(placed[:, :, 3].transpose(2, 0, 1) + np.array([1.0, -2.0, 3.0]), positions, atol=2e-6)
 
 
 @pytest.mark.parametrize("make", [default_body, canton_body])
 def test_exact_count_equals_sets_of_voxels(make):
     body = make(1.75)
     flesh = flesh_points(body, 0.05)
-    rotations, positions = particles(body, 6)
+    rotations, positions = segment_transforms(body, particles(body, 6))
     origin = np.array([0.013, -0.4, 7.0])
     ours = exact_overlap(flesh, rotations, positions, origin, 0.05)
     for n in range(6):
@@ -72,7 +83,7 @@ def test_quick_estimate_is_the_shared_volume():
     state = neutral_state("sideways", body.limits)
     state[dof_index("l_shoulder_z", "l_elbow_z")] = np.radians([10, -150])
     rotations, positions = segment_transforms(body, state[None])
-    estimate = quick(body, flesh, rotations, positions, test_points=250)[0]
+    estimate = quick(body, flesh, state[None], test_points=250)[0]
     volume = np.bincount(flesh.part, minlength=len(PARTS)) * 0.01**3
     part = PARTS.index("l_forearm")
     others = [q for q in range(len(PARTS)) if q != part]
@@ -85,9 +96,9 @@ def test_quick_estimate_is_the_shared_volume():
 def test_quick_estimate_follows_the_exact_count(make):
     body = make(1.75)
     flesh = flesh_points(body, 0.02)
-    rotations, positions = particles(body, 300)
-    exact = exact_overlap(flesh, rotations, positions, np.zeros(3), 0.02)
-    estimate = quick(body, flesh, rotations, positions)
+    states = particles(body, 300)
+    exact = exact_overlap(flesh, *segment_transforms(body, states), np.zeros(3), 0.02)
+    estimate = quick(body, flesh, states)
     assert estimate.shape == exact.shape and estimate.min() >= 0 and estimate.max() <= 1
     assert np.corrcoef(exact.mean(axis=1), estimate.mean(axis=1))[0, 1] > 0.97
     assert np.corrcoef(exact.ravel(), estimate.ravel())[0, 1] > 0.96
@@ -97,23 +108,22 @@ def test_what_the_capsules_leave_out_is_nothing():
     # With capsules so wide that every pair is tested, the same comes out.
     body = default_body(1.75)
     table = make_overlap_table(body, flesh_points(body, 0.03))
-    rotations, positions = particles(body, 80, seed=3)
-    placed = particles_last(rotations, positions, positions[0, 0])
+    states = particles(body, 80, seed=3)
+    placed = place_segments(body, states, states[0, :3])
     np.testing.assert_allclose(quick_overlap(replace(table, radius=table.radius + 10), placed), quick_overlap(table, placed), atol=1e-6)
 
 
 def test_a_body_far_from_the_origin_overlaps_the_same():
     body = default_body(1.75)
     flesh = flesh_points(body, 0.03)
-    rotations, positions = particles(body, 20)
-    far = quick(body, flesh, rotations, positions + np.array([400.0, -300.0, 2.0]))
-    np.testing.assert_allclose(far, quick(body, flesh, rotations, positions), atol=0.01)
+    states = particles(body, 20)
+    far = quick(body, flesh, states + np.r_[400.0, -300.0, 2.0, np.zeros(24)])
+    np.testing.assert_allclose(far, quick(body, flesh, states), atol=0.01)
 
 
 def test_limbs_stretched_out_overlap_only_at_their_joints():
     body = default_body(1.75)
     flesh = flesh_points(body, 0.02)
-    rotations, positions = segment_transforms(body, neutral_state("sideways", body.limits)[None])
-    estimate = dict(zip(PARTS, quick(body, flesh, rotations, positions)[0], strict=True))
+    estimate = dict(zip(PARTS, quick(body, flesh, neutral_state("sideways", body.limits)[None])[0], strict=True))
     assert max(estimate["l_shank"], estimate["r_forearm"]) < 0.1
     assert estimate["l_forearm"] == pytest.approx(estimate["r_forearm"], abs=0.05)

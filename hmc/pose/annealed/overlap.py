@@ -17,7 +17,7 @@ from hmc.pose.body.flesh import FleshTable, place_points
 from hmc.pose.body.joints import SEGMENTS
 from hmc.pose.body.model import PARTS, BodyModel, Cones
 
-__all__ = ["OverlapTable", "exact_overlap", "make_overlap_table", "particles_last", "quick_overlap"]
+__all__ = ["OverlapTable", "exact_overlap", "make_overlap_table", "quick_overlap"]
 
 #: Points tested a piece.
 TEST_POINTS = 24
@@ -227,27 +227,6 @@ def _test_points(cones: Cones, piece: np.ndarray, n: int) -> np.ndarray:
     return np.c_[points, np.ones(n)].astype(np.float32)
 
 
-def particles_last(rotations: np.ndarray, positions: np.ndarray, origin: np.ndarray) -> np.ndarray:
-    """Transforms with the particles along the last axis, so that all that follows is arithmetic on whole rows.
-
-    Parameters
-    ----------
-    rotations, positions : ndarray, shape (n, 11, 3, 3) and (n, 11, 3)
-        As from `hmc.pose.body.kinematics.segment_transforms`.
-    origin : ndarray, shape (3,)
-        Somewhere near, world, metres: positions are taken from here, as single precision is coarse far from its zero.
-
-    Returns
-    -------
-    ndarray of float32, shape (11, 3, 4, n)
-        Rotation and position side by side.
-    """
-    placed = np.empty((rotations.shape[1], 3, 4, len(rotations)), np.float32)
-    placed[:, :, :3] = rotations.transpose(1, 2, 3, 0)
-    placed[:, :, 3] = (positions - origin).transpose(1, 2, 0)
-    return placed
-
-
 def quick_overlap(table: OverlapTable, placed: np.ndarray) -> np.ndarray:
     """Estimate of the fraction of each part inside other parts.
 
@@ -255,7 +234,7 @@ def quick_overlap(table: OverlapTable, placed: np.ndarray) -> np.ndarray:
     ----------
     table : OverlapTable
     placed : ndarray of float32, shape (11, 3, 4, n)
-        From `particles_last`.
+        From `hmc.pose.annealed.placing.place_segments`.
 
     Returns
     -------
@@ -316,7 +295,11 @@ def _near(table: OverlapTable, placed: np.ndarray) -> tuple[np.ndarray, np.ndarr
     boxes around all particles touch.
     """
     axes, radius = np.concatenate([table.axes, table.cone_axes]), np.concatenate([table.radius, table.cone_radius])
-    ends = np.moveaxis(axes[:, None] @ placed[np.concatenate([table.segment, table.cone_segment])], 1, 0)
+    segments = np.concatenate([table.segment, table.cone_segment])
+    ends = np.empty((3, len(axes), 2, placed.shape[-1]), np.float32)
+    for segment in range(len(placed)):
+        here = np.flatnonzero(segments == segment)
+        ends[:, here] = (axes[here].reshape(-1, 4) @ placed[segment]).reshape(3, len(here), 2, -1)
     first, second = table.first, table.second + len(table.axes)
     start, axis = ends[:, :, 0], ends[:, :, 1] - ends[:, :, 0]
     squared = np.sum((axes[:, 1] - axes[:, 0]) ** 2, axis=1)
@@ -368,9 +351,9 @@ def _shared(
     stop = 0
     for i, cone, size in zip(pieces, cones, sizes, strict=True):
         start, stop = stop, stop + size
-        columns = np.tensordot(table.to_cone[cone, :, :3], relative[:, :, start:stop], axes=1)
-        columns[:, 3] += table.to_cone[cone, :, 3:]
-        np.matmul(points[i], columns, out=coordinates[:, :, start:stop])
+        columns = table.to_cone[cone, :, :3] @ relative[:, :, start:stop].swapaxes(0, 1)
+        columns[3] += table.to_cone[cone, :, 3:]
+        np.matmul(points[i], columns.swapaxes(0, 1), out=coordinates[:, :, start:stop])
 
     # How much each point counts: from 0 half a voxel outside the cone to 1 half a voxel inside.
     radius, slope, half_length = np.repeat(table.shape[cones], sizes, axis=0).T

@@ -18,7 +18,8 @@ import cv2
 import numpy as np
 from scipy import ndimage
 
-from hmc.pose.annealed.overlap import OverlapTable, exact_overlap, make_overlap_table, particles_last, quick_overlap
+from hmc.pose.annealed.overlap import OverlapTable, exact_overlap, make_overlap_table, quick_overlap
+from hmc.pose.annealed.placing import place_segments
 from hmc.pose.body.flesh import FleshTable
 from hmc.pose.body.joints import SEGMENTS
 from hmc.pose.body.kinematics import segment_transforms
@@ -240,14 +241,13 @@ def scores(table: ScoreTable, states: np.ndarray, maps: ScoreMaps, exact: bool =
     ndarray, shape (n, n_parts, 4)
         Columns as in `SCORES`, each from 0 (good) to 1. Out is the fraction of the part's voxels outside the room.
     """
-    rotations, positions = segment_transforms(table.body, states)
-    placed = particles_last(rotations, positions, maps.origin)
     out = np.empty((len(states), len(PARTS), 4))
     if len(out) == 0:
         return out
+    placed = place_segments(table.body, states, maps.origin)
     out[..., 0], out[..., 2], out[..., 3] = map_scores(table, placed, maps)
     if exact:
-        out[..., 1] = exact_overlap(table.flesh, rotations, positions, maps.origin, maps.voxel_size_m)
+        out[..., 1] = exact_overlap(table.flesh, *segment_transforms(table.body, states), maps.origin, maps.voxel_size_m)
     else:
         out[..., 1] = quick_overlap(table.overlap, placed)
     return out
@@ -260,7 +260,7 @@ def map_scores(table: ScoreTable, placed: np.ndarray, maps: ScoreMaps) -> tuple[
     ----------
     table : ScoreTable
     placed : ndarray of float32, shape (11, 3, 4, n)
-        From `particles_last`, relative to the maps' origin.
+        From `place_segments`, counted from the maps' origin.
     maps : ScoreMaps
 
     Returns
