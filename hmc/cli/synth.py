@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 from pathlib import Path
 
 from hmc.cli.common import whole_number
@@ -36,5 +37,7 @@ def run(args: argparse.Namespace) -> int:
     recipe = load_recipe(args.recipe)
     total = recipe.n_frames + recipe.background_frames
     with tqdm(total=total, desc=f"rendering {recipe.name}", unit="frame", dynamic_ncols=True, disable=args.quiet) as bar:
-        render_recording(recipe, args.out, args.seed, args.workers or None, on_progress=lambda done, _: bar.update(done - bar.n))
+        render_recording(
+            recipe, args.out, args.seed, args.workers or os.cpu_count() or 1, on_progress=lambda done, _: bar.update(done - bar.n)
+        )
     return 0

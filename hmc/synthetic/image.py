@@ -97,17 +97,16 @@ def make_backdrop(scene: Scene, camera: Camera, furniture: tuple[ShadowMap, ...]
     width, height = camera.size
     v, u = np.mgrid[0:height, 0:width]
     pixels = np.stack([u.ravel(), v.ravel()], axis=1).astype(float)
-    ambient = scene.recipe.light.ambient
-    radiance = np.zeros((len(pixels), 3))
+    # Colours are averaged over each pixel; light, which changes slowly, is taken at its middle.
+    albedo = np.zeros((len(pixels), 3))
     for offset in ((-0.25, -0.25), (0.25, -0.25), (-0.25, 0.25), (0.25, 0.25)):
-        rays = backproject(camera, pixels + offset)
-        hits = cast_rays(scene.room, camera.centre, rays)
-        points = camera.centre + hits.distance[:, None] * rays
-        shares, index, distance = _light_surfaces(scene, points, hits.normal, furniture)
-        light = ambient * _open_sky(hits.normal)[:, None] + sum(
-            share[:, None] * lamp.power for share, lamp in zip(shares, scene.lights, strict=True)
-        )
-        radiance += hits.albedo * light / 4
+        albedo += cast_rays(scene.room, camera.centre, backproject(camera, pixels + offset)).albedo / 4
+    rays = backproject(camera, pixels)
+    hits = cast_rays(scene.room, camera.centre, rays)
+    points = camera.centre + hits.distance[:, None] * rays
+    shares, index, distance = _light_surfaces(scene, points, hits.normal, furniture)
+    ambient = scene.recipe.light.ambient * _open_sky(hits.normal)[:, None]
+    radiance = albedo * (ambient + sum(share[:, None] * lamp.power for share, lamp in zip(shares, scene.lights, strict=True)))
     depth = (points @ camera.rotation.T + camera.translation)[:, 2]
     corners = scene.room.corners
     on_floor = (points[:, 2] < 0.01) & (hits.normal[:, 2] > 0.5)
@@ -216,11 +215,9 @@ def _darken(scene: Scene, backdrop: Backdrop, lit: LitCrowd, radiance: np.ndarra
     taken = []
     for k, shadow in enumerate(lit.shadows):
         # Where anything is taken, the place must also lie behind the person, seen from the light.
-        share = np.append(shadow.taken.ravel(), np.float32(0))[backdrop.index[k]]
-        spread = int(np.ceil(2 * scene.lights[k].softness))
-        nearest = cv2.erode(shadow.distance, np.ones((2 * spread + 1, 2 * spread + 1), np.uint8))
+        share = shadow.taken[backdrop.index[k]]
         some = np.flatnonzero(share > 0.004)
-        share[some] *= backdrop.distance[k, some] > nearest.ravel()[backdrop.index[k, some]] + 0.02
+        share[some] *= backdrop.distance[k, some] > shadow.nearest[backdrop.index[k, some]] + 0.02
         taken.append(share)
     changed = np.flatnonzero((contact > 0.004) | (np.array(taken) > 0.004).any(axis=0))
     full = np.full((len(changed), 3), scene.recipe.light.ambient, np.float32)
@@ -253,10 +250,14 @@ def develop(radiance: np.ndarray, size: tuple[int, int], scene: Scene, rng: np.r
     # The gamma curve from a table: a power for every value would be the slowest step of all.
     place = np.clip(radiance * np.float32(gain * (_GAMMA.size - 1)), 0, _GAMMA.size - 1).astype(np.int32)
     grey = _GAMMA[place]
-    noise = rng.standard_normal(grey.shape, dtype=np.float32)
-    noise *= np.sqrt(np.float32(sensor.read_noise**2) + np.float32(sensor.shot_noise**2 / 255) * grey)
-    grey += noise
+    # Neighbouring pixels share noise, as after the interpolation of a colour sensor.
+    white = rng.standard_normal((size[1], size[0], 3), dtype=np.float32)
+    noise = np.asarray(cv2.GaussianBlur(white, (5, 5), _GRAIN_SIGMA)).reshape(grey.shape)
+    grey += noise * np.sqrt(np.float32(sensor.read_noise**2) + np.float32(sensor.shot_noise**2 / 255) * grey) / _GRAIN_SPREAD
     return np.clip(np.rint(grey), 0, 255).astype(np.uint8).reshape(size[1], size[0], 3)
 
 
+_GRAIN_SIGMA = 0.8
+#: What the blur leaves of the noise's standard deviation: the sum of the squared weights of its kernel.
+_GRAIN_SPREAD = np.float32((cv2.getGaussianKernel(5, _GRAIN_SIGMA) ** 2).sum())
 _GAMMA = (255 * np.linspace(0, 1, 8192) ** (1 / 2.2)).astype(np.float32)

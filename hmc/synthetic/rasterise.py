@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 __all__ = ["Fragments", "rasterise"]
-
-from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
@@ -57,8 +57,9 @@ def rasterise(points: np.ndarray, depth: np.ndarray, triangles: np.ndarray, size
     with np.errstate(invalid="ignore"):
         keep = np.isfinite(area) & ((area < -1e-9) if cull else (np.abs(area) > 1e-9))
     keep = np.flatnonzero(keep)
-    low = np.maximum(np.ceil(corners[keep].min(axis=1) - 1e-9), 0).astype(np.int64)
-    high = np.minimum(np.floor(corners[keep].max(axis=1) + 1e-9), [width - 1, height - 1]).astype(np.int64)
+    a, b, c = a[keep], b[keep], c[keep]
+    low = np.maximum(np.ceil(np.minimum(np.minimum(a, b), c) - 1e-9), 0).astype(np.int64)
+    high = np.minimum(np.floor(np.maximum(np.maximum(a, b), c) + 1e-9), [width - 1, height - 1]).astype(np.int64)
     extent = high - low + 1
     seen = (extent > 0).all(axis=1)
     keep, low, extent = keep[seen], low[seen], extent[seen]
@@ -70,14 +71,13 @@ def rasterise(points: np.ndarray, depth: np.ndarray, triangles: np.ndarray, size
         for side, group in _by_size(extent.max(axis=1))
     ]
     pixel, triangle, weights, near = (np.concatenate([piece[k] for piece in pieces]) for k in range(4))
-    # Sort by pixel and, within one, nearest first (largest inverse depth); then keep the first of each.
-    order = np.lexsort((triangle, -near, pixel))
-    pixel = pixel[order]
-    first = np.ones(len(pixel), bool)
-    first[1:] = pixel[1:] != pixel[:-1]
-    chosen = order[first]
-    weights, near = weights[chosen], near[chosen]
-    return Fragments(pixel[first], triangle[chosen], weights, 1 / near)
+    # Every pixel is written farthest first, so that the nearest stays; of equals, the last triangle.
+    order = np.argsort(near, kind="stable")
+    nearest = np.full(width * height, -1)
+    nearest[pixel[order]] = order
+    covered = np.flatnonzero(nearest >= 0)
+    chosen = nearest[covered]
+    return Fragments(covered, triangle[chosen], weights[chosen], 1 / near[chosen])
 
 
 def _by_size(extent: np.ndarray):

@@ -72,8 +72,8 @@ class LightRecipe:
 class ImageRecipe:
     """The sensor: noise in grey levels (of 255) at black, what the light adds at white, and the flicker of the gain (a fraction)."""
 
-    read_noise: float = 1.5
-    shot_noise: float = 2.0
+    read_noise: float = 1.8
+    shot_noise: float = 2.2
     flicker: float = 0.004
 
 

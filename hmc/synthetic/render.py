@@ -11,6 +11,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from hmc.camera.calibration import write_calibration
 from hmc.errors import InputError
@@ -34,7 +35,7 @@ def render_recording(
     recipe: Recipe | str | Path,
     out: str | Path,
     seed: int | None = None,
-    workers: int | None = None,
+    workers: int = 1,
     on_progress: Callable[[int, int], None] | None = None,
 ) -> Path:
     """Render a recipe into a recording with truth.
@@ -48,8 +49,8 @@ def render_recording(
         Folder of the recording; must not exist, or hold a recording that was rendered before (it is replaced).
     seed : int, optional
         In place of the recipe's. The same recipe and seed give the same recording, whatever the number of workers.
-    workers : int, optional
-        Processes; by default one a core.
+    workers : int
+        Processes. A script that asks for more than one must keep its top level behind ``if __name__ == "__main__":``.
     on_progress : callable, optional
         Called with the number of frames done and their total, once a frame.
 
@@ -69,7 +70,6 @@ def render_recording(
         out.is_dir() and (not any(out.iterdir()) or ((out / "calibration.toml").is_file() and (out / "truth").is_dir()))
     ):
         raise InputError(f"{out}: exists and is no rendered recording; choose another folder or remove it")
-    workers = workers or os.cpu_count() or 1
     scene = build_scene(recipe, seed)
     out.parent.mkdir(parents=True, exist_ok=True)
     part = out.with_name(f".{out.name}.{os.getpid()}.part")
@@ -202,7 +202,9 @@ _STUDIO: list[_Studio] = []
 
 
 def _open_studio(scene: Scene, store: Path) -> None:
+    # One thread each: the processes share the cores, and sums do not depend on how threads divide them.
     cv2.setNumThreads(1)
+    threadpool_limits(1)
     _STUDIO[:] = [_Studio(scene, store)]
 
 
@@ -217,9 +219,10 @@ def _render_frame(frame: int) -> Pictures:
 @contextmanager
 def _pool(workers: int, scene: Scene, store: Path) -> Iterator[tuple[Callable, Callable]]:
     """Two functions that map `_Studio.store_backdrop` over cameras and `_Studio.render` over frames, lazily and in order."""
-    if workers == 1:
-        studio = _Studio(scene, store)
-        yield (lambda cameras: map(studio.store_backdrop, cameras)), (lambda frames: map(studio.render, frames))
+    if workers <= 1:
+        with threadpool_limits(1):
+            studio = _Studio(scene, store)
+            yield (lambda cameras: map(studio.store_backdrop, cameras)), (lambda frames: map(studio.render, frames))
         return
     # Spawned, not forked: a fork copies the locks of threads that the parent may be running.
     with multiprocessing.get_context("spawn").Pool(workers, _open_studio, (scene, store)) as pool:

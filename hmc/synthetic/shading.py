@@ -41,9 +41,20 @@ class Light:
 
 @dataclass(frozen=True)
 class ShadowMap:
-    """What stands below a light: nearest distance (`MAP_SIZE`, `MAP_SIZE`), and how much of the light is taken, in [0, 1]."""
+    """What stands below a light.
+
+    Parameters
+    ----------
+    distance : ndarray, shape (MAP_SIZE, MAP_SIZE)
+        Of the nearest surface from the light, metres.
+    nearest : ndarray, shape (MAP_SIZE ** 2 + 1,)
+        The least distance in the neighbourhood of each pixel, as wide as the penumbra; a last entry, far away, serves index -1.
+    taken : ndarray, shape (MAP_SIZE ** 2 + 1,)
+        How much of the light is kept from what lies behind, in [0, 1]; a last entry, 0, serves index -1.
+    """
 
     distance: np.ndarray
+    nearest: np.ndarray
     taken: np.ndarray
 
 
@@ -109,8 +120,10 @@ def shadow_map(light: Light, vertices: np.ndarray, triangles: np.ndarray) -> Sha
     fragments = rasterise(uv, distance, triangles, (MAP_SIZE, MAP_SIZE), cull=False)
     nearest = np.full((MAP_SIZE, MAP_SIZE), _FAR)
     nearest.ravel()[fragments.pixels] = fragments.depth
+    width = 2 * max(3, int(np.ceil(2 * light.softness))) + 1
+    around = cv2.erode(nearest, np.ones((width, width), np.uint8))
     taken = cv2.GaussianBlur((nearest < _FAR).astype(np.float32), (0, 0), light.softness)
-    return ShadowMap(nearest, taken)
+    return ShadowMap(nearest, np.append(around.ravel(), _FAR), np.append(taken.ravel(), np.float32(0)))
 
 
 def soft_shadow(shadows: ShadowMap, index: np.ndarray, distance: np.ndarray, margin: float) -> np.ndarray:
@@ -125,8 +138,7 @@ def soft_shadow(shadows: ShadowMap, index: np.ndarray, distance: np.ndarray, mar
         Metres by which the hiding surface must be nearer to the light.
     """
     # Only where the neighbourhood holds something nearer to the light is there anything to compare.
-    nearest = np.append(cv2.erode(shadows.distance, np.ones((7, 7), np.uint8)).ravel(), _FAR)
-    some = np.flatnonzero(distance > nearest[index] + margin)
+    some = np.flatnonzero(distance > shadows.nearest[index] + margin)
     column, row = index[some] % MAP_SIZE, index[some] // MAP_SIZE
     total = np.zeros(len(some), np.float32)
     offsets = [(dx, dy) for dx in (-3, -1, 1, 3) for dy in (-3, -1, 1, 3)]
