@@ -93,6 +93,12 @@ def test_an_empty_room_and_a_selection(tmp_path, ring, capsys):
     assert len(read_tracks(tmp_path / "out" / "tracks.csv").frames) == 0
 
 
+def test_one_camera_finds_nobody_and_says_why(folder, tmp_path, capsys):
+    assert track(folder, tmp_path, "--frames", "3", "--cameras", "cam_00") == 0
+    captured = capsys.readouterr()
+    assert "3 frames" in captured.out and "one camera does not tell" in captured.err
+
+
 def test_what_was_survived_is_listed_at_the_end(tmp_path, ring, capsys):
     path = draw_recording(tmp_path / "take", ring, walk(10))
     (path / "images" / "cam_02" / "000004.png").write_bytes(b"no image")

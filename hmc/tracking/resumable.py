@@ -90,6 +90,8 @@ def track_recording(
 
     for line in problems:
         report(line)
+    if len(recording.rig) < 2:
+        report("one camera does not tell how far away people are; two at least are needed to find them, better four")
     end = recording.start + recording.n_frames
     stream = stream_hulls(recording, grid, frontend, first=done.next_frame, warm_up=WARM_UP_FRAMES, on_problem=note)
     hulls: Iterable[HullStep] = stream if done.next_frame < end else ()
