@@ -15,10 +15,10 @@ from _scene import ROOM
 from _timing import interleaved, report
 
 from hmc.montecarlo import annealed_step, filter_layer, particle_init, truncated_drift, truncated_normal
-from hmc.pose.annealed.canton2009 import CANTON2009, first_drift, score_log_likelihood
 from hmc.pose.annealed.overlap import exact_overlap, quick_overlap
 from hmc.pose.annealed.placing import place_segments
-from hmc.pose.annealed.scores import make_score_table, map_scores, observe
+from hmc.pose.annealed.presets import PRESETS, drift
+from hmc.pose.annealed.scores import ScoreVariances, log_likelihood_factorised, make_score_table, map_scores, observe, scores
 from hmc.pose.body.flesh import flesh_points, place_points
 from hmc.pose.body.kinematics import segment_transforms
 from hmc.pose.body.model import PARTS, neutral_state
@@ -43,6 +43,12 @@ def scene(voxel_m: float):
     return body, grid, pose, occupied
 
 
+def log_likelihood_of(table, maps):
+    """The factorised likelihood of the printed preset as a function of states."""
+    variances = ScoreVariances().by_part()
+    return lambda states: log_likelihood_factorised(scores(table, states, maps), variances)
+
+
 def bare_gather(table, states, maps):
     """One `take` of every voxel that the likelihood looks up: all points in the occupancy, the surface's in its map."""
     rotations, positions = segment_transforms(table.body, states)
@@ -63,7 +69,7 @@ def bare_gather(table, states, maps):
 
 def one_by_one(table, states, maps):
     """A whole layer's likelihood, particle by particle: NumPy over the points of one body, a Python loop over particles."""
-    flesh, variances = table.flesh, CANTON2009.variances.by_part()
+    flesh, variances = table.flesh, ScoreVariances().by_part()
     occupancy, surface, size = maps.occupancy, maps.surface / 255, maps.voxel_size_m
     values = np.empty(len(states))
     for n, state in enumerate(states):
@@ -106,11 +112,11 @@ def main() -> int:
         size = f"{voxel_m * 100:.0f} cm"
         for name, scale in DRIFTS.items():
             rng = np.random.default_rng(0)
-            states = truncated_normal(rng, np.tile(pose, (PARTICLES, 1)), first_drift(30) * scale, low, high)
+            states = truncated_normal(rng, np.tile(pose, (PARTICLES, 1)), drift(30) * scale, low, high)
             rotations, positions = segment_transforms(body, states)
             placed = place_segments(body, states, maps.origin)
-            state, drift = particle_init(states), truncated_drift(first_drift(30), low, high, scale)
-            likelihood = score_log_likelihood(table, maps)
+            state, propagate = particle_init(states), truncated_drift(drift(30), low, high, scale)
+            likelihood = log_likelihood_of(table, maps)
             # The layer draws from one point, so that its particles spread as those of the likelihood do.
             start = particle_init(pose[None])
             times = interleaved(
@@ -118,7 +124,7 @@ def main() -> int:
                     "gather": bare_gather(table, states, maps),
                     "likelihood": lambda t=table, p=placed, m=maps: map_scores(t, p, m),
                     "overlap": lambda t=table, p=placed: quick_overlap(t.overlap, p),
-                    "layer": lambda s=start, f=likelihood, d=drift, r=rng: filter_layer(r, s, f, d, PARTICLES, 0.5),
+                    "layer": lambda s=start, f=likelihood, d=propagate, r=rng: filter_layer(r, s, f, d, PARTICLES, 0.5),
                 }
             )
             gather = times["gather"]
@@ -132,7 +138,7 @@ def main() -> int:
                 loop = interleaved(
                     {
                         "loop": lambda t=table, s=some, m=maps: one_by_one(t, s, m),
-                        "layer": lambda s=state, f=likelihood, d=drift, r=rng: filter_layer(r, s, f, d, PARTICLES, 0.5),
+                        "layer": lambda s=state, f=likelihood, d=propagate, r=rng: filter_layer(r, s, f, d, PARTICLES, 0.5),
                     },
                     rounds=5,
                 )
@@ -142,8 +148,10 @@ def main() -> int:
                 )
 
         def frame(t=table, o=occupied, g=grid, p=pose, a=low, b=high):
-            likelihood = score_log_likelihood(t, observe(o, g))
-            return annealed_step(np.random.default_rng(0), particle_init(p[None]), likelihood, first_drift(30), a, b, CANTON2009.annealing)
+            likelihood = log_likelihood_of(t, observe(o, g))
+            return annealed_step(
+                np.random.default_rng(0), particle_init(p[None]), likelihood, drift(30), a, b, PRESETS["canton2009"].annealed
+            )
 
         seconds = interleaved({"frame": frame}, rounds=7)["frame"]
         good &= report("5d", f"6 layers of 600, frames a second, {size}", 1 / seconds, targets["fps"], at_least=True, note="with its maps")

@@ -14,7 +14,7 @@ from _timing import interleaved, report
 from scipy import stats
 
 from hmc.montecarlo import find_beta, systematic, truncated_normal
-from hmc.pose.annealed.canton2009 import first_drift
+from hmc.pose.annealed.presets import drift
 from hmc.pose.body.model import neutral_state
 from hmc.pose.body.proportions import default_body
 
@@ -34,8 +34,8 @@ def loop(rng, weights, n):
 def main() -> int:
     rng, body, good = np.random.default_rng(0), default_body(1.75), True
     low, high = body.limits.low, body.limits.high
-    mean = truncated_normal(rng, np.tile(neutral_state("down", body.limits), (600, 1)), first_drift(30), low, high)
-    sd = np.broadcast_to(first_drift(30), mean.shape)
+    mean = truncated_normal(rng, np.tile(neutral_state("down", body.limits), (600, 1)), drift(30), low, high)
+    sd = np.broadcast_to(drift(30), mean.shape)
     a, b = (low - mean) / sd, (high - mean) / sd
     times = interleaved(
         {
