@@ -81,7 +81,7 @@ def measure(n_people: int) -> tuple[float, float, float]:
         voxels += len(front_end(images, still).voxels)
         mixture.append(middle - start)
         whole.append(time.perf_counter() - middle)
-    ratio = (np.sum(whole) - np.sum(mixture)) / np.sum(mixture)
+    ratio = float(np.median(np.subtract(whole, mixture)) / np.median(mixture))
     with ThreadPoolExecutor(2) as pool:
         start = time.perf_counter()
         for images in frames:
