@@ -292,7 +292,7 @@ def _near(table: OverlapTable, placed: np.ndarray) -> tuple[np.ndarray, np.ndarr
     """Pairs whose capsules touch in some particle, shape (m,), and in which they do, shape (m, n).
 
     The distance of two line segments, by Ericson (2005), Real-Time Collision Detection, section 5.1.9, for the pairs whose
-    boxes around all particles touch.
+    boxes around all particles touch, and then their spheres.
     """
     axes, radius = np.concatenate([table.axes, table.cone_axes]), np.concatenate([table.radius, table.cone_radius])
     segments = np.concatenate([table.segment, table.cone_segment])
@@ -304,8 +304,13 @@ def _near(table: OverlapTable, placed: np.ndarray) -> tuple[np.ndarray, np.ndarr
     start, axis = ends[:, :, 0], ends[:, :, 1] - ends[:, :, 0]
     squared = np.sum((axes[:, 1] - axes[:, 0]) ** 2, axis=1)
     widest = radius.max(axis=1)
-    low, high = ends.min((2, 3)) - widest, ends.max((2, 3)) + widest
+    centre, sphere = start + axis * np.float32(0.5), np.sqrt(squared) / 2 + widest
+    low, high = centre.min(2) - sphere, centre.max(2) + sphere
     pairs = np.flatnonzero(np.all((low[:, first] < high[:, second]) & (high[:, first] > low[:, second]), axis=0))
+    between = centre[:, first[pairs]]
+    between -= centre[:, second[pairs]]
+    touching = _dot(between, between) < ((sphere[first] + sphere[second]) ** 2)[pairs, None]
+    pairs = pairs[np.any(touching, axis=1)]
 
     i, j = first[pairs], second[pairs]
     apart, axis_i, axis_j = start[:, i] - start[:, j], axis[:, i], axis[:, j]
@@ -346,7 +351,9 @@ def _shared(
     turn; `other` are the transforms of the segment.
     """
     one[:, 3] -= other[:, 3]
-    relative = np.add.reduce(other[:, :3, None] * one[:, None], axis=0)
+    relative = other[0, :3, None] * one[0]
+    for axis in (1, 2):
+        relative += other[axis, :3, None] * one[axis]
     coordinates = np.empty((3, points.shape[1], one.shape[-1]), np.float32)
     stop = 0
     for i, cone, size in zip(pieces, cones, sizes, strict=True):
