@@ -13,8 +13,7 @@ import numpy as np
 from hmc.landmarks import LANDMARKS
 from hmc.pose.annealed.hull_target import HullTarget, sample_points
 from hmc.pose.annealed.refine import RefineSettings, refine
-from hmc.pose.annealed.symmetric import SymmetricSettings, symmetric_cost
-from hmc.pose.body.flesh import SurfaceSamples
+from hmc.pose.annealed.symmetric import BodyPoints, SymmetricSettings, symmetric_cost
 from hmc.pose.body.inverse import fit_landmarks
 from hmc.pose.body.joints import dof_index
 from hmc.pose.body.kinematics import landmarks
@@ -75,7 +74,7 @@ def template_states(body: BodyModel, xy: np.ndarray, floor_z: float, headings: n
 def first_poses(
     rng: np.random.Generator,
     body: BodyModel,
-    samples: SurfaceSamples,
+    samples: BodyPoints,
     target: HullTarget,
     cost_settings: SymmetricSettings,
     floor_z: float = 0.0,

@@ -17,8 +17,10 @@ from hmc.montecarlo.filters import AnnealedSettings
 from hmc.pose.annealed.apf import PoseFilter, PoseInfo, PoseState, make_filter, pose_init, pose_step
 from hmc.pose.annealed.fit_body import FitBodyInfo, fit_body
 from hmc.pose.annealed.hull_target import HullTarget, sample_points
+from hmc.pose.annealed.limb_search import LIMBS, search_limbs
 from hmc.pose.annealed.presets import PosePreset
 from hmc.pose.annealed.refine import refine
+from hmc.pose.annealed.symmetric import symmetric_cost
 from hmc.pose.body.flesh import surface_coordinates
 from hmc.pose.body.kinematics import landmarks
 from hmc.pose.body.model import BodyModel, neutral_state
@@ -224,6 +226,8 @@ def _best_hypothesis(frame_rng, filt, fps, targets, usable, velocities, floor_z,
             chosen.append(state)
         if len(chosen) == settings.candidates:
             break
+    if preset.search is not None:
+        chosen = [_search_all(frame_rng(anchor), filt, state, targets[anchor], points) for state in chosen]
     quick = replace(preset, annealed=AnnealedSettings(layers=2, particles=60, survival_rate=0.1, spread=0.5), search=None)
     quick_filter = replace(filt, preset=quick)
     reach = max(2, round(settings.follow_s * fps))
@@ -236,6 +240,15 @@ def _best_hypothesis(frame_rng, filt, fps, targets, usable, velocities, floor_z,
         scores.append(np.nanmean(costs) * (1 + settings.walk_penalty * _backwards(headings, velocities[first:last], settings)))
     order = np.argsort(scores)
     return anchor, chosen[order[0]], np.array(scores)[order]
+
+
+def _search_all(rng, filt, state, target, points):
+    """A candidate with each limb where it explains the hulls best."""
+    preset = filt.preset
+    cost = float(symmetric_cost(filt.body, filt.samples, state[None], target, points, preset.symmetric)[0])
+    return search_limbs(
+        rng, filt.body, filt.samples, state, cost, list(LIMBS), target, points, preset.symmetric, preset.refine, preset.search
+    )[0]
 
 
 def _backwards(headings: np.ndarray, velocities: np.ndarray, settings: StartSettings) -> float:

@@ -24,8 +24,8 @@ from hmc.pose.annealed.scores import (
     observe,
     scores,
 )
-from hmc.pose.annealed.symmetric import symmetric_cost
-from hmc.pose.body.flesh import SurfaceSamples, flesh_points, surface_coordinates, surface_samples
+from hmc.pose.annealed.symmetric import BodyPoints, body_points, symmetric_cost
+from hmc.pose.body.flesh import flesh_points, surface_coordinates
 from hmc.pose.body.model import BodyModel
 from hmc.voxels.grid import VoxelGrid
 
@@ -42,8 +42,8 @@ class PoseFilter:
     Parameters
     ----------
     body : BodyModel
-    samples : SurfaceSamples
-        Of the body's surface.
+    samples : BodyPoints
+        At which the symmetric cost is taken.
     preset : PosePreset
     drift : ndarray, shape (27,)
         P0, metres and radians.
@@ -54,7 +54,7 @@ class PoseFilter:
     """
 
     body: BodyModel
-    samples: SurfaceSamples
+    samples: BodyPoints
     preset: PosePreset
     drift: np.ndarray
     table: ScoreTable | None = None
@@ -118,7 +118,7 @@ def make_filter(body: BodyModel, preset: PosePreset, fps: float, voxel_size_m: f
     room : ndarray, shape (2, 3), optional
         Limits of the room, metres.
     """
-    samples = surface_samples(body, surface_coordinates(body, preset.surface_samples))
+    samples = body_points(body, surface_coordinates(body, preset.surface_samples))
     table = None if preset.likelihood == "symmetric" else make_score_table(body, flesh_points(body, preset.density * voxel_size_m))
     return PoseFilter(body, samples, preset, preset.drift_scale * drift(fps), table, room)
 
@@ -184,7 +184,7 @@ def _polish(rng, filt, preset, starts, anchor, target):
     estimate, best = min(trials, key=lambda trial: trial[1].cost_after)
     cost, searched = best.cost_after, []
     if preset.search is not None:
-        searched = lost_limbs(body, samples, estimate, target, points, preset.search)
+        searched = lost_limbs(rng, body, samples, estimate, target, points, preset.search)
         if searched:
             estimate, cost, more = search_limbs(
                 rng, body, samples, estimate, cost, searched, target, points, preset.symmetric, preset.refine, preset.search

@@ -15,8 +15,7 @@ import numpy as np
 
 from hmc.pose.annealed.hull_target import HullTarget
 from hmc.pose.annealed.refine import residual_rows, residual_values
-from hmc.pose.annealed.symmetric import SymmetricSettings
-from hmc.pose.body.flesh import surface_samples
+from hmc.pose.annealed.symmetric import SymmetricSettings, body_points
 from hmc.pose.body.joints import N_DOF
 from hmc.pose.body.model import BodyModel
 from hmc.pose.body.proportions import make_body
@@ -106,7 +105,7 @@ def fit_body(
         bodies = [_reshaped(body, shape)]
         step = 0.01
         bodies += [_reshaped(body, shape + step * unit) for unit in np.eye(len(shape))]
-        surfaces = [surface_samples(one, coordinates) for one in bodies]
+        surfaces = [body_points(one, coordinates) for one in bodies]
         out = []
         for state, target, points in zip(states, targets, hull_points, strict=True):
             residual, jacobian = residual_rows(bodies[0], surfaces[0], state, target, points, cost_settings)
@@ -116,7 +115,7 @@ def fit_body(
 
     def costs(shape, states):
         one = _reshaped(body, shape)
-        samples = surface_samples(one, coordinates)
+        samples = body_points(one, coordinates)
         data = [residual_values(one, samples, s, t, p, cost_settings) for s, t, p in zip(states, targets, hull_points, strict=True)]
         fit = sum(float(r @ r) for r in data)
         total = fit + float((hold * (states - anchors) ** 2).sum()) + len(states) * float(precision @ shape**2)

@@ -8,8 +8,7 @@ import numpy as np
 
 from hmc.pose.annealed.hull_target import HullTarget, sample_points
 from hmc.pose.annealed.refine import RefineSettings, refine
-from hmc.pose.annealed.symmetric import SymmetricSettings, body_distance, outside_distance, symmetric_cost
-from hmc.pose.body.flesh import SurfaceSamples
+from hmc.pose.annealed.symmetric import BodyPoints, SymmetricSettings, body_distance, outside_distance, symmetric_cost
 from hmc.pose.body.joints import DOF_NAMES, dof_index
 from hmc.pose.body.model import PARTS, BodyModel
 
@@ -52,14 +51,22 @@ class SearchSettings:
     far_m: float = 0.05
     outside_share: float = 0.25
     unexplained_share: float = 0.02
-    draws: int = 200
+    draws: int = 150
     gain: float = 0.03
 
 
 def lost_limbs(
-    body: BodyModel, samples: SurfaceSamples, state: np.ndarray, target: HullTarget, hull_points: np.ndarray, settings: SearchSettings
+    rng: np.random.Generator,
+    body: BodyModel,
+    samples: BodyPoints,
+    state: np.ndarray,
+    target: HullTarget,
+    hull_points: np.ndarray,
+    settings: SearchSettings,
 ) -> list[str]:
-    """Limbs that the hulls contradict, and all four where much of the hull is unexplained.
+    """Limbs that the hulls contradict, and all four where much of the hull is unexplained; else one picked at random.
+
+    The random one is for limbs that rest in a wrong place which is nearly as good, a folded arm before the chest say.
 
     Returns
     -------
@@ -69,14 +76,15 @@ def lost_limbs(
     unexplained = body_distance(body, state[None], hull_points)[0]
     if (unexplained > settings.far_m).mean() > settings.unexplained_share:
         return list(LIMBS)
-    outside = outside_distance(body, samples, state[None], target)[0] > settings.far_m
-    return [limb for limb, parts in _PARTS.items() if outside[np.isin(samples.part, parts)].mean() > settings.outside_share]
+    outside = outside_distance(body, samples.surface, state[None], target)[0] > settings.far_m
+    lost = [limb for limb, parts in _PARTS.items() if outside[np.isin(samples.surface.part, parts)].mean() > settings.outside_share]
+    return lost or [str(rng.choice(list(LIMBS)))]
 
 
 def search_limbs(
     rng: np.random.Generator,
     body: BodyModel,
-    samples: SurfaceSamples,
+    samples: BodyPoints,
     state: np.ndarray,
     cost: float,
     limbs: list[str],

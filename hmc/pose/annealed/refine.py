@@ -12,8 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from hmc.pose.annealed.hull_target import HullTarget, distance_at
-from hmc.pose.annealed.symmetric import SymmetricSettings, body_distance
-from hmc.pose.body.flesh import SurfaceSamples, place_points
+from hmc.pose.annealed.penetration import penetration_depth, penetration_rows
+from hmc.pose.annealed.symmetric import POSTURE, BodyPoints, SymmetricSettings, body_distance
+from hmc.pose.body.flesh import place_points
 from hmc.pose.body.joints import N_DOF
 from hmc.pose.body.kinematics import dof_masks, joint_twists, segment_transforms
 from hmc.pose.body.model import BodyModel
@@ -54,7 +55,7 @@ class RefineInfo:
 
 def refine(
     body: BodyModel,
-    samples: SurfaceSamples,
+    samples: BodyPoints,
     state: np.ndarray,
     target: HullTarget,
     hull_points: np.ndarray,
@@ -127,7 +128,7 @@ def refine(
 
 def residual_rows(
     body: BodyModel,
-    samples: SurfaceSamples,
+    samples: BodyPoints,
     state: np.ndarray,
     target: HullTarget,
     hull_points: np.ndarray,
@@ -143,18 +144,19 @@ def residual_rows(
 
     Returns
     -------
-    residuals : ndarray, shape (n_samples + n_hull_points,)
+    residuals : ndarray, shape (n_residuals,)
         Their squares sum to the cost; square metres.
-    jacobian : ndarray, shape (n_samples + n_hull_points, 27)
+    jacobian : ndarray, shape (n_residuals, 27)
         Zero where a distance is zero or beyond the cap.
     """
     axes, centres, rotations, positions = joint_twists(body, state)
     moments = np.cross(axes, centres)
-    points = place_points(rotations, positions, samples.points, samples.segment)
+    surface = samples.surface
+    points = place_points(rotations, positions, surface.points, surface.segment)
     value, slope = _field(target, points)
     residuals, jacobians = [], []
     for distance, direction, where, segment, weight in (
-        (value, slope, points, samples.segment, 1.0 / len(points)),
+        (value, slope, points, surface.segment, 1.0 / len(points)),
         (*_hull_to_body(body, rotations, positions, hull_points), settings.explain_weight / len(hull_points)),
     ):
         # g . (axis x (p - centre)) = (p x g) . axis - g . (axis x centre)
@@ -164,12 +166,21 @@ def residual_rows(
         jacobian *= _MASKS[segment] * (np.sqrt(weight) * pull)[:, None]
         residuals.append(np.sqrt(weight) * np.minimum(distance, settings.cap_m))
         jacobians.append(jacobian)
+    depth, outward, where, segment, other = penetration_rows(body, samples.axes, rotations, positions)
+    weight = np.sqrt(settings.overlap_weight / len(depth))
+    jacobian = np.cross(where, outward) @ axes.T - outward @ moments.T
+    # What carries both parts leaves them where they are to one another.
+    jacobian *= (_MASKS[other] - _MASKS[segment]) * (weight * (depth > 0))[:, None]
+    residuals.append(weight * depth)
+    jacobians.append(jacobian)
+    residuals.append(_posture(state, settings))
+    jacobians.append(np.diag(np.sqrt(settings.posture_weight) / POSTURE[1]))
     return np.concatenate(residuals), np.concatenate(jacobians)
 
 
 def residual_values(
     body: BodyModel,
-    samples: SurfaceSamples,
+    samples: BodyPoints,
     state: np.ndarray,
     target: HullTarget,
     hull_points: np.ndarray,
@@ -177,15 +188,23 @@ def residual_values(
 ) -> np.ndarray:
     """The residuals of `residual_rows` alone, at a fraction of the work."""
     rotations, positions = segment_transforms(body, state)
-    outside = distance_at(target, place_points(rotations, positions, samples.points, samples.segment), smooth=True)
+    surface = samples.surface
+    outside = distance_at(target, place_points(rotations, positions, surface.points, surface.segment), smooth=True)
+    depth = penetration_depth(body, samples.axes, rotations[None], positions[None])[0]
     unexplained = body_distance(body, state[None], hull_points)[0]
     cap = settings.cap_m
     return np.concatenate(
         [
             np.sqrt(1 / len(outside)) * np.minimum(outside, cap).astype(float),
             np.sqrt(settings.explain_weight / len(hull_points)) * np.minimum(unexplained, cap).astype(float),
+            np.sqrt(settings.overlap_weight / len(depth)) * depth,
+            _posture(state, settings),
         ]
     )
+
+
+def _posture(state: np.ndarray, settings: SymmetricSettings) -> np.ndarray:
+    return np.sqrt(settings.posture_weight) * (state - POSTURE[0]) / POSTURE[1]
 
 
 def _field(target: HullTarget, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

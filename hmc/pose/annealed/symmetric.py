@@ -12,14 +12,34 @@ from dataclasses import dataclass
 import numpy as np
 
 from hmc.pose.annealed.hull_target import HullTarget, distance_at
-from hmc.pose.body.flesh import SurfaceSamples, place_points
+from hmc.pose.annealed.penetration import AxisPoints, axis_points, penetration_depth
+from hmc.pose.body.flesh import SurfaceSamples, place_points, surface_samples
+from hmc.pose.body.joints import DOF_NAMES
 from hmc.pose.body.kinematics import segment_transforms
 from hmc.pose.body.model import BodyModel
 
-__all__ = ["SymmetricSettings", "body_distance", "outside_distance", "symmetric_cost"]
+__all__ = ["POSTURE", "BodyPoints", "SymmetricSettings", "body_distance", "body_points", "outside_distance", "symmetric_cost"]
 
 #: Elements (states x cones x points) worked on at a time: what stays in the second-level cache.
 CHUNK = 65536
+
+
+# Angles at rest and how far people commonly go from there, degrees; what is not named rests at 0.
+_REST_DEG = {"r_shoulder_x": 75, "l_shoulder_x": -75, "r_elbow_z": 25, "l_elbow_z": -25, "torso_y": 5, "r_knee_y": 8, "l_knee_y": 8}
+_SPREAD_DEG = {
+    "torso_x": 25, "torso_y": 45, "torso_z": 25, "neck_x": 25, "neck_y": 30,
+    "shoulder_x": 90, "shoulder_y": 40, "shoulder_z": 70, "elbow_z": 90,
+    "hip_x": 30, "hip_y": 70, "hip_z": 25, "knee_y": 90,
+}  # fmt: skip
+
+
+def _posture() -> tuple[np.ndarray, np.ndarray]:
+    spread = [next((value for key, value in _SPREAD_DEG.items() if name.endswith(key)), np.inf) for name in DOF_NAMES]
+    return np.radians([_REST_DEG.get(name, 0.0) for name in DOF_NAMES]), np.radians(spread)
+
+
+#: Rest and spread of every angle, radians, each of shape (27,); the root's are free (spread infinite).
+POSTURE = _posture()
 
 
 @dataclass(frozen=True)
@@ -32,10 +52,30 @@ class SymmetricSettings:
         Distances beyond this count as this (metres), so that furniture in the hull or a cut-off limb cannot pull without end.
     explain_weight : float
         Weight of unexplained hull against body outside the hull.
+    overlap_weight : float
+        Weight of parts that reach into one another.
+    posture_weight : float
+        Square metres that an angle one `POSTURE` spread away from rest costs: it decides between poses that the hulls do not
+        tell apart, such as the ways to fold an arm before the chest.
     """
 
     cap_m: float = 0.20
     explain_weight: float = 1.0
+    overlap_weight: float = 2.0
+    posture_weight: float = 3e-6
+
+
+@dataclass(frozen=True)
+class BodyPoints:
+    """Points of one body at which the cost is taken: its surface, and the axes of its limbs."""
+
+    surface: SurfaceSamples
+    axes: AxisPoints
+
+
+def body_points(body: BodyModel, coordinates: tuple[np.ndarray, np.ndarray, np.ndarray]) -> BodyPoints:
+    """The points of a body, its surface sampled at given coordinates (`hmc.pose.body.flesh.surface_coordinates`)."""
+    return BodyPoints(surface_samples(body, coordinates), axis_points(body))
 
 
 def outside_distance(body: BodyModel, samples: SurfaceSamples, states: np.ndarray, target: HullTarget) -> np.ndarray:
@@ -107,18 +147,18 @@ def body_distance(body: BodyModel, states: np.ndarray, points: np.ndarray) -> np
 
 def symmetric_cost(
     body: BodyModel,
-    samples: SurfaceSamples,
+    points: BodyPoints,
     states: np.ndarray,
     target: HullTarget,
     hull_points: np.ndarray,
     settings: SymmetricSettings,
 ) -> np.ndarray:
-    """Mean squared distance of the body from the hulls and of the hull from the body.
+    """Mean squared distance of the body from the hulls, of the hull from the body, depth of its parts in one another, and posture.
 
     Parameters
     ----------
     body : BodyModel
-    samples : SurfaceSamples
+    points : BodyPoints
     states : ndarray, shape (n, 27)
     target : HullTarget
     hull_points : ndarray, shape (k, 3)
@@ -131,9 +171,13 @@ def symmetric_cost(
         Square metres.
     """
     cap = np.float32(settings.cap_m)
-    outside = np.minimum(outside_distance(body, samples, states, target), cap)
+    outside = np.minimum(outside_distance(body, points.surface, states, target), cap)
     unexplained = np.minimum(body_distance(body, states, hull_points), cap)
+    rotations, positions = segment_transforms(body, states)
+    depth = penetration_depth(body, points.axes, rotations.astype(np.float32), positions.astype(np.float32))
     return (
         np.einsum("ij,ij->i", outside, outside) / outside.shape[1]
-        + settings.explain_weight * np.einsum("ij,ij->i", unexplained, unexplained) / unexplained.shape[1]
+        + settings.explain_weight / unexplained.shape[1] * np.einsum("ij,ij->i", unexplained, unexplained)
+        + settings.overlap_weight / depth.shape[1] * np.einsum("ij,ij->i", depth, depth)
+        + settings.posture_weight * (((states - POSTURE[0]) / POSTURE[1]) ** 2).sum(1)
     )
