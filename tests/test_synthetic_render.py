@@ -210,6 +210,11 @@ def test_wrong_recipes_get_one_clear_line(changes, words):
         recipe_from(small(**changes))
 
 
+def test_walking_into_a_wall_is_refused():
+    with pytest.raises(InputError, match=r"actor 1 walks into a wall after 1\.\d s"):
+        build_scene(recipe_from(small(seconds=5, actor=[{"motion": "walk"}])))
+
+
 def test_a_missing_name_and_a_broken_file_are_refused(tmp_path):
     with pytest.raises(InputError, match="'name' is missing"):
         recipe_from({})

@@ -37,7 +37,7 @@ MOTIONS = ("walk", "jog", "stand", "box", "gesture", "throw_catch", "sit", "pick
 
 @dataclass(frozen=True)
 class RigRecipe:
-    """Cameras; see `hmc.synthetic.rigs.make_rig`."""
+    """Cameras; see `hmc.synthetic.rigs.make_rig`. A `field_of_view_deg` (horizontal, degrees) of 0 takes the rig's own."""
 
     kind: str = "ring7"
     size_px: tuple[int, int] = (640, 480)
@@ -91,7 +91,38 @@ class FurnitureRecipe:
 
 @dataclass(frozen=True)
 class ActorRecipe:
-    """One person: body, clothes and motion."""
+    """One person: body, clothes and motion.
+
+    Parameters
+    ----------
+    height_m : float
+        Stature.
+    build : str or float
+        thin, slim, average, sturdy, heavy, or a number from -1 to 1.
+    sex : {"man", "woman"}
+    shirt, trousers, skin, hair, shoes, pattern_colour : tuple of float
+        sRGB in [0, 1].
+    pattern : {"plain", "stripes", "checks", "dots"}
+        Of the shirt.
+    sleeves, legs : {"long", "short"}
+    long_hair : bool
+    loose_m : float
+        How far clothes stand off the body, metres.
+    motion : str
+        One of `MOTIONS`.
+    start_m : (x, y)
+        Place at the first frame, metres.
+    heading_deg : float
+        Where the person faces at the first frame, degrees from x towards y.
+    speed_m_s : float
+        Of walking and jogging; 0 takes 1.25 and 2.2.
+    turn_radius_m : float
+        Of the circle walked, to the left if positive, to the right if negative; 0 goes straight.
+    bvh : str
+        Motion file for ``motion = "bvh"``, relative to the recipe.
+    bvh_start_s : float
+        Where in the file the clip begins.
+    """
 
     height_m: float = 1.75
     build: str | float = "average"

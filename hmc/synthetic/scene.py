@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hmc.camera.model import Rig
+from hmc.errors import InputError
 from hmc.synthetic.actor import Actor, make_actor, pose_mesh
 from hmc.synthetic.clothes import Clothes
 from hmc.synthetic.library import make_motion
@@ -75,6 +76,11 @@ def build_scene(recipe: Recipe, seed: int | None = None) -> Scene:
     Returns
     -------
     Scene
+
+    Raises
+    ------
+    InputError
+        When somebody leaves the room.
     """
     seed = recipe.seed if seed is None else seed
     rng_rig, rng_room, rng_light, *rng_actors = (
@@ -111,6 +117,12 @@ def build_scene(recipe: Recipe, seed: int | None = None) -> Scene:
         actor = make_actor(a.height_m, a.build, rng_actors[2 * k], a.sex, clothes, recipe.cell_m)
         actors.append(actor)
         motions.append(make_motion(a, actor.skeleton, times, rng_actors[2 * k + 1]))
+        outside = np.flatnonzero((np.abs(motions[-1].root[:, :2]) > corners[1, :2] - 0.3).any(axis=1))
+        if outside.size:
+            raise InputError(
+                f"recipe '{recipe.name}': actor {k + 1} walks into a wall after {times[outside[0]]:.1f} s; "
+                "change start_m, heading_deg, turn_radius_m or speed_m_s, make the clip shorter (seconds) or the room larger (size_m)"
+            )
     return Scene(recipe, seed, rig, room, lights, tuple(actors), tuple(motions))
 
 
