@@ -19,8 +19,8 @@ from hmc.pose.body.model import PARTS, BodyModel, Cones
 
 __all__ = ["OverlapTable", "exact_overlap", "make_overlap_table", "quick_overlap"]
 
-#: Points tested a piece.
-TEST_POINTS = 24
+#: Points tested a piece: more hardly raise the correlation with the exact count, .99 over a first layer's particles.
+TEST_POINTS = 16
 #: Points tested for the tables of joints, and nodes along each side of such a table: some 6 degrees apart.
 JOINT_POINTS = 256
 JOINT_NODES = 33
