@@ -9,7 +9,7 @@ from scipy import ndimage
 
 from hmc.voxels.grid import VoxelGrid
 
-__all__ = ["HullTarget", "distance_at", "make_target", "sample_points"]
+__all__ = ["HullTarget", "distance_at", "distance_gradient", "make_target", "sample_points"]
 
 #: Room left around a person's voxels in the distance field, metres: limbs of wrong guesses still see the way back.
 MARGIN_M = 0.35
@@ -94,7 +94,7 @@ def sample_points(rng: np.random.Generator, points: np.ndarray, n: int) -> np.nd
     return points[(edges[:-1] + rng.random(n) * np.diff(edges)).astype(int)]
 
 
-def distance_at(target: HullTarget, points: np.ndarray, smooth: bool = False) -> np.ndarray:
+def distance_at(target: HullTarget, points: np.ndarray) -> np.ndarray:
     """Distance of points to the tolerant hull, metres; 0 inside. Beyond the crop the distance to its border is added.
 
     Parameters
@@ -102,28 +102,57 @@ def distance_at(target: HullTarget, points: np.ndarray, smooth: bool = False) ->
     target : HullTarget
     points : ndarray, shape (..., 3)
         World, metres.
-    smooth : bool
-        Interpolate between voxels (eight reads a point in place of one).
 
     Returns
     -------
     ndarray of float32, shape (...)
+        Of the voxel in which the point lies.
     """
-    shape = np.array(target.distance.shape)
-    place = (points - target.origin.astype(points.dtype)) * points.dtype.type(1 / target.voxel_size_m)
-    inner = np.clip(place, 0, (shape - 1).astype(points.dtype))
-    beyond = np.sqrt(np.einsum("...i,...i->...", place - inner, place - inner)) * points.dtype.type(target.voxel_size_m)
-    strides = np.array([shape[1] * shape[2], shape[2], 1])
-    flat = target.distance.ravel()
-    if not smooth:
-        index = (inner + points.dtype.type(0.5)).astype(np.int64)
-        return flat.take(index @ strides, mode="clip") + beyond
-    base = np.minimum(inner.astype(np.int64), shape - 2)
-    part = inner - base
-    index = base @ strides
-    value = np.zeros(index.shape, np.float32)
-    for corner in range(8):
-        bits = np.array([corner >> 2 & 1, corner >> 1 & 1, corner & 1])
-        weight = np.prod(np.where(bits == 1, part, 1 - part), axis=-1)
-        value += (weight * flat.take(index + bits @ strides, mode="clip")).astype(np.float32)
-    return value + beyond.astype(np.float32)
+    inner, beyond, strides = _place(target, points)
+    index = (inner + points.dtype.type(0.5)).astype(np.int32) @ strides
+    return target.distance.ravel().take(index, mode="clip") + beyond
+
+
+def distance_gradient(target: HullTarget, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The same distance, interpolated between voxels, and its gradient.
+
+    Parameters
+    ----------
+    target : HullTarget
+    points : ndarray, shape (n, 3)
+        World, metres.
+
+    Returns
+    -------
+    distance : ndarray, shape (n,)
+        Metres.
+    gradient : ndarray, shape (n, 3)
+        Of the interpolation.
+    """
+    inner, beyond, strides = _place(target, points)
+    base = np.minimum(inner.astype(np.int32), np.array(target.distance.shape, np.int32) - 2)
+    x, y, z = (inner - base).T
+    corners = (base @ strides)[:, None] + _CORNERS @ strides
+    v = target.distance.ravel().take(corners, mode="clip").astype(float).T.reshape(2, 2, 2, -1)
+    along_z = v[:, :, 0] + z * (v[:, :, 1] - v[:, :, 0])
+    along_y = along_z[:, 0] + y * (along_z[:, 1] - along_z[:, 0])
+    value = along_y[0] + x * (along_y[1] - along_y[0])
+    by_z = v[:, :, 1] - v[:, :, 0]
+    by_z = by_z[:, 0] + y * (by_z[:, 1] - by_z[:, 0])
+    by_y = along_z[:, 1] - along_z[:, 0]
+    slope = np.stack([along_y[1] - along_y[0], by_y[0] + x * (by_y[1] - by_y[0]), by_z[0] + x * (by_z[1] - by_z[0])], axis=1)
+    return value + beyond, slope / target.voxel_size_m
+
+
+_CORNERS = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)], np.int32)
+
+
+def _place(target: HullTarget, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Points in voxels, held inside the crop; how far outside they were, metres; strides of the flat crop."""
+    shape = target.distance.shape
+    kind = points.dtype.type
+    place = (points - target.origin.astype(points.dtype)) * kind(1 / target.voxel_size_m)
+    inner = np.clip(place, kind(0), np.array(shape, points.dtype) - kind(1))
+    off = place - inner
+    beyond = np.sqrt(np.einsum("...i,...i->...", off, off)) * kind(target.voxel_size_m)
+    return inner, beyond, np.array([shape[1] * shape[2], shape[2], 1], np.int32)

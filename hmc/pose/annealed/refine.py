@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hmc.pose.annealed.hull_target import HullTarget, distance_at
+from hmc.pose.annealed.hull_target import HullTarget, distance_gradient
 from hmc.pose.annealed.penetration import penetration_depth, penetration_rows
 from hmc.pose.annealed.symmetric import POSTURE, BodyPoints, SymmetricSettings, body_distance
 from hmc.pose.body.flesh import place_points
@@ -150,17 +150,17 @@ def residual_rows(
         Zero where a distance is zero or beyond the cap.
     """
     axes, centres, rotations, positions = joint_twists(body, state)
-    moments = np.cross(axes, centres)
+    moments = _cross(axes, centres)
     surface = samples.surface
     points = place_points(rotations, positions, surface.points, surface.segment)
-    value, slope = _field(target, points)
+    value, slope = distance_gradient(target, points)
     residuals, jacobians = [], []
     for distance, direction, where, segment, weight in (
         (value, slope, points, surface.segment, 1.0 / len(points)),
         (*_hull_to_body(body, rotations, positions, hull_points), settings.explain_weight / len(hull_points)),
     ):
         # g . (axis x (p - centre)) = (p x g) . axis - g . (axis x centre)
-        jacobian = np.cross(where, direction) @ axes.T - direction @ moments.T
+        jacobian = _cross(where, direction) @ axes.T - direction @ moments.T
         jacobian[:, :3] = direction
         pull = (distance > 0) & (distance < settings.cap_m)
         jacobian *= _MASKS[segment] * (np.sqrt(weight) * pull)[:, None]
@@ -168,7 +168,7 @@ def residual_rows(
         jacobians.append(jacobian)
     depth, outward, where, segment, other = penetration_rows(body, samples.axes, rotations, positions)
     weight = np.sqrt(settings.overlap_weight / len(depth))
-    jacobian = np.cross(where, outward) @ axes.T - outward @ moments.T
+    jacobian = _cross(where, outward) @ axes.T - outward @ moments.T
     # What carries both parts leaves them where they are to one another.
     jacobian *= (_MASKS[other] - _MASKS[segment]) * (weight * (depth > 0))[:, None]
     residuals.append(weight * depth)
@@ -189,7 +189,7 @@ def residual_values(
     """The residuals of `residual_rows` alone, at a fraction of the work."""
     rotations, positions = segment_transforms(body, state)
     surface = samples.surface
-    outside = distance_at(target, place_points(rotations, positions, surface.points, surface.segment), smooth=True)
+    outside, _ = distance_gradient(target, place_points(rotations, positions, surface.points, surface.segment))
     depth = penetration_depth(body, samples.axes, rotations[None], positions[None])[0]
     unexplained = body_distance(body, state[None], hull_points)[0]
     cap = settings.cap_m
@@ -207,12 +207,11 @@ def _posture(state: np.ndarray, settings: SymmetricSettings) -> np.ndarray:
     return np.sqrt(settings.posture_weight) * (state - POSTURE[0]) / POSTURE[1]
 
 
-def _field(target: HullTarget, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Distance to the tolerant hull and its gradient, by central differences over a voxel."""
-    step = 0.5 * target.voxel_size_m
-    offsets = np.concatenate([np.zeros((1, 3)), step * np.eye(3), -step * np.eye(3)])
-    values = distance_at(target, points + offsets[:, None, :], smooth=True).astype(float)
-    return values[0], ((values[1:4] - values[4:7]) / (2 * step)).T
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Cross product of rows; `numpy.cross` spends more time on its arguments than on the product."""
+    x, y, z = a.T
+    u, v, w = b.T
+    return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=1)
 
 
 def _hull_to_body(body: BodyModel, rotations, positions, points):
@@ -220,19 +219,22 @@ def _hull_to_body(body: BodyModel, rotations, positions, points):
     cones = body.cones
     turn = cones.bases @ np.swapaxes(rotations[cones.segment], -1, -2)
     start = positions[cones.segment] + (rotations[cones.segment] @ cones.start[..., None])[..., 0]
-    local = np.einsum("cij,ckj->cki", turn, points[None] - start[:, None])
-    along = local[..., 2]
-    clipped = np.clip(along, 0, cones.lengths[:, None])
+    shift = (turn @ start[..., None])[..., 0]
+    local = (turn.reshape(-1, 3) @ points.T).reshape(len(turn), 3, -1) - shift[..., None]
+    x, y, along = local[:, 0], local[:, 1], local[:, 2]
+    length = cones.lengths[:, None]
+    clipped = np.clip(along, 0, length)
     beyond = along - clipped
-    t = (clipped / cones.lengths[:, None])[..., None]
-    radii = (1 - t) * cones.radii[:, None, 0] + t * cones.radii[:, None, 1]
-    level = np.maximum(np.hypot(local[..., 0] / radii[..., 0], local[..., 1] / radii[..., 1]), 1.0)
-    shrink = 1 - 1 / level
-    squared = (local[..., 0] ** 2 + local[..., 1] ** 2) * shrink**2 + beyond**2
+    t = clipped / length
+    first, slope = cones.radii[:, 0], cones.radii[:, 1] - cones.radii[:, 0]
+    level = (x / (first[:, :1] + slope[:, :1] * t)) ** 2 + (y / (first[:, 1:] + slope[:, 1:] * t)) ** 2
+    shrink = 1 - 1 / np.sqrt(np.maximum(level, 1.0))
+    squared = (x * x + y * y) * shrink**2 + beyond**2
     nearest = squared.argmin(0)
     k = np.arange(len(points))
     distance = np.sqrt(squared[nearest, k])
-    outward = np.stack([local[nearest, k, 0] * shrink[nearest, k], local[nearest, k, 1] * shrink[nearest, k], beyond[nearest, k]], -1)
+    shrink = shrink[nearest, k]
+    outward = np.stack([x[nearest, k] * shrink, y[nearest, k] * shrink, beyond[nearest, k]], -1)
     outward /= np.maximum(distance, 1e-9)[:, None]
-    direction = np.einsum("kji,kj->ki", turn[nearest], outward)
+    direction = (outward[:, None, :] @ turn[nearest])[:, 0]
     return distance, -direction, points, cones.segment[nearest]

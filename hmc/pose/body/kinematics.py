@@ -29,6 +29,8 @@ def _segment_dofs() -> tuple[tuple[int, ...], ...]:
 #: Places in the state of each segment's angles.
 SEGMENT_DOFS = _segment_dofs()
 
+_AXIS = np.array(["xyz".index(axis) for segment in SEGMENTS for axis in segment.axes])
+
 
 def segment_transforms(body: BodyModel, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Where every rigid segment is.
@@ -101,17 +103,35 @@ def joint_twists(body: BodyModel, state: np.ndarray) -> tuple[np.ndarray, np.nda
     rotations, positions : ndarray
         As from `segment_transforms`, for this one state.
     """
-    rotations, positions = segment_transforms(body, state)
+    state = np.asarray(state, float)
+    turns = _elementary_turns(state[3:])
     axes, centres = np.zeros((N_DOF, 3)), np.zeros((N_DOF, 3))
+    rotations, positions = np.empty((len(SEGMENTS), 3, 3)), np.empty((len(SEGMENTS), 3))
     axes[:3] = np.eye(3)
-    cos, sin = np.cos(state), np.sin(state)
     for index, segment in enumerate(SEGMENTS):
-        frame = np.eye(3) if segment.parent < 0 else rotations[segment.parent]
-        for axis, dof in zip(segment.axes, SEGMENT_DOFS[index], strict=True):
-            axes[dof] = frame[:, "xyz".index(axis)]
+        if segment.parent < 0:
+            frame, positions[index] = np.eye(3), state[:3]
+        else:
+            frame = rotations[segment.parent]
+            positions[index] = positions[segment.parent] + frame @ body.offsets[index]
+        for dof in SEGMENT_DOFS[index]:
+            axes[dof] = frame[:, _AXIS[dof - 3]]
             centres[dof] = positions[index]
-            frame = _turn(frame, axis, cos[dof], sin[dof])
+            frame = frame @ turns[dof - 3]
+        rotations[index] = frame
     return axes, centres, rotations, positions
+
+
+def _elementary_turns(angles: np.ndarray) -> np.ndarray:
+    """Rotation matrix of every angle about its own axis, (24,) to (24, 3, 3)."""
+    k = np.arange(len(angles))
+    first, second = (_AXIS + 1) % 3, (_AXIS + 2) % 3
+    cos, sin = np.cos(angles), np.sin(angles)
+    out = np.zeros((len(angles), 3, 3))
+    out[k, _AXIS, _AXIS] = 1.0
+    out[k, first, first] = out[k, second, second] = cos
+    out[k, first, second], out[k, second, first] = -sin, sin
+    return out
 
 
 def dof_masks() -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -43,12 +44,12 @@ class Cones:
     radii: np.ndarray
     across: np.ndarray
 
-    @property
+    @cached_property
     def lengths(self) -> np.ndarray:
         """Axis lengths, shape (n_cones,), metres."""
         return np.linalg.norm(self.end - self.start, axis=1)
 
-    @property
+    @cached_property
     def bases(self) -> np.ndarray:
         """Rows across, third and axis of every cone, shape (n_cones, 3, 3): segment's frame to the cone's own."""
         axis = (self.end - self.start) / self.lengths[:, None]
