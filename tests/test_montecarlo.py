@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from scipy import integrate, optimize, stats
@@ -77,6 +77,7 @@ def test_systematic_equals_the_printed_algorithm():
         np.testing.assert_array_equal(systematic(np.random.default_rng(seed + 1), weights, n), loop_of_algorithm_2(weights, n, u))
 
 
+@settings(deadline=None)
 @given(weight_arrays, st.integers(1, 300), st.integers(0, 2**32))
 def test_systematic_counts_lie_within_floor_and_ceiling(weights, n, seed):
     indices = systematic(np.random.default_rng(seed), weights, n)
@@ -118,6 +119,7 @@ def rate_at(log_likelihood, beta):
     return 1 / (np.sum(weights**2) * len(weights))
 
 
+@settings(deadline=None)
 @given(st.integers(0, 2**32), st.integers(5, 300), st.floats(0.01, 0.99), st.floats(-8, 8))
 def test_find_beta_agrees_with_brentq(seed, n, target, log_scale):
     rng = np.random.default_rng(seed)
@@ -140,6 +142,7 @@ def test_find_beta_closed_form():
     assert beta == pytest.approx(-np.log(x), rel=1e-4)
 
 
+@settings(deadline=None)
 @given(st.integers(0, 2**32), st.floats(0.05, 0.9), st.floats(0.05, 0.9))
 def test_a_smaller_target_never_needs_a_smaller_power(seed, first, second):
     log_likelihood = -np.random.default_rng(seed).gamma(2, 3, 200)
@@ -209,6 +212,7 @@ def test_truncated_draws_follow_scipys_distribution(name):
     assert stats.kstest(draws, truth.cdf).pvalue > 0.005
 
 
+@settings(deadline=None)
 @given(
     hnp.arrays(float, (7, 4), elements=st.floats(-100, 100)),
     hnp.arrays(float, 4, elements=st.floats(0, 50)),
@@ -282,10 +286,10 @@ def test_annealing_finds_the_higher_of_many_peaks_in_six_dimensions():
     def log_likelihood(x):
         return -np.sum((x - goal) ** 2 + 0.3 * (1 - np.cos(2 * np.pi * (x - goal))), axis=1)
 
-    settings = AnnealedSettings(layers=10, particles=500, survival_rate=0.1, spread=0.7)
+    many = AnnealedSettings(layers=10, particles=500, survival_rate=0.1, spread=0.7)
     found = 0
     for seed in range(10):
-        state, info = annealed_step(np.random.default_rng(seed), particle_init(np.zeros((1, 6))), log_likelihood, 1.2, -4.0, 4.0, settings)
+        state, info = annealed_step(np.random.default_rng(seed), particle_init(np.zeros((1, 6))), log_likelihood, 1.2, -4.0, 4.0, many)
         found += np.abs(info.estimate - goal).max() < 0.25
         assert info.best_log_likelihood >= log_likelihood(state.particles).max()
     # A single layer of as many particles does not get there.
@@ -318,10 +322,8 @@ def test_drift_shrinks_by_the_survival_rates_run_or_by_a_factor():
     assert spread_scale("survival", []) == 1
     assert spread_scale("survival", [0.5, 0.4]) == pytest.approx(0.2)
     assert spread_scale(0.7, [0.1, 0.9]) == pytest.approx(0.49)
-    settings = AnnealedSettings(layers=4, particles=[50, 200, 100, 80], survival_rate=[0.5, 0.3, 0.2, 0.1])
-    state, info = annealed_step(
-        np.random.default_rng(0), particle_init([[0.0, 0.0]]), lambda x: -np.sum(x**2, axis=1), 1.0, -9, 9, settings
-    )
+    varied = AnnealedSettings(layers=4, particles=[50, 200, 100, 80], survival_rate=[0.5, 0.3, 0.2, 0.1])
+    state, info = annealed_step(np.random.default_rng(0), particle_init([[0.0, 0.0]]), lambda x: -np.sum(x**2, axis=1), 1.0, -9, 9, varied)
     np.testing.assert_allclose(info.survival_rate, [0.5, 0.3, 0.2, 0.1], rtol=1e-4)
     np.testing.assert_allclose(info.scale, [1, 0.5, 0.15, 0.03], rtol=1e-4)
     assert info.evaluations == 430 and state.particles.shape == (80, 2)
