@@ -153,12 +153,13 @@ def start_person(
         state = _neutral_start(body, targets[anchor], velocities[: max(2, int(0.5 * fps))].mean(0), floor_z)
     else:
         anchor, state, costs = _best_hypothesis(frame_rng, filt, fps, targets, usable, velocities, floor_z, settings)
-    states, infos = follow(frame_rng, filt, state, anchor, targets)
     fit = None
     if preset.fit_body is not None:
+        # What the body's dimensions are fitted to need not be the last word on the poses.
+        states, infos = follow(frame_rng, _quick(filt), state, anchor, targets)
         filt, fit = _fit(frame_rng, filt, fps, targets, states, infos, settings, height_m is not None)
-        if fit is not None and fit.accepted:
-            states, infos = follow(frame_rng, filt, states[anchor].state, anchor, targets)
+        state = states[anchor].state
+    states, infos = follow(frame_rng, filt, state, anchor, targets)
     return Started(filt, states, infos, costs, fit)
 
 
@@ -228,18 +229,22 @@ def _best_hypothesis(frame_rng, filt, fps, targets, usable, velocities, floor_z,
             break
     if preset.search is not None:
         chosen = [_search_all(frame_rng(anchor), filt, state, targets[anchor], points) for state in chosen]
-    quick = replace(preset, annealed=AnnealedSettings(layers=2, particles=60, survival_rate=0.1, spread=0.5), search=None)
-    quick_filter = replace(filt, preset=quick)
     reach = max(2, round(settings.follow_s * fps))
     first, last = max(0, anchor - reach), min(len(targets), anchor + reach + 1)
     scores = []
     for state in chosen:
-        states, infos = follow(lambda k: frame_rng(first + k), quick_filter, state, anchor - first, targets[first:last])
+        states, infos = follow(lambda k: frame_rng(first + k), _quick(filt), state, anchor - first, targets[first:last])
         costs = np.array([info.cost for info in infos])
         headings = np.array([one.state[3] for one in states])
         scores.append(np.nanmean(costs) * (1 + settings.walk_penalty * _backwards(headings, velocities[first:last], settings)))
     order = np.argsort(scores)
     return anchor, chosen[order[0]], np.array(scores)[order]
+
+
+def _quick(filt: PoseFilter) -> PoseFilter:
+    """The same filter with a fraction of the work a frame."""
+    annealed = AnnealedSettings(layers=2, particles=60, survival_rate=0.1, spread=0.5)
+    return replace(filt, preset=replace(filt.preset, annealed=annealed, search=None))
 
 
 def _search_all(rng, filt, state, target, points):

@@ -98,7 +98,7 @@ class PosePreset:
 PRESETS: dict[str, PosePreset] = {
     "canton2009": PosePreset(
         name="canton2009",
-        source="Canton (2009), sections 3.2.2, 6.3 to 6.7: Table 6.1, Table 6.2, 6 layers of 600 particles, survival rate .5, neutral start",
+        source="Canton (2009), 3.2.2 and 6.3 to 6.7: Tables 6.1 and 6.2, 6 layers of 600 particles, survival rate .5, neutral start",
         body="canton",
         likelihood="factorised",
         annealed=AnnealedSettings(layers=6, particles=600, survival_rate=0.5, spread="survival"),
