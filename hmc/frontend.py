@@ -4,8 +4,8 @@
 ...     print(step.index, step.strict.sum(), step.tolerant.sum())
 
 Where the silhouettes come from, camera by camera (``FrontendSettings.source = "auto"``): ready-made ones where the recording has them;
-else the images against a background learnt from frames of the empty scene; else against the temporal median of the recording, which
-holds only where people move.
+else the images against a background learnt from frames of the empty scene; else against a temporal median of the recording from which
+people were cut out (`hmc.camera.empty_scene`), which holds only where people move.
 
 Nothing grows with the length of the recording.
 """
@@ -21,6 +21,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from hmc.camera.empty_scene import empty_scene, replace_people
 from hmc.camera.segmentation import BackgroundModel, SegmentationSettings, segment_views, train_background
 from hmc.errors import InputError
 from hmc.recording import Frame, Recording, background_frames, iterate_frames, open_recording
@@ -37,8 +38,6 @@ Report = Callable[[str], None]
 SOURCES = ("auto", "silhouettes", "background", "median")
 #: Bytes that the images of which the median is taken may fill.
 MEDIAN_BYTES = 400e6
-#: A pixel further than this from the median, in grey levels, is taken for a person's when the background is learnt from a median.
-MEDIAN_DISTANCE = 25
 
 
 @dataclass(frozen=True)
@@ -68,7 +67,7 @@ class FrontendSettings:
     segmentation: SegmentationSettings = field(default_factory=SegmentationSettings)
     source: str = "auto"
     background_frames: int = 200
-    median_frames: int = 40
+    median_frames: int = 20
     median_span: int = 1800
     tolerance: int = 1
     outside: str = "ignore"
@@ -266,7 +265,7 @@ def _segment(frame: Frame, models: tuple, settings: FrontendSettings, pool: Thre
 
 
 def _around_median(recording: Recording, cameras: list[int], settings: FrontendSettings) -> dict[int, list[np.ndarray]]:
-    """Images of the scene without what moves: samples of the recording, with the median wherever they are far from it."""
+    """Images of the scene without what moves: samples of the recording, without the people."""
     whole = open_recording(recording.path, recording.rig.names)
     frame_bytes = sum(3 * width * height for width, height in (recording.rig[c].size for c in cameras))
     n_samples = int(np.clip(MEDIAN_BYTES // frame_bytes, 9, settings.median_frames))
@@ -283,11 +282,8 @@ def _around_median(recording: Recording, cameras: list[int], settings: FrontendS
     for c, images in samples.items():
         if not images:
             raise InputError(f"{recording.path}: camera '{recording.rig[c].name}' has no readable image; leave it out: --cameras")
-        rows = [np.partition([image[y] for image in images], len(images) // 2, axis=0)[len(images) // 2] for y in range(len(images[0]))]
-        median = np.stack(rows)
-        for image in images:
-            far = np.abs(image.astype(np.int16) - median).max(axis=2) > MEDIAN_DISTANCE
-            image[far] = median[far]
+        scene = empty_scene(images)
+        samples[c] = [replace_people(image, scene) for image in images]
     return samples
 
 
