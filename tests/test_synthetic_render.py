@@ -247,6 +247,15 @@ def test_an_interrupted_render_leaves_nothing_and_foreign_folders_stay(tmp_path)
     assert (tmp_path / "mine" / "thesis.txt").exists()
 
 
+def test_an_empty_room_is_a_recording_too(tmp_path):
+    out = render_recording(recipe_from(small(actor=[], seconds=0.2)), tmp_path / "empty", workers=1)
+    recording = open_recording(out)
+    assert (recording.persons, recording.n_frames) == (0, 2)
+    mask = cv2.imread(str(out / "truth" / "silhouettes" / "cam_00" / "000000.png"), cv2.IMREAD_GRAYSCALE)
+    assert mask.shape == (96, 128)
+    assert not mask.any()
+
+
 def test_a_rendered_recording_is_replaced(rendered, tmp_path):
     copy = tmp_path / "copy"
     shutil.copytree(rendered, copy)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import shutil
+import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -202,6 +203,8 @@ _STUDIO: list[_Studio] = []
 
 
 def _open_studio(scene: Scene, store: Path) -> None:
+    # An interrupt is the parent's to answer: it ends the pool.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     # One thread each: the processes share the cores, and sums do not depend on how threads divide them.
     cv2.setNumThreads(1)
     threadpool_limits(1)
