@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
+from hmc.camera.background import stable_background
 from hmc.camera.segmentation import SegmentationSettings, segment, segment_views, train_background
 from hmc.camera.silhouettes import cut_halo, evidence
 from hmc.errors import InputError
@@ -208,11 +209,50 @@ def test_the_halo_of_a_blurred_square_is_cut_at_half_contrast():
     np.testing.assert_array_equal(cut_halo(fat, seen, 0.0, 1.0), fat)
 
 
+def visited(scene, times, n=30):
+    """Images in which somebody in ever other clothes stands at the left in the first `times` of `n`; and where that is."""
+    truth = scene.person(x=90)[1]
+    images = [scene.empty() for _ in range(n)]
+    for image in images[:times]:
+        image[truth] = np.clip(scene.rng.uniform(20, 90, 3) + scene.rng.normal(0, 2, (truth.sum(), 3)), 0, 255)
+    return images, truth
+
+
+def test_the_background_behind_somebody_who_is_mostly_there():
+    """Seen empty in four of ten images, a place has its background all the same; a median over time has the person."""
+    scene = Scene(8)
+    images, truth = visited(scene, 18)
+    background, unseen = stable_background(images)
+    inside = cv2.erode(truth.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    assert np.abs(background - scene.wall)[inside].mean() < 3
+    assert np.abs(np.median(images, axis=0) - scene.wall)[inside].mean() > 40
+    assert unseen.mean() < 0.01
+
+
+def test_a_place_that_was_never_empty_is_unseen_and_counts_where_somebody_is():
+    scene = Scene(9)
+    images, truth = visited(scene, 30)
+    background, unseen = stable_background(images)
+    assert np.mean(unseen[truth]) > 0.9 and np.mean(unseen[~truth]) < 0.02
+    model = train_background((scene.empty() for _ in range(20)), unseen=unseen)
+    image, _ = scene.person(x=220)
+    mask, model = segment(model, image)
+    assert not mask[:, :130].any()  # nobody touches it
+    image[:] = np.where(truth[..., None], background, scene.empty())
+    image[86:100, 40:75] = 20  # an arm that leads to it
+    mask, _ = segment(model, image)
+    assert np.mean(mask[truth]) > 0.9
+
+
 def test_bad_input():
     with pytest.raises(InputError, match="no background frame"):
         train_background([])
     with pytest.raises(InputError, match="differ in size"):
         train_background([np.zeros((20, 30, 3), np.uint8), np.zeros((30, 20, 3), np.uint8)])
+    with pytest.raises(InputError, match="no image to find the background in"):
+        stable_background([])
+    with pytest.raises(InputError, match="`share` must lie between 0 and 1"):
+        stable_background([np.zeros((20, 30, 3), np.uint8)], 1.0)
     with pytest.raises(InputError, match="`shadow_factor` must lie between 0 and 1"):
         SegmentationSettings(shadow_factor=1.5)
     with pytest.raises(InputError, match="`learn_every` must be positive"):

@@ -112,6 +112,8 @@ class BackgroundModel:
         Images segmented so far.
     settling : int
         Frames left of learning quickly, after a light was switched.
+    unseen : ndarray of bool, shape (height, width), or None
+        Where the empty scene was never seen (`hmc.camera.background.stable_background`): foreground wherever it touches some.
     """
 
     mixture: cv2.BackgroundSubtractorMOG2
@@ -120,9 +122,12 @@ class BackgroundModel:
     people: np.ndarray
     frame: int = 0
     settling: int = 0
+    unseen: np.ndarray | None = None
 
 
-def train_background(frames: Iterable[np.ndarray], settings: SegmentationSettings | None = None) -> BackgroundModel:
+def train_background(
+    frames: Iterable[np.ndarray], settings: SegmentationSettings | None = None, unseen: np.ndarray | None = None
+) -> BackgroundModel:
     """Learn the empty scene.
 
     Parameters
@@ -130,6 +135,8 @@ def train_background(frames: Iterable[np.ndarray], settings: SegmentationSetting
     frames : iterable of ndarray of uint8, shape (height, width, 3)
         BGR images without people, one at least and 20 or more for a good model; they are read once and not kept.
     settings : SegmentationSettings, optional
+    unseen : ndarray of bool, shape (height, width), optional
+        Where somebody stood in all frames.
 
     Returns
     -------
@@ -166,7 +173,7 @@ def train_background(frames: Iterable[np.ndarray], settings: SegmentationSetting
         variance = np.stack([variance[..., 0], variance[..., 1:].mean(axis=2)], axis=-1)
         deviation = np.maximum(np.sqrt(variance), np.array(LEAST_DEVIATION, np.float32))
     mean[..., 0] = np.maximum(mean[..., 0], 1)
-    return BackgroundModel(mixture, mean, deviation, np.zeros(mean.shape[:2], bool))
+    return BackgroundModel(mixture, mean, deviation, np.zeros(mean.shape[:2], bool), unseen=unseen)
 
 
 def segment(
@@ -206,7 +213,10 @@ def segment(
     found = cv2.threshold(answer, FOREGROUND - 1, 1, cv2.THRESH_BINARY)[1]
     if cv2.countNonZero(found) > settings.max_foreground * found.size:
         return None, _adapt_to_switch(model, image, settings)
-    mask = _complete(found, image, model, settings).view(bool)
+    mask = _complete(found, image, model, settings)
+    if model.unseen is not None:
+        mask = _join_unseen(mask, model.unseen, settings)
+    mask = mask.view(bool)
     after = replace(model, people=mask, frame=model.frame + 1, settling=max(0, model.settling - 1))
     if after.settling or after.frame % settings.learn_every == 0:
         rate = SETTLING_RATE if after.settling else settings.learning_rate
@@ -265,6 +275,14 @@ def _complete(found: np.ndarray, image: np.ndarray, model: BackgroundModel, sett
     )
     mask[rows, columns] = cut_halo(part, seen, settings.halo_share, scale)
     return mask
+
+
+def _join_unseen(mask: np.ndarray, unseen: np.ndarray, settings: SegmentationSettings) -> np.ndarray:
+    """Add those places where the scene was never seen that touch the mask: somebody who is there now was there when it was learnt."""
+    n, labels = cv2.connectedComponents(cv2.bitwise_or(mask, unseen.view(np.uint8)), connectivity=8)
+    counts = np.bincount(labels[mask.view(bool)], minlength=n)
+    counts[0] = 0
+    return np.take((counts >= settings.least_blob_px).view(np.uint8), np.asarray(labels))
 
 
 def _hidden(mask: np.ndarray, answer: np.ndarray, settings: SegmentationSettings) -> np.ndarray:

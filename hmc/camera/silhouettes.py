@@ -11,7 +11,6 @@ Shadows are told apart as in Canton (2009), section 2.2.3 (Landabaso's rule): th
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
 
 import cv2
 import numpy as np
@@ -157,13 +156,11 @@ REACH_PX = 41
 CLOSE_PX = 7
 
 
-@cache
 def _square(width: float, scale: float) -> np.ndarray:
     side = 2 * round((width * scale - 1) / 2) + 1
     return np.ones((max(3, side),) * 2, np.uint8)
 
 
-@cache
 def _disc(width: float, scale: float) -> np.ndarray:
     side = 2 * round((width * scale - 1) / 2) + 1
     return cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (max(3, side),) * 2)
