@@ -3,6 +3,9 @@
 A plain temporal median holds the people who stay about one place for more than half of the time. So people are first cut out of every
 image: what differs from the median is surely theirs, what lies between such parts may be, and a graph cut on the colours (Rother et al.
 2004, "GrabCut") decides. The scene is the median of what is left; pixels never seen without people are filled in from around them.
+
+It helps but does not replace background frames: a foot that never moves stays in the scene, and where somebody moves so little that
+nearly all that differs is limbs, the cut may stop at the limbs.
 """
 
 from __future__ import annotations
