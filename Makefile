@@ -1,0 +1,54 @@
+# Every target does its own set-up: a virtual environment in .venv, made anew when pyproject.toml changes.
+#   make demo    render a clip, find and fit the person in it, print the metrics and where the pictures are
+#   make test    the test suite            make lint    style and types
+#   make bench   measured speed            make clean   remove what the others made
+
+PYTHON ?= python3
+VENV ?= .venv
+OUT ?= out
+PY := $(VENV)/bin/python
+READY := $(VENV)/.ready
+
+# The arrays here are small: threads inside BLAS cost more than they bring, and hmc uses its cores in other ways.
+export OPENBLAS_NUM_THREADS := 1
+export OMP_NUM_THREADS := 1
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+
+.PHONY: help setup demo test lint bench clean
+help:
+	@sed -n 's/^#   //p' Makefile
+
+setup: $(READY)
+
+$(READY): pyproject.toml
+	@echo "setting up $(VENV) (once)"
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
+	  || { echo "hmc needs Python 3.11 or later; say which: make PYTHON=python3.12 ..." >&2; exit 1; }
+	@$(PYTHON) -m venv $(VENV) \
+	  || { echo "python cannot make virtual environments; on Debian and Ubuntu: apt-get install python3-venv" >&2; exit 1; }
+	@$(PY) -m pip install --quiet --root-user-action=ignore -e ".[test]"
+	@touch $(READY)
+
+demo: $(READY)
+	$(PY) -m hmc synth demo --out $(OUT)/demo
+	$(PY) -m hmc pose $(OUT)/demo --out $(OUT)/demo-result --height auto
+	$(PY) -m hmc evaluate $(OUT)/demo-result $(OUT)/demo
+	$(PY) -m hmc view $(OUT)/demo-result $(OUT)/demo --out $(OUT)/demo.png
+	$(PY) -m hmc view $(OUT)/demo-result $(OUT)/demo --out $(OUT)/demo.mp4
+	@echo
+	@echo "the fitted body over every camera: $(OUT)/demo.png (one frame), $(OUT)/demo.mp4 (all frames)"
+	@echo "tables:                            $(OUT)/demo-result/"
+
+test: $(READY)
+	$(PY) -m pytest
+
+lint: $(READY)
+	$(VENV)/bin/ruff check
+	$(VENV)/bin/ruff format --check
+	$(VENV)/bin/mypy
+
+bench: $(READY)
+	@for file in benchmarks/bench_*.py; do echo "== $$file"; $(PY) $$file || exit 1; done
+
+clean:
+	rm -rf $(VENV) $(OUT) build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
