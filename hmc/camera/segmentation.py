@@ -252,7 +252,6 @@ def segment_views(
 def _complete(found: np.ndarray, image: np.ndarray, model: BackgroundModel, settings: SegmentationSettings) -> np.ndarray:
     """Clean and complete what the mixture found; only the part of the image around it is looked at."""
     scale = max(image.shape[:2]) / 640
-    found = cv2.morphologyEx(found, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
     mask = np.zeros_like(found)
     # Specks are all over the image; a person has some solid part.
     left, top, width, height = cv2.boundingRect(cv2.erode(found, np.ones((SOLID_PX, SOLID_PX), np.uint8)))
@@ -261,7 +260,7 @@ def _complete(found: np.ndarray, image: np.ndarray, model: BackgroundModel, sett
     margin = round(MARGIN_PX * scale)
     rows = slice(max(0, top - margin), top + height + margin)
     columns = slice(max(0, left - margin), left + width + margin)
-    seeds = found[rows, columns]
+    seeds = cv2.morphologyEx(found[rows, columns], cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
     seen = evidence(image[rows, columns], model.mean[rows, columns], model.deviation[rows, columns])
     part = fill_gaps(
         seeds,
