@@ -173,7 +173,7 @@ class _Studio:
         if self.backdrops is None:
             self.backdrops = []
             for camera in range(len(self.scene.rig)):
-                with np.load(self.store / f"{camera}.npz") as arrays:
+                with np.load(self.store / f"{camera}.npz", allow_pickle=False) as arrays:
                     self.backdrops.append(Backdrop(**arrays))
         return self.backdrops
 

@@ -1,0 +1,190 @@
+"""The plan of the house: who may import whom, what a core module may need, and what no file of the package does."""
+
+import ast
+import subprocess
+import sys
+from graphlib import TopologicalSorter
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).resolve().parents[1] / "hmc"
+MODULES = sorted(PACKAGE.rglob("*.py"))
+
+MAX_LINES = 500
+
+# What each part of the package may import of the others. A part is a package or a module directly under hmc/.
+BASE = {"errors", "landmarks", "files", "settings", "journal"}
+CAMERA = BASE | {"camera"}
+RECORDING = CAMERA | {"footage", "recording", "results"}
+VOXELS = CAMERA | {"voxels"}
+FRONTEND = RECORDING | {"voxels", "frontend"}
+TRACKING = FRONTEND | {"montecarlo", "tracking"}
+POSE = TRACKING | {"pose"}
+EVALUATION = BASE | {"metrics", "results", "evaluation"}
+VIEW = POSE | {"rig_picture", "view"}
+EVERYTHING = VIEW | EVALUATION | {"check", "plotting", "synthetic"}
+MAY_IMPORT = {
+    "errors": set(),
+    "landmarks": {"errors"},
+    "files": {"errors"},
+    "settings": {"errors"},
+    "journal": {"errors", "files"},
+    "montecarlo": {"errors", "landmarks"},
+    "metrics": {"errors", "landmarks"},
+    "camera": CAMERA,
+    "footage": CAMERA,
+    "results": BASE,
+    "recording": RECORDING,
+    "voxels": VOXELS,
+    "frontend": FRONTEND,
+    "tracking": TRACKING,
+    "pose": POSE,
+    "evaluation": EVALUATION,
+    "rig_picture": CAMERA,
+    "check": FRONTEND | {"rig_picture"},
+    "view": VIEW,
+    "plotting": VIEW | EVALUATION,
+    "synthetic": POSE,
+    "experiments": EVERYTHING,
+    "cli": EVERYTHING | {"experiments"},
+    "__main__": {"cli"},
+    "__init__": set(),
+}
+
+#: Parts that draw; only these may need what a server lacks.
+DRAWING = ("plotting", "experiments")
+UNWANTED = ("matplotlib", "mpl_toolkits", "pandas", "tqdm")
+
+#: Loading what these wrote can run code.
+UNSAFE_MODULES = {"pickle", "cPickle", "dill", "cloudpickle", "shelve", "marshal"}
+
+
+def trees(but=()):
+    """Path and syntax tree of every file of the package, without some parts."""
+    return [(path, ast.parse(path.read_text(encoding="utf-8"), str(path))) for path in MODULES if part_of(path) not in but]
+
+
+def part_of(path):
+    """The part of the package that a file belongs to."""
+    return path.relative_to(PACKAGE).with_suffix("").parts[0]
+
+
+def imported(tree):
+    """Full names of the modules that a file imports, wherever in the file; of `from a import b` both a and a.b."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield node.module or ""
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def where(path, node):
+    return f"{path.relative_to(PACKAGE.parent)}:{node.lineno}"
+
+
+def calls(tree, *names):
+    """Calls of functions by their last name: print(...), np.load(...)."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call):
+            name = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+            if name in names:
+                yield node
+
+
+def test_plan_has_one_direction():
+    TopologicalSorter({part: allowed - {part} for part, allowed in MAY_IMPORT.items()}).prepare()  # raises CycleError
+
+
+def test_every_part_is_in_the_plan():
+    unknown = {part_of(path) for path in MODULES} - set(MAY_IMPORT)
+    assert not unknown, f"say in MAY_IMPORT what these may import: {sorted(unknown)}"
+
+
+def test_imports_follow_the_plan():
+    wrong = []
+    for path, tree in trees():
+        allowed = MAY_IMPORT[part_of(path)] | {part_of(path)}
+        for name in imported(tree):
+            names = name.split(".")
+            # `from hmc import __version__` imports no part
+            if names[0] == "hmc" and len(names) > 1 and names[1] != "__version__" and names[1] not in allowed:
+                wrong.append(f"{path.relative_to(PACKAGE.parent)} imports {name}")
+    assert not wrong, "\n".join(wrong)
+
+
+def test_imports_are_absolute():
+    relative = [
+        where(path, node) for path, tree in trees() for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.level > 0
+    ]
+    assert not relative
+
+
+def test_core_needs_nothing_that_draws():
+    names = [
+        ".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts)
+        for path in MODULES
+        if part_of(path) not in (*DRAWING, "__main__") and path.name != "__init__.py"
+    ]
+    program = f"""
+import importlib, importlib.abc, sys
+
+class Refuse(importlib.abc.MetaPathFinder):
+    def find_spec(self, name, path=None, target=None):
+        if name.split(".")[0] in {UNWANTED!r}:
+            raise ImportError(f"{{name}} is not here")
+
+sys.meta_path.insert(0, Refuse())
+for name in {names!r}:
+    importlib.import_module(name)
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=PACKAGE.parent)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_files_are_short(path):
+    assert len(path.read_text(encoding="utf-8").splitlines()) <= MAX_LINES
+
+
+def test_nothing_that_is_loaded_can_run_code():
+    wrong = []
+    for path, tree in trees():
+        wrong += [f"{path.name} imports {name}" for name in imported(tree) if name.split(".")[0] in UNSAFE_MODULES]
+        wrong += [f"{where(path, node)} {ast.unparse(node.func)}" for node in calls(tree, "eval", "exec", "read_pickle")]
+        for node in calls(tree, "load"):
+            refused = any(
+                keyword.arg == "allow_pickle" and isinstance(keyword.value, ast.Constant) and keyword.value.value is False
+                for keyword in node.keywords
+            )
+            if ast.unparse(node.func) in ("np.load", "numpy.load", "joblib.load") and not refused:
+                wrong.append(f"{where(path, node)}: {ast.unparse(node.func)} without allow_pickle=False")
+    assert not wrong, "\n".join(wrong)
+
+
+def test_library_neither_prints_nor_asserts():
+    printing = [where(path, node) for path, tree in trees(but=("cli",)) for node in calls(tree, "print")]
+    asserting = [where(path, node) for path, tree in trees() for node in ast.walk(tree) if isinstance(node, ast.Assert)]
+    assert not printing + asserting
+
+
+def test_random_numbers_come_from_a_generator_that_is_given():
+    made = [
+        where(path, node)
+        for path, tree in trees(but=("cli",))
+        for node in calls(tree, "default_rng")
+        if not node.args and not node.keywords
+    ]
+    assert not made, "without a seed, two runs differ"
+
+
+def test_everything_public_is_described():
+    bare = []
+    for path, tree in trees():
+        if path.read_text(encoding="utf-8").strip() and not ast.get_docstring(tree):
+            bare.append(str(path.relative_to(PACKAGE)))
+        for node in tree.body:
+            if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_") and not ast.get_docstring(node):
+                bare.append(f"{where(path, node)} {node.name}")
+    assert not bare, "\n".join(bare)
