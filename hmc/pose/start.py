@@ -29,6 +29,8 @@ from hmc.pose.initialisation import first_poses, swapped_poses
 
 __all__ = ["StartSettings", "Started", "estimate_height", "follow", "start_person"]
 
+#: Fewer frames say too little of a body: what they cannot tell apart, such as fat silhouettes from a tall person, would be fitted.
+LEAST_BODY_FRAMES = 6
 #: Random generator of a frame: the same whatever the order in which frames are visited.
 FrameRng = Callable[[int], np.random.Generator]
 
@@ -270,7 +272,7 @@ def _fit(frame_rng, filt, fps, targets, states, infos, settings, height_known):
     """The body fitted to some frames of the window, if the others agree."""
     preset = filt.preset
     good = [k for k, info in enumerate(infos) if np.isfinite(info.cost)]
-    if len(good) < 4:
+    if len(good) < LEAST_BODY_FRAMES:
         return filt, None
     # Frames in which the pose is in doubt teach nothing of the body: leave the worst third out.
     limit = np.quantile([infos[k].cost for k in good], 0.67)

@@ -203,9 +203,9 @@ def _by_symmetric_cost(rng, filt, target):
 
 
 def _by_scores(filt, table, target):
-    """The four scores against the tolerant hull, which is where the target's distance is zero."""
+    """The four scores against the tolerant hull."""
     grid = VoxelGrid(target.origin - 0.5 * target.voxel_size_m, target.voxel_size_m, target.distance.shape)
-    maps = observe(target.distance == 0, grid, filt.room)
+    maps = observe(target.tolerant, grid, filt.room)
     variances = ScoreVariances()
 
     def log_likelihood(states: np.ndarray) -> np.ndarray:

@@ -42,9 +42,9 @@ class FitBodySettings:
     """
 
     iterations: int = 8
-    scale_deviation: float = 0.05
+    scale_deviation: float = 0.04
     length_deviation: float = 0.07
-    girth_deviation: float = 0.15
+    girth_deviation: float = 0.20
     prior_weight: float = 4e-6
 
 

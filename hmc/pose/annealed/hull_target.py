@@ -13,6 +13,10 @@ __all__ = ["HullTarget", "distance_at", "distance_gradient", "make_target", "sam
 
 #: Room left around a person's voxels in the distance field, metres: limbs of wrong guesses still see the way back.
 MARGIN_M = 0.35
+#: Between the strict and the tolerant hull a body may be, but had better not: this share of the distance to the strict hull,
+#: up to a bound, is added. With few cameras the tolerant hull is so fat that it hardly holds a body.
+STRICT_SHARE = np.float32(0.3)
+STRICT_CAP_M = np.float32(0.08)
 
 
 @dataclass(frozen=True)
@@ -22,7 +26,10 @@ class HullTarget:
     Parameters
     ----------
     distance : ndarray of float32, shape (nx, ny, nz)
-        Distance to the tolerant hull, metres; 0 inside it. A crop around the person.
+        How far a body's surface is from where it may be, metres: the distance to the tolerant hull plus a bounded share of that
+        to the strict one; 0 inside both. A crop around the person.
+    tolerant : ndarray of bool, shape (nx, ny, nz)
+        The tolerant hull in the same crop.
     origin : ndarray, shape (3,)
         Centre of the crop's first voxel, world, metres.
     voxel_size_m : float
@@ -33,6 +40,7 @@ class HullTarget:
     """
 
     distance: np.ndarray
+    tolerant: np.ndarray
     origin: np.ndarray
     voxel_size_m: float
     surface: np.ndarray
@@ -66,13 +74,18 @@ def make_target(grid: VoxelGrid, strict: np.ndarray, tolerant: np.ndarray) -> Hu
     occupied = np.zeros(shape, bool)
     occupied[tuple((tolerant - low).T)] = True
     occupied[tuple((strict - low).T)] = True
-    distance = ndimage.distance_transform_edt(~occupied).astype(np.float32) * np.float32(grid.voxel_size_m)
-    # The transform measures to voxel centres; the hull's surface is half a voxel nearer.
-    distance = np.maximum(distance - np.float32(0.5 * grid.voxel_size_m), 0)
     core = np.zeros(shape, bool)
     core[tuple((strict - low).T)] = True
+    distance = _distance_to(occupied, grid.voxel_size_m)
+    distance += STRICT_SHARE * np.minimum(_distance_to(core, grid.voxel_size_m), STRICT_CAP_M)
     surface = np.argwhere(core & ~ndimage.binary_erosion(core))
-    return HullTarget(distance, grid.centres(low), grid.voxel_size_m, grid.centres(surface + low), len(strict) * grid.voxel_size_m**3)
+    return HullTarget(distance, occupied, grid.centres(low), grid.voxel_size_m, grid.centres(surface + low), len(strict) * grid.voxel_size_m**3)
+
+
+def _distance_to(occupied: np.ndarray, voxel_size_m: float) -> np.ndarray:
+    distance = ndimage.distance_transform_edt(~occupied).astype(np.float32) * np.float32(voxel_size_m)
+    # The transform measures to voxel centres; the hull's surface is half a voxel nearer.
+    return np.maximum(distance - np.float32(0.5 * voxel_size_m), 0)
 
 
 def sample_points(rng: np.random.Generator, points: np.ndarray, n: int) -> np.ndarray:

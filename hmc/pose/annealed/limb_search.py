@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hmc.montecarlo.truncated import truncated_normal
 from hmc.pose.annealed.hull_target import HullTarget, sample_points
 from hmc.pose.annealed.refine import RefineSettings, refine
-from hmc.pose.annealed.symmetric import BodyPoints, SymmetricSettings, body_distance, outside_distance, symmetric_cost
+from hmc.pose.annealed.symmetric import POSTURE, BodyPoints, SymmetricSettings, body_distance, outside_distance, symmetric_cost
 from hmc.pose.body.joints import DOF_NAMES, dof_index
 from hmc.pose.body.model import PARTS, BodyModel
 
@@ -51,7 +52,7 @@ class SearchSettings:
     far_m: float = 0.05
     outside_share: float = 0.25
     unexplained_share: float = 0.02
-    draws: int = 150
+    draws: int = 200
     gain: float = 0.03
 
 
@@ -121,7 +122,7 @@ def search_limbs(
     for limb in limbs:
         dofs = LIMBS[limb]
         trials = np.repeat(state[None], settings.draws, axis=0)
-        trials[:, dofs] = rng.uniform(low[dofs], high[dofs], (settings.draws, len(dofs)))
+        trials[:, dofs] = _draw(rng, settings.draws, low[dofs], high[dofs], dofs)
         costs = symmetric_cost(body, samples, trials, target, coarse, cost_settings)
         evaluations += settings.draws
         for pick in np.argsort(costs)[:2]:
@@ -130,3 +131,14 @@ def search_limbs(
             if info.cost_after < (1 - settings.gain) * cost:
                 state, cost = trial, info.cost_after
     return state, cost, evaluations
+
+
+def _draw(rng: np.random.Generator, n: int, low: np.ndarray, high: np.ndarray, dofs: np.ndarray) -> np.ndarray:
+    """Random poses of a limb: half are common ones, half may be any."""
+    common = n // 2
+    return np.concatenate(
+        [
+            truncated_normal(rng, np.tile(POSTURE[0][dofs], (common, 1)), POSTURE[1][dofs], low, high),
+            rng.uniform(low, high, (n - common, len(dofs))),
+        ]
+    )
