@@ -26,7 +26,7 @@ $(READY): pyproject.toml
 	  || { echo "hmc needs Python 3.11 or later; say which: make PYTHON=python3.12 ..." >&2; exit 1; }
 	@$(PYTHON) -m venv $(VENV) \
 	  || { echo "python cannot make virtual environments; on Debian and Ubuntu: apt-get install python3-venv" >&2; exit 1; }
-	@$(PY) -m pip install --quiet --root-user-action=ignore -e ".[test]"
+	@$(PY) -m pip install -qq --root-user-action=ignore -e ".[test]"
 	@touch $(READY)
 
 demo: $(READY)
