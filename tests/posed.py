@@ -1,0 +1,52 @@
+"""Bodies and poses that several pose tests share."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+from acted import Act
+
+from hmc.pose.annealed.symmetric import BodyPoints, body_points
+from hmc.pose.body.flesh import surface_coordinates
+from hmc.pose.body.inverse import fit_landmarks
+from hmc.pose.body.joints import N_DOF, dof_index
+from hmc.pose.body.model import BodyModel, neutral_state
+from hmc.pose.body.proportions import default_body
+
+
+@cache
+def body_of(height_m: float = 1.78) -> tuple[BodyModel, BodyPoints]:
+    """A body of average proportions and its points."""
+    body = default_body(height_m)
+    return body, body_points(body, surface_coordinates(body, 250))
+
+
+def with_cylinders(body: BodyModel, radius_m: float = 0.05) -> BodyModel:
+    """The same skeleton with circular cylinders for flesh, for which distances and their derivatives are known in closed form."""
+    cones = body.cones
+    axis = (cones.end - cones.start) / np.linalg.norm(cones.end - cones.start, axis=1, keepdims=True)
+    across = cones.across - axis * (axis * cones.across).sum(1, keepdims=True)
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    return replace(body, cones=replace(cones, radii=np.full_like(cones.radii, radius_m), across=across))
+
+
+def true_state(body: BodyModel, act: Act, frame: int = 0) -> np.ndarray:
+    """The state whose landmarks lie nearest to an actor's true ones."""
+    start = neutral_state("down", body.limits)
+    start[:3], start[3] = act.landmarks[frame, 0], act.heading
+    return fit_landmarks(body, act.landmarks[frame], start, iterations=80)[0]
+
+
+def crossed_arms() -> np.ndarray:
+    """Standing with both forearms before the chest, one through the other."""
+    state = np.zeros(N_DOF)
+    state[2] = 0.95
+    state[dof_index("r_shoulder_x", "l_shoulder_x")] = 0.5, -0.5
+    state[dof_index("r_shoulder_z", "l_shoulder_z")] = 1.5, -1.55
+    state[dof_index("r_elbow_z", "l_elbow_z")] = 1.9, -1.9
+    return state
+
+
+def mean_error(body_landmarks: np.ndarray, truth: np.ndarray) -> float:
+    """Mean distance of landmarks, metres."""
+    return float(np.linalg.norm(body_landmarks - truth, axis=-1).mean())

@@ -1,0 +1,164 @@
+"""Local refinement: residuals and their derivatives against the cost and finite differences, and recovery of rendered people's poses."""
+
+import numpy as np
+import pytest
+from acted import act
+from numpy.testing import assert_allclose
+from posed import body_of, crossed_arms, mean_error, true_state, with_cylinders
+
+from hmc.pose.annealed.penetration import axis_points
+from hmc.pose.annealed.refine import RefineSettings, refine, residual_rows, residual_values
+from hmc.pose.annealed.symmetric import BodyPoints, SymmetricSettings, symmetric_cost
+from hmc.pose.body.joints import N_DOF, dof_index
+from hmc.pose.body.kinematics import landmarks
+
+SETTINGS = SymmetricSettings()
+GROUPS = ("outside", "unexplained", "depth", "posture")
+
+
+@pytest.fixture(scope="module")
+def scene():
+    """A person who gestures: body, its points, frame, hull points, the true state."""
+    acted = act("gesture")
+    body, points = body_of(acted.height_m)
+    return body, points, acted.targets[0], acted.targets[0].surface[::4], true_state(body, acted)
+
+
+def placed(state: np.ndarray, like: np.ndarray) -> np.ndarray:
+    """A state moved to where another one stands."""
+    out = state.copy()
+    out[:6] = like[:6]
+    return out
+
+
+def groups(points: BodyPoints, hull: np.ndarray) -> dict[str, slice]:
+    edges = np.cumsum([0, len(points.surface.points), len(hull), len(points.axes.points), N_DOF])
+    return {name: slice(a, b) for name, a, b in zip(GROUPS, edges[:-1], edges[1:], strict=True)}
+
+
+def smooth_derivatives(function, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Central differences, and which rows are free of kinks: two steps agree there."""
+    measured = []
+    for step in (1e-6, 3e-6):
+        columns = [(function(state + step * unit) - function(state - step * unit)) / (2 * step) for unit in np.eye(N_DOF)]
+        measured.append(np.stack(columns, axis=1))
+    agree = np.abs(measured[0] - measured[1]).max(1) < 1e-6 + 1e-3 * np.abs(measured[0]).max(1)
+    return measured[0], agree
+
+
+def poses(scene) -> list[np.ndarray]:
+    true = scene[-1]
+    rng = np.random.default_rng(2)
+    return [true + rng.normal(0, 0.1, N_DOF), placed(crossed_arms(), true) + rng.normal(0, 0.02, N_DOF)]
+
+
+@pytest.mark.parametrize("pose", [0, 1], ids=["near", "arms crossed"])
+def test_derivatives_are_exact_for_cylinders(scene, pose):
+    body, points, target, hull, _ = scene
+    body = with_cylinders(body)
+    points = BodyPoints(points.surface, axis_points(body))
+    state = poses(scene)[pose]
+    residuals, jacobian = residual_rows(body, points, state, target, hull, SETTINGS)
+    measured, smooth = smooth_derivatives(lambda s: residual_rows(body, points, s, target, hull, SETTINGS)[0], state)
+    for name, rows in groups(points, hull).items():
+        assert smooth[rows].mean() > 0.95
+        fine = np.flatnonzero(smooth)
+        fine = fine[(fine >= rows.start) & (fine < rows.stop)]
+        assert_allclose(jacobian[fine], measured[fine], atol=1e-6 * max(1.0, np.abs(measured[fine]).max()), err_msg=name)
+        if name != "depth" or pose == 1:
+            assert np.abs(measured[fine]).max() > 1e-4  # there was something to test
+
+
+@pytest.mark.parametrize("pose", [0, 1], ids=["near", "arms crossed"])
+def test_derivatives_for_flesh_point_the_right_way(scene, pose):
+    """Elliptic and tapered cones may be treated as round and straight: descent needs the direction."""
+    body, points, target, hull, _ = scene
+    state = poses(scene)[pose]
+    _, jacobian = residual_rows(body, points, state, target, hull, SETTINGS)
+    measured, smooth = smooth_derivatives(lambda s: residual_rows(body, points, s, target, hull, SETTINGS)[0], state)
+    for name, rows in groups(points, hull).items():
+        fine = smooth[rows] & (np.linalg.norm(measured[rows], axis=1) > 1e-9)
+        a, b = jacobian[rows][fine], measured[rows][fine]
+        cosine = (a * b).sum(1) / (np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1))
+        if cosine.size:
+            assert cosine.min() > 0.7 and np.median(cosine) > 0.97, name
+        assert not np.any(jacobian[rows][smooth[rows] & ~fine])  # what does not change has no derivative
+
+
+@pytest.mark.parametrize("settings", [SETTINGS, SymmetricSettings(0.08, 0.4, 3.0, 1e-4)])
+def test_residuals_square_to_the_cost(scene, settings):
+    """The refinement interpolates the distance field, the particles take the nearest voxel: the same up to the voxel's size."""
+    body, points, target, hull, true = scene
+    for state in (true, *poses(scene)):
+        residuals, _ = residual_rows(body, points, state, target, hull, settings)
+        assert residuals @ residuals == pytest.approx(symmetric_cost(body, points, state[None], target, hull, settings)[0], rel=0.1)
+        assert_allclose(residual_values(body, points, state, target, hull, settings), residuals, atol=1e-5)
+
+
+def test_nothing_pulls_beyond_the_cap(scene):
+    body, points, target, hull, true = scene
+    far = true.copy()
+    far[:2] += 3.0
+    residuals, jacobian = residual_rows(body, points, far, target, hull, SETTINGS)
+    both = slice(0, len(points.surface.points) + len(hull))
+    assert not jacobian[both].any()
+    assert residuals[both] @ residuals[both] == pytest.approx((1 + SETTINGS.explain_weight) * SETTINGS.cap_m**2, rel=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_cost_never_rises_and_limits_hold(scene, seed):
+    body, points, target, hull, true = scene
+    start = true + np.random.default_rng(seed).normal(0, [0.1] * 3 + [0.4] * 24)
+    last = np.inf
+    for iterations in (1, 2, 4, 8):
+        state, info = refine(body, points, start, target, hull, SETTINGS, RefineSettings(iterations=iterations))
+        assert np.all((state >= body.limits.low) & (state <= body.limits.high))
+        assert info.cost_after <= info.cost_before and info.cost_after <= last
+        assert info.evaluations >= 1
+        residuals, _ = residual_rows(body, points, state, target, hull, SETTINGS)
+        assert residuals @ residuals <= info.cost_after + 1e-12  # the rest is the hold on the start
+        last = info.cost_after
+
+
+def test_only_free_degrees_move(scene):
+    body, points, target, hull, true = scene
+    start = np.clip(true + np.random.default_rng(1).normal(0, 0.15, N_DOF), body.limits.low, body.limits.high)
+    free = np.zeros(N_DOF, bool)
+    free[dof_index("l_shoulder_x", "l_shoulder_z", "l_elbow_z")] = True
+    state, info = refine(body, points, start, target, hull, SETTINGS, RefineSettings(), free=free)
+    assert_allclose(state[~free], start[~free])
+    assert np.abs(state[free] - start[free]).max() > 1e-3 and info.cost_after < info.cost_before
+    state, info = refine(body, points, start, target, hull, SETTINGS, RefineSettings(), free=np.zeros(N_DOF, bool))
+    assert_allclose(state, start)
+    assert info.cost_after == info.cost_before
+
+
+def test_a_strong_hold_keeps_the_pose(scene):
+    body, points, target, hull, true = scene
+    start = np.clip(true + np.random.default_rng(4).normal(0, 0.1, N_DOF), body.limits.low, body.limits.high)
+    weak, _ = refine(body, points, start, target, hull, SETTINGS, RefineSettings(stay_weight=1e-7))
+    strong, _ = refine(body, points, start, target, hull, SETTINGS, RefineSettings(stay_weight=10.0))
+    assert np.abs(strong - start).max() < 0.01 * np.abs(weak - start).max()
+    # The hold pulls to the anchor, where one is given.
+    anchored, _ = refine(body, points, start, target, hull, SETTINGS, RefineSettings(iterations=40, stay_weight=10.0), anchor=true)
+    assert np.abs(anchored - np.clip(true, body.limits.low, body.limits.high)).max() < 0.02
+
+
+@pytest.mark.parametrize("motion", ["gesture", "walk"])
+def test_displaced_poses_of_rendered_people_are_recovered(motion):
+    """The hull is carved from silhouettes of a mesh: the pose nearest to the truth is found again from some way off."""
+    acted = act(motion)
+    body, points = body_of(acted.height_m)
+    gains = []
+    for frame in (0, 5):
+        target = acted.targets[frame]
+        true = true_state(body, acted, frame)
+        rng = np.random.default_rng(frame)
+        for _ in range(3):
+            start = np.clip(true + rng.normal(0, [0.05] * 3 + [0.08] * 3 + [0.2] * 21), body.limits.low, body.limits.high)
+            state, _ = refine(body, points, start, target, target.surface[::3], SETTINGS, RefineSettings(iterations=20))
+            before, after = (mean_error(landmarks(body, s), acted.landmarks[frame]) for s in (start, state))
+            gains.append((before, after))
+    before, after = np.mean(gains, axis=0)
+    assert before > 0.08
+    assert after < 0.055 and after < 0.6 * before
