@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import sysconfig
 import tomllib
 from dataclasses import MISSING, dataclass, fields, replace
 from pathlib import Path
@@ -29,8 +30,9 @@ __all__ = [
 
 Colour = tuple[float, float, float]
 
-#: Recipes that come with a checkout.
-RECIPE_FOLDER = Path(__file__).resolve().parents[2] / "data" / "synthetic"
+_CHECKOUT = Path(__file__).resolve().parents[2] / "data" / "synthetic"
+#: Shipped recipes: in a checkout, else where an installation puts its data (pyproject.toml).
+RECIPE_FOLDER = _CHECKOUT if _CHECKOUT.is_dir() else Path(sysconfig.get_path("data")) / "share" / "hmc" / "recipes"
 
 MOTIONS = ("walk", "jog", "stand", "box", "gesture", "throw_catch", "sit", "pick_up", "bvh")
 
@@ -187,7 +189,7 @@ class Recipe:
 
 
 def shipped_recipes() -> list[str]:
-    """Names of the recipes that come with a checkout."""
+    """Names of the recipes that come with the package."""
     return sorted(path.stem for path in RECIPE_FOLDER.glob("*.toml"))
 
 
