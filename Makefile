@@ -43,7 +43,7 @@ test: $(READY)
 	$(PY) -m pytest
 
 lint: $(READY)
-	$(VENV)/bin/ruff check
+	$(VENV)/bin/ruff check --output-format concise
 	$(VENV)/bin/ruff format --check
 	$(VENV)/bin/mypy
 
