@@ -58,7 +58,7 @@ def test_derivatives_are_exact_for_cylinders(scene, pose):
     body = with_cylinders(body)
     points = BodyPoints(points.surface, axis_points(body))
     state = poses(scene)[pose]
-    residuals, jacobian = residual_rows(body, points, state, target, hull, SETTINGS)
+    _, jacobian = residual_rows(body, points, state, target, hull, SETTINGS)
     measured, smooth = smooth_derivatives(lambda s: residual_rows(body, points, s, target, hull, SETTINGS)[0], state)
     for name, rows in groups(points, hull).items():
         assert smooth[rows].mean() > 0.95

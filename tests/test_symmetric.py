@@ -162,8 +162,9 @@ def test_distance_to_many_bodies_far_from_the_origin():
     states = random_states(2, 700)
     points = np.random.default_rng(3).normal([0, 0, 1], 0.4, (20, 3))
     near = body_distance(body, states, points)
-    states[:, :3] += [120.0, -80.0, 3.0]
-    assert_allclose(body_distance(body, states, points + [120.0, -80.0, 3.0]), near, atol=1e-4)
+    far = np.array([120.0, -80.0, 3.0])
+    states[:, :3] += far
+    assert_allclose(body_distance(body, states, points + far), near, atol=1e-4)
     assert_allclose(near[[5, 699]], loop_body_distance(body, random_states(2, 700)[[5, 699]], points), atol=2e-5)
 
 
