@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-__all__ = ["LANDMARKS", "BONES", "landmark_index"]
+__all__ = ["BONES", "LANDMARKS", "landmark_index"]
 
 #: Joint centres (centres of rotation); `pelvis` is the middle of the hip centres, `neck` the base of the neck, `head_top` the crown.
 LANDMARKS: tuple[str, ...] = (

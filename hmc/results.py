@@ -134,7 +134,7 @@ class PoseStates:
     persons: np.ndarray
     states: np.ndarray
     dof_names: tuple[str, ...]
-    bodies: Mapping[int, Mapping[str, np.ndarray]] = field(default_factory=dict)
+    bodies: Mapping[int, Mapping[str, float | np.ndarray]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "dof_names", tuple(str(name) for name in self.dof_names))

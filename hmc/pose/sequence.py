@@ -18,6 +18,7 @@ import numpy as np
 from hmc.files import atomic_write
 from hmc.frontend import FrontendSettings, HullStep, stream_hulls
 from hmc.journal import append_journal, read_journal
+from hmc.landmarks import LANDMARKS
 from hmc.montecarlo.filters import ParticleState
 from hmc.pose.annealed.apf import PoseFilter, PoseInfo, PoseState, make_filter, pose_init, pose_step
 from hmc.pose.annealed.hull_target import HullTarget, make_target
@@ -127,7 +128,8 @@ class _Records:
     """What is done, in a journal on disk or, without one, in memory."""
 
     def __init__(self, path: str | Path | None, key: str) -> None:
-        self.path, self.kept = path, []
+        self.path = path
+        self.kept: list[dict[str, Any]] = []
         if path is not None:
             found = read_journal(path)
             if not found or found[0].get("key") != key:
@@ -282,19 +284,19 @@ def _assemble(records: list[dict[str, Any]], preset: PosePreset) -> PosedPeople:
             costs.append(np.nan if record["costs"][k] is None else record["costs"][k])
             fitted.append(record["status"][k] == "fitted")
     order = np.lexsort([persons, frames])
-    frames, persons = np.array(frames, int)[order], np.array(persons, int)[order]
-    states = np.array(states, float).reshape(-1, len(DOF_NAMES))[order]
-    costs, fitted = np.array(costs, float)[order], np.array(fitted, bool)[order]
-    positions = np.full((len(frames), 15, 3), np.nan)
-    for person, body in bodies.items():
-        rows = (persons == person) & fitted
-        positions[rows] = landmarks(body, states[rows])
+    frame, person = np.array(frames, int)[order], np.array(persons, int)[order]
+    state = np.array(states, float).reshape(-1, len(DOF_NAMES))[order]
+    is_fitted = np.array(fitted, bool)[order]
+    positions = np.full((len(frame), len(LANDMARKS), 3), np.nan)
+    for who, body in bodies.items():
+        rows = (person == who) & is_fitted
+        positions[rows] = landmarks(body, state[rows])
     for reason, who, count in _unfitted(records):
         notes.append(f"person {who}: {count} frame{'s' if count > 1 else ''} without a pose: {reason}")
     return PosedPeople(
-        PoseTable(frames, persons, positions),
-        PoseStates(frames, persons, states, DOF_NAMES, {person: body.dimensions for person, body in bodies.items()}),
-        costs,
+        PoseTable(frame, person, positions),
+        PoseStates(frame, person, state, DOF_NAMES, {who: body.dimensions for who, body in bodies.items()}),
+        np.array(costs, float)[order],
         tuple(notes),
     )
 
