@@ -51,4 +51,4 @@ bench: $(READY)
 	@for file in benchmarks/bench_*.py; do echo "== $$file"; $(PY) $$file || exit 1; done
 
 clean:
-	rm -rf $(VENV) $(OUT) build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) $(OUT)/demo* build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

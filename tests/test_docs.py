@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from hmc import __version__
 from hmc.cli import COMMANDS, make_parser
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -88,6 +89,11 @@ def test_make_targets_and_scripts_exist(page):
             assert wanted <= targets, f"{name_of(page)}: {line}"
         if len(words) > 1 and words[0].endswith("python") and words[1].endswith(".py"):
             assert (ROOT / words[1]).exists(), f"{name_of(page)}: {line}"
+
+
+def test_version_is_the_same_everywhere():
+    assert f"\nversion: {__version__}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"\n## {__version__} " in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
 
 
 def test_readme_names_every_part_of_the_tree():
