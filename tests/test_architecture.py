@@ -1,6 +1,7 @@
 """The plan of the house: who may import whom, what a core module may need, and what no file of the package does."""
 
 import ast
+import functools
 import subprocess
 import sys
 from graphlib import TopologicalSorter
@@ -60,9 +61,14 @@ UNWANTED = ("matplotlib", "mpl_toolkits", "pandas", "tqdm")
 UNSAFE_MODULES = {"pickle", "cPickle", "dill", "cloudpickle", "shelve", "marshal"}
 
 
+@functools.cache
+def parse(path):
+    return ast.parse(path.read_text(encoding="utf-8"), str(path))
+
+
 def trees(but=()):
     """Path and syntax tree of every file of the package, without some parts."""
-    return [(path, ast.parse(path.read_text(encoding="utf-8"), str(path))) for path in MODULES if part_of(path) not in but]
+    return [(path, parse(path)) for path in MODULES if part_of(path) not in but]
 
 
 def part_of(path):

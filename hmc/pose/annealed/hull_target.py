@@ -78,8 +78,8 @@ def make_target(grid: VoxelGrid, strict: np.ndarray, tolerant: np.ndarray) -> Hu
     core[tuple((strict - low).T)] = True
     distance = _distance_to(occupied, grid.voxel_size_m)
     distance += STRICT_SHARE * np.minimum(_distance_to(core, grid.voxel_size_m), STRICT_CAP_M)
-    surface = np.argwhere(core & ~ndimage.binary_erosion(core))
-    return HullTarget(distance, occupied, grid.centres(low), grid.voxel_size_m, grid.centres(surface + low), len(strict) * grid.voxel_size_m**3)
+    surface = grid.centres(np.argwhere(core & ~ndimage.binary_erosion(core)) + low)
+    return HullTarget(distance, occupied, grid.centres(low), grid.voxel_size_m, surface, len(strict) * grid.voxel_size_m**3)
 
 
 def _distance_to(occupied: np.ndarray, voxel_size_m: float) -> np.ndarray:
