@@ -14,7 +14,7 @@ PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md"), *(ROOT / "ben
 README = ROOT / "README.md"
 
 BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
-INLINE = re.compile(r"(?<!`)`([^`\n]+)`(?!`)")
+INLINE = re.compile(r"(?<!`)`([^`]+)`(?!`)")
 LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")
 HEADING = re.compile(r"^#+ +(.*)$", re.MULTILINE)
 PREFIXES = (("hmc",), ("python", "-m", "hmc"), (".venv/bin/hmc",), (".venv/bin/python", "-m", "hmc"))
@@ -30,7 +30,7 @@ def shell_lines(page):
     for language, block in BLOCK.findall(text):
         if language in ("sh", "bash", "console"):
             yield from (line.removeprefix("$ ") for line in block.replace("\\\n", " ").splitlines())
-    yield from INLINE.findall(BLOCK.sub("", text))
+    yield from (" ".join(code.split()) for code in INLINE.findall(BLOCK.sub("", text)))
 
 
 def hmc_commands(page):
