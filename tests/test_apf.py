@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from acted import act
 from numpy.testing import assert_allclose, assert_array_equal
-from posed import body_of, mean_error, true_state
+from posed import COST, body_of, mean_error, true_state
 
 from hmc.errors import InputError
 from hmc.montecarlo.filters import AnnealedSettings
@@ -16,9 +16,12 @@ from hmc.pose.body.joints import DOF_NAMES, N_DOF, mirror_state
 from hmc.pose.body.kinematics import landmarks
 from hmc.pose.body.proportions import canton_body
 
-# Little work a frame; everything else as in the presets.
+# Little work a frame, and weights of the tests' own; everything else as in the presets.
+FEW = AnnealedSettings(layers=2, particles=50, survival_rate=0.1, spread=0.5)
 LEAN = {
-    "default": replace(PRESETS["default"], annealed=AnnealedSettings(layers=2, particles=50, survival_rate=0.1, spread=0.5)),
+    "default": replace(
+        PRESETS["default"], symmetric=COST, annealed=AnnealedSettings(layers=2, particles=50, survival_rate=0.1, spread=0.5)
+    ),
     "canton2009": replace(PRESETS["canton2009"], annealed=AnnealedSettings(layers=3, particles=120)),
     "global": replace(PRESETS["canton2009"], likelihood="global", annealed=AnnealedSettings(layers=3, particles=120)),
 }

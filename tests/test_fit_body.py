@@ -4,16 +4,15 @@ import numpy as np
 import pytest
 from acted import act
 from numpy.testing import assert_allclose
-from posed import body_of, mean_error, true_state
+from posed import COST, body_of, mean_error, true_state
 
 from hmc.pose.annealed.fit_body import FitBodySettings, fit_body
 from hmc.pose.annealed.refine import RefineSettings, refine
-from hmc.pose.annealed.symmetric import SymmetricSettings, body_points
+from hmc.pose.annealed.symmetric import body_points
 from hmc.pose.body.flesh import surface_coordinates
 from hmc.pose.body.kinematics import landmarks
 from hmc.pose.body.proportions import default_body
 
-COST = SymmetricSettings()
 FRAMES = (0, 1, 3, 4, 6, 7)
 
 

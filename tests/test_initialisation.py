@@ -6,17 +6,14 @@ import numpy as np
 import pytest
 from acted import act
 from numpy.testing import assert_allclose
-from posed import body_of, mean_error
+from posed import COST, body_of, mean_error
 
 from hmc.landmarks import LANDMARKS, landmark_index
-from hmc.pose.annealed.symmetric import SymmetricSettings
 from hmc.pose.body.joints import DOF_NAMES, N_DOF, mirror_state
 from hmc.pose.body.kinematics import landmarks
 from hmc.pose.body.model import neutral_state
 from hmc.pose.body.proportions import canton_body
 from hmc.pose.initialisation import TEMPLATES, first_poses, swapped_poses, template_states
-
-COST = SymmetricSettings()
 
 
 def turn(one: float, other: float) -> float:

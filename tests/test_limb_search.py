@@ -4,16 +4,15 @@ import numpy as np
 import pytest
 from acted import act
 from numpy.testing import assert_allclose
-from posed import body_of, true_state
+from posed import COST, body_of, true_state
 
 from hmc.landmarks import landmark_index
 from hmc.pose.annealed.limb_search import LIMBS, SearchSettings, lost_limbs, search_limbs
 from hmc.pose.annealed.refine import RefineSettings, refine
-from hmc.pose.annealed.symmetric import SymmetricSettings
 from hmc.pose.body.joints import DOF_NAMES
 from hmc.pose.body.kinematics import landmarks
 
-COST = SymmetricSettings()
+SEARCH = SearchSettings(far_m=0.05, draws=250, gain=0.03)
 # An arm held out where there is nothing, a leg kicked aside.
 LOST = {
     "r_arm": {"r_shoulder_x": -1.4, "r_shoulder_z": 0.0, "r_elbow_z": 0.2},
@@ -73,9 +72,9 @@ def test_a_lost_limb_is_found_again(scene, limb):
     lost, info = refine(body, points, lose(state, limb), target, hull, COST, RefineSettings(iterations=1))
     assert info.cost_after > 1.5 * best
     found, cost, evaluations = search_limbs(
-        np.random.default_rng(1), body, points, lost, info.cost_after, [limb], target, hull, COST, RefineSettings(), SearchSettings()
+        np.random.default_rng(1), body, points, lost, info.cost_after, [limb], target, hull, COST, RefineSettings(), SEARCH
     )
-    assert cost < 0.6 * info.cost_after and evaluations > SearchSettings().draws
+    assert cost < 0.6 * info.cost_after and evaluations > SEARCH.draws
     assert np.all((found >= body.limits.low) & (found <= body.limits.high))
     ends = [landmark_index(f"{limb[0]}_{end}") for end in ENDS[limb[2:]]]
     miss = np.linalg.norm(landmarks(body, found)[ends] - landmarks(body, state)[ends], axis=1)
@@ -105,7 +104,7 @@ def test_what_is_right_stays(scene):
 def test_nothing_is_looked_for_when_nothing_is_asked(scene):
     body, points, target, hull, state, cost = scene
     found, after, evaluations = search_limbs(
-        np.random.default_rng(0), body, points, state, cost, [], target, hull, COST, RefineSettings(), SearchSettings()
+        np.random.default_rng(0), body, points, state, cost, [], target, hull, COST, RefineSettings(), SEARCH
     )
     assert_allclose(found, state)
     assert after == cost and evaluations == 0
@@ -115,7 +114,7 @@ def test_the_same_seed_gives_the_same(scene):
     body, points, target, hull, state, _ = scene
     lost = lose(state, "l_arm")
     one, other = (
-        search_limbs(np.random.default_rng(7), body, points, lost, 1.0, ["l_arm"], target, hull, COST, RefineSettings(), SearchSettings())
+        search_limbs(np.random.default_rng(7), body, points, lost, 1.0, ["l_arm"], target, hull, COST, RefineSettings(), SEARCH)
         for _ in range(2)
     )
     np.testing.assert_array_equal(one[0], other[0])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from acted import act
 from numpy.testing import assert_allclose
-from posed import body_of, crossed_arms, mean_error, true_state, with_cylinders
+from posed import COST, body_of, crossed_arms, mean_error, true_state, with_cylinders
 
 from hmc.pose.annealed.penetration import axis_points
 from hmc.pose.annealed.refine import RefineSettings, refine, residual_rows, residual_values
@@ -12,7 +12,6 @@ from hmc.pose.annealed.symmetric import BodyPoints, SymmetricSettings, symmetric
 from hmc.pose.body.joints import N_DOF, dof_index
 from hmc.pose.body.kinematics import landmarks
 
-SETTINGS = SymmetricSettings()
 GROUPS = ("outside", "unexplained", "depth", "posture")
 
 
@@ -58,8 +57,8 @@ def test_derivatives_are_exact_for_cylinders(scene, pose):
     body = with_cylinders(body)
     points = BodyPoints(points.surface, axis_points(body))
     state = poses(scene)[pose]
-    _, jacobian = residual_rows(body, points, state, target, hull, SETTINGS)
-    measured, smooth = smooth_derivatives(lambda s: residual_rows(body, points, s, target, hull, SETTINGS)[0], state)
+    _, jacobian = residual_rows(body, points, state, target, hull, COST)
+    measured, smooth = smooth_derivatives(lambda s: residual_rows(body, points, s, target, hull, COST)[0], state)
     for name, rows in groups(points, hull).items():
         assert smooth[rows].mean() > 0.95
         fine = np.flatnonzero(smooth)
@@ -74,8 +73,8 @@ def test_derivatives_for_flesh_point_the_right_way(scene, pose):
     """Elliptic and tapered cones may be treated as round and straight: descent needs the direction."""
     body, points, target, hull, _ = scene
     state = poses(scene)[pose]
-    _, jacobian = residual_rows(body, points, state, target, hull, SETTINGS)
-    measured, smooth = smooth_derivatives(lambda s: residual_rows(body, points, s, target, hull, SETTINGS)[0], state)
+    _, jacobian = residual_rows(body, points, state, target, hull, COST)
+    measured, smooth = smooth_derivatives(lambda s: residual_rows(body, points, s, target, hull, COST)[0], state)
     for name, rows in groups(points, hull).items():
         fine = smooth[rows] & (np.linalg.norm(measured[rows], axis=1) > 1e-9)
         a, b = jacobian[rows][fine], measured[rows][fine]
@@ -85,7 +84,7 @@ def test_derivatives_for_flesh_point_the_right_way(scene, pose):
         assert not np.any(jacobian[rows][smooth[rows] & ~fine])  # what does not change has no derivative
 
 
-@pytest.mark.parametrize("settings", [SETTINGS, SymmetricSettings(0.08, 0.4, 3.0, 1e-4)])
+@pytest.mark.parametrize("settings", [COST, SymmetricSettings(0.08, 0.4, 3.0, 1e-4)])
 def test_residuals_square_to_the_cost(scene, settings):
     """The refinement interpolates the distance field, the particles take the nearest voxel: the same up to the voxel's size."""
     body, points, target, hull, true = scene
@@ -99,10 +98,10 @@ def test_nothing_pulls_beyond_the_cap(scene):
     body, points, target, hull, true = scene
     far = true.copy()
     far[:2] += 3.0
-    residuals, jacobian = residual_rows(body, points, far, target, hull, SETTINGS)
+    residuals, jacobian = residual_rows(body, points, far, target, hull, COST)
     both = slice(0, len(points.surface.points) + len(hull))
     assert not jacobian[both].any()
-    assert residuals[both] @ residuals[both] == pytest.approx((1 + SETTINGS.explain_weight) * SETTINGS.cap_m**2, rel=1e-6)
+    assert residuals[both] @ residuals[both] == pytest.approx((1 + COST.explain_weight) * COST.cap_m**2, rel=1e-6)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -111,11 +110,11 @@ def test_the_cost_never_rises_and_limits_hold(scene, seed):
     start = true + np.random.default_rng(seed).normal(0, [0.1] * 3 + [0.4] * 24)
     last = np.inf
     for iterations in (1, 2, 4, 8):
-        state, info = refine(body, points, start, target, hull, SETTINGS, RefineSettings(iterations=iterations))
+        state, info = refine(body, points, start, target, hull, COST, RefineSettings(iterations=iterations))
         assert np.all((state >= body.limits.low) & (state <= body.limits.high))
         assert info.cost_after <= info.cost_before and info.cost_after <= last
         assert info.evaluations >= 1
-        residuals, _ = residual_rows(body, points, state, target, hull, SETTINGS)
+        residuals, _ = residual_rows(body, points, state, target, hull, COST)
         assert residuals @ residuals <= info.cost_after + 1e-12  # the rest is the hold on the start
         last = info.cost_after
 
@@ -125,10 +124,10 @@ def test_only_free_degrees_move(scene):
     start = np.clip(true + np.random.default_rng(1).normal(0, 0.15, N_DOF), body.limits.low, body.limits.high)
     free = np.zeros(N_DOF, bool)
     free[dof_index("l_shoulder_x", "l_shoulder_z", "l_elbow_z")] = True
-    state, info = refine(body, points, start, target, hull, SETTINGS, RefineSettings(), free=free)
+    state, info = refine(body, points, start, target, hull, COST, RefineSettings(), free=free)
     assert_allclose(state[~free], start[~free])
     assert np.abs(state[free] - start[free]).max() > 1e-3 and info.cost_after < info.cost_before
-    state, info = refine(body, points, start, target, hull, SETTINGS, RefineSettings(), free=np.zeros(N_DOF, bool))
+    state, info = refine(body, points, start, target, hull, COST, RefineSettings(), free=np.zeros(N_DOF, bool))
     assert_allclose(state, start)
     assert info.cost_after == info.cost_before
 
@@ -136,11 +135,11 @@ def test_only_free_degrees_move(scene):
 def test_a_strong_hold_keeps_the_pose(scene):
     body, points, target, hull, true = scene
     start = np.clip(true + np.random.default_rng(4).normal(0, 0.1, N_DOF), body.limits.low, body.limits.high)
-    weak, _ = refine(body, points, start, target, hull, SETTINGS, RefineSettings(stay_weight=1e-7))
-    strong, _ = refine(body, points, start, target, hull, SETTINGS, RefineSettings(stay_weight=10.0))
+    weak, _ = refine(body, points, start, target, hull, COST, RefineSettings(stay_weight=1e-7))
+    strong, _ = refine(body, points, start, target, hull, COST, RefineSettings(stay_weight=10.0))
     assert np.abs(strong - start).max() < 0.01 * np.abs(weak - start).max()
     # The hold pulls to the anchor, where one is given.
-    anchored, _ = refine(body, points, start, target, hull, SETTINGS, RefineSettings(iterations=40, stay_weight=10.0), anchor=true)
+    anchored, _ = refine(body, points, start, target, hull, COST, RefineSettings(iterations=40, stay_weight=10.0), anchor=true)
     assert np.abs(anchored - np.clip(true, body.limits.low, body.limits.high)).max() < 0.02
 
 
@@ -156,7 +155,7 @@ def test_displaced_poses_of_rendered_people_are_recovered(motion):
         rng = np.random.default_rng(frame)
         for _ in range(3):
             start = np.clip(true + rng.normal(0, [0.05] * 3 + [0.08] * 3 + [0.2] * 21), body.limits.low, body.limits.high)
-            state, _ = refine(body, points, start, target, target.surface[::3], SETTINGS, RefineSettings(iterations=20))
+            state, _ = refine(body, points, start, target, target.surface[::3], COST, RefineSettings(iterations=20))
             before, after = (mean_error(landmarks(body, s), acted.landmarks[frame]) for s in (start, state))
             gains.append((before, after))
     before, after = np.mean(gains, axis=0)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from acted import act
 from numpy.testing import assert_allclose, assert_array_equal
-from posed import body_of, mean_error, true_state
+from posed import COST, body_of, mean_error, true_state
 
 from hmc.montecarlo.filters import AnnealedSettings
 from hmc.pose.annealed.apf import make_filter
@@ -15,9 +15,8 @@ from hmc.pose.annealed.presets import PRESETS
 from hmc.pose.body.kinematics import landmarks
 from hmc.pose.start import StartSettings, estimate_height, follow, start_person
 
-LEAN = replace(
-    PRESETS["default"], annealed=AnnealedSettings(layers=2, particles=50, survival_rate=0.1, spread=0.5), search=SearchSettings(draws=80)
-)
+FEW = AnnealedSettings(layers=2, particles=50, survival_rate=0.1, spread=0.5)
+LEAN = replace(PRESETS["default"], symmetric=COST, annealed=FEW, search=SearchSettings(draws=80))
 CANTON = replace(PRESETS["canton2009"], annealed=AnnealedSettings(layers=2, particles=60))
 ROOM = np.array([[-1.6, -1.6, 0.0], [1.6, 1.6, 2.3]])
 QUICK, LEAST = StartSettings(anchors=2, candidates=4), StartSettings(anchors=1, candidates=2)

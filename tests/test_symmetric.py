@@ -8,7 +8,7 @@ from acted import act
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from posed import body_of, crossed_arms, true_state, with_cylinders
+from posed import COST, body_of, crossed_arms, true_state, with_cylinders
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
@@ -201,7 +201,7 @@ def test_outside_distance_equals_a_loop(balls):
                 assert found[n, k] == pytest.approx(balls.distance[tuple(held)] + beyond, abs=1e-5)
 
 
-@pytest.mark.parametrize("settings", [SymmetricSettings(), SymmetricSettings(0.1, 0.5, 3.0, 1e-4)])
+@pytest.mark.parametrize("settings", [COST, SymmetricSettings(0.1, 0.5, 3.0, 1e-4)])
 def test_the_cost_is_the_sum_of_its_parts(balls, settings):
     body, points = body_of()
     states = np.stack([crossed_arms(), *random_states(6, 3)])
@@ -240,6 +240,6 @@ def test_the_true_pose_of_a_rendered_person_costs_least():
         spread = np.r_[np.full(3, 0.15), np.full(24, 0.35)]
         others = np.clip(true + rng.normal(0, 1, (60, N_DOF)) * spread, body.limits.low, body.limits.high)
         target = acted.targets[frame]
-        costs = symmetric_cost(body, points, np.stack([true, *others]), target, target.surface[::4], SymmetricSettings())
+        costs = symmetric_cost(body, points, np.stack([true, *others]), target, target.surface[::4], COST)
         assert np.argmin(costs) == 0
         assert costs[0] < 0.3 * np.median(costs)
