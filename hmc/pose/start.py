@@ -59,7 +59,7 @@ class StartSettings:
     candidates: int = 5
     follow_s: float = 0.4
     walk_speed_m_s: float = 0.5
-    walk_penalty: float = 0.6
+    walk_penalty: float = 2.0
     body_frames: int = 12
 
 
@@ -214,6 +214,7 @@ def _best_hypothesis(frame_rng, filt, fps, targets, usable, velocities, floor_z,
     for anchor in anchors:
         rng = frame_rng(anchor)
         states, costs = first_poses(rng, body, samples, targets[anchor], preset.symmetric, floor_z)
+        costs = costs * _walk_factor(states[:, 3], velocities[anchor], settings)
         pool += [(cost, anchor, state) for cost, state in zip(costs, states, strict=True)]
     pool.sort(key=lambda entry: entry[0])
     # All candidates are compared in the frame that was easiest to explain.
@@ -222,7 +223,7 @@ def _best_hypothesis(frame_rng, filt, fps, targets, usable, velocities, floor_z,
     here = [state for _, where, state in pool if where == anchor]
     trials = [*here, *swapped_poses(body, here[0]), *swapped_poses(body, here[min(1, len(here) - 1)])]
     refined = [refine(body, samples, trial, targets[anchor], points, preset.symmetric, preset.refine) for trial in trials]
-    refined.sort(key=lambda pair: pair[1].cost_after)
+    refined.sort(key=lambda pair: pair[1].cost_after * _walk_factor(pair[0][3], velocities[anchor], settings))
     chosen: list[np.ndarray] = []
     for state, _ in refined:
         if all(np.abs(landmarks(body, state) - landmarks(body, other)).max() > 0.08 for other in chosen):
@@ -238,7 +239,7 @@ def _best_hypothesis(frame_rng, filt, fps, targets, usable, velocities, floor_z,
         states, infos = follow(lambda k: frame_rng(first + k), _quick(filt), state, anchor - first, targets[first:last])
         costs = np.array([info.cost for info in infos])
         headings = np.array([one.state[3] for one in states])
-        scores.append(np.nanmean(costs) * (1 + settings.walk_penalty * _backwards(headings, velocities[first:last], settings)))
+        scores.append(np.nanmean(costs * _walk_factor(headings, velocities[first:last], settings)))
     order = np.argsort(scores)
     return anchor, chosen[order[0]], np.array(scores)[order]
 
@@ -258,14 +259,11 @@ def _search_all(rng, filt, state, target, points):
     )[0]
 
 
-def _backwards(headings: np.ndarray, velocities: np.ndarray, settings: StartSettings) -> float:
-    """How much a body walks backwards: 0 (forwards, or hardly moving) to 1."""
-    speed = np.hypot(velocities[:, 0], velocities[:, 1])
-    moving = speed > settings.walk_speed_m_s
-    if not moving.any():
-        return 0.0
-    forwards = (np.cos(headings) * velocities[:, 0] + np.sin(headings) * velocities[:, 1])[moving] / speed[moving]
-    return float(np.mean((1 - forwards) / 2))
+def _walk_factor(headings: np.ndarray, velocities: np.ndarray, settings: StartSettings) -> np.ndarray:
+    """By how much walking backwards raises a cost: 1 for forwards or hardly moving, 1 + walk_penalty for straight back."""
+    speed = np.hypot(velocities[..., 0], velocities[..., 1])
+    forwards = (np.cos(headings) * velocities[..., 0] + np.sin(headings) * velocities[..., 1]) / np.maximum(speed, 1e-9)
+    return np.where(speed > settings.walk_speed_m_s, 1 + settings.walk_penalty * (1 - forwards) / 2, 1.0)
 
 
 def _fit(frame_rng, filt, fps, targets, states, infos, settings, height_known):

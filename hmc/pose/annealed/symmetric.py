@@ -59,7 +59,7 @@ class SymmetricSettings:
         tell apart, such as the ways to fold an arm before the chest.
     """
 
-    cap_m: float = 0.20
+    cap_m: float = 0.06
     explain_weight: float = 1.0
     overlap_weight: float = 2.0
     posture_weight: float = 3e-6
