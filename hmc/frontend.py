@@ -5,7 +5,8 @@
 
 Where the silhouettes come from, camera by camera (``FrontendSettings.source = "auto"``): ready-made ones where the recording has them;
 else the images against a background learnt from frames of the empty scene; else against a temporal median of the recording from which
-people were cut out (`hmc.camera.empty_scene`), which holds only where people move.
+people were cut out with the help of all cameras (`hmc.camera.empty_scene`). That holds where people move; a place they hardly ever leave
+is foreground whenever they are there, and a foot that stands still for most of the time may be missed.
 
 Nothing grows with the length of the recording.
 """
@@ -17,14 +18,17 @@ import os
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
 
-from hmc.camera.empty_scene import empty_scene, replace_people
+from hmc.camera.empty_scene import empty_scenes, replace_people
+from hmc.camera.model import Rig
 from hmc.camera.segmentation import BackgroundModel, SegmentationSettings, segment_views, train_background
 from hmc.errors import InputError
 from hmc.recording import Frame, Recording, background_frames, iterate_frames, open_recording
+from hmc.voxels.agreement import agreed_views
 from hmc.voxels.carving import CarvingTables, carve_levels, make_tables
 from hmc.voxels.grid import VoxelGrid
 
@@ -38,6 +42,9 @@ Report = Callable[[str], None]
 SOURCES = ("auto", "silhouettes", "background", "median")
 #: Bytes that the images of which the median is taken may fill.
 MEDIAN_BYTES = 400e6
+#: Longer side of the images on which people are told from the scene, pixels, and the voxels in which cameras agree on them, metres.
+SMALL_PX = 320
+COARSE_M = 0.05
 
 
 @dataclass(frozen=True)
@@ -238,8 +245,7 @@ def learn_backgrounds(recording: Recording, settings: FrontendSettings | None = 
             f"{', '.join(names[c] for c in left)}: no frames of the empty scene; the background is the median of the recording, "
             "so people who stay where they are may be missed"
         )
-        for c, images in _around_median(recording, left, settings).items():
-            models[c] = train_background(images, settings.segmentation)
+        models |= _learn_from_people(recording, left, settings)
     return tuple(models.get(c) for c in range(len(names)))
 
 
@@ -264,27 +270,35 @@ def _segment(frame: Frame, models: tuple, settings: FrontendSettings, pool: Thre
     return tuple(masks), tuple(new.get(c) for c in range(len(models)))
 
 
-def _around_median(recording: Recording, cameras: list[int], settings: FrontendSettings) -> dict[int, list[np.ndarray]]:
-    """Images of the scene without what moves: samples of the recording, without the people."""
+def _samples(recording: Recording, cameras: list[int], settings: FrontendSettings) -> list[list[np.ndarray | None]]:
+    """Some frames' images of some cameras, spread over the recording around the selection."""
     whole = open_recording(recording.path, recording.rig.names)
     frame_bytes = sum(3 * width * height for width, height in (recording.rig[c].size for c in cameras))
     n_samples = int(np.clip(MEDIAN_BYTES // frame_bytes, 9, settings.median_frames))
     first = max(0, recording.start + recording.n_frames // 2 - settings.median_span // 2)
     last = min(first + settings.median_span, whole.n_frames)
     wanted = set(np.unique(np.linspace(first, last - 1, n_samples).round().astype(int)).tolist())
-    samples: dict[int, list[np.ndarray]] = {c: [] for c in cameras}
-    for frame in iterate_frames(whole, first, last, on_problem=lambda line: None):  # the run itself reports them
-        if frame.index in wanted:
-            for c in cameras:
-                image = frame.images[c]
-                if image is not None:
-                    samples[c].append(image)
-    for c, images in samples.items():
-        if not images:
+    frames = iterate_frames(whole, first, last, on_problem=lambda line: None)  # the run itself reports them
+    samples = [[frame.images[c] for c in cameras] for frame in frames if frame.index in wanted]
+    for c, images in zip(cameras, zip(*samples, strict=True), strict=True):
+        if all(image is None for image in images):
             raise InputError(f"{recording.path}: camera '{recording.rig[c].name}' has no readable image; leave it out: --cameras")
-        scene = empty_scene(images)
-        samples[c] = [replace_people(image, scene) for image in images]
     return samples
+
+
+def _learn_from_people(recording: Recording, cameras: list[int], settings: FrontendSettings) -> dict[int, BackgroundModel]:
+    """Models of the empty scene from frames with people in them."""
+    samples = _samples(recording, cameras, settings)
+    rig = Rig(tuple(recording.rig[c].scaled(min(1.0, SMALL_PX / max(recording.rig[c].size))) for c in cameras))
+    tables = make_tables(VoxelGrid.from_room(recording.room, COARSE_M, len(rig)), rig)
+    with ThreadPoolExecutor(settings.threads or os.cpu_count() or 1) as pool:
+        scenes = empty_scenes(samples, [camera.size for camera in rig], partial(agreed_views, tables), pool)
+    models = {}
+    for i, c in enumerate(cameras):
+        scene, unseen = scenes[i]
+        images = (replace_people(image, scene) for image in (frame[i] for frame in samples) if image is not None)
+        models[c] = train_background(images, settings.segmentation, unseen)
+    return models
 
 
 def _read_ahead(items: Iterable[T], reader: ThreadPoolExecutor) -> Iterator[T]:

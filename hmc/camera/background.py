@@ -15,7 +15,7 @@ import numpy as np
 
 from hmc.errors import InputError
 
-__all__ = ["stable_background"]
+__all__ = ["masked_median", "stable_background"]
 
 #: Rows of an image that are worked on at a time: bounds the memory.
 ROWS = 64
@@ -67,3 +67,30 @@ def stable_background(images: Sequence[np.ndarray], share: float = 0.25) -> tupl
     closing, opening = (cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (n, n)) for n in (2 * side + 1, side))
     closed = cv2.morphologyEx(cv2.medianBlur(doubtful, 5), cv2.MORPH_CLOSE, closing)
     return background, cv2.morphologyEx(closed, cv2.MORPH_OPEN, opening).view(bool)
+
+
+def masked_median(images: Sequence[np.ndarray], hidden: Sequence[np.ndarray]) -> np.ndarray:
+    """Median over images of each pixel where it is not hidden; over all images where it always is.
+
+    Parameters
+    ----------
+    images : sequence of ndarray of uint8, shape (height, width, 3)
+    hidden : sequence of ndarray of bool, shape (height, width)
+        One an image.
+
+    Returns
+    -------
+    ndarray of uint8, shape (height, width, 3)
+        Of an even number of values, the lower of the two in the middle.
+    """
+    result = np.empty_like(images[0])
+    for top in range(0, len(result), ROWS):
+        rows = slice(top, top + ROWS)
+        stack = np.stack([image[rows] for image in images])
+        out = np.stack([mask[rows] for mask in hidden])
+        out &= ~out.all(axis=0)
+        stack[out] = 255  # sorts behind every grey level, and equal ones need not be told apart
+        middle = ((~out).sum(axis=0) - 1) // 2
+        stack.sort(axis=0)
+        result[rows] = np.take_along_axis(stack, middle[None, ..., None], axis=0)[0]
+    return result

@@ -1,0 +1,82 @@
+"""What the cameras' silhouettes agree on, seen from each camera: the visual hull, back in the images.
+
+A silhouette holds shadows, mirror images and people outside of the room; others have gaps. In the hull of all cameras these have no
+place, and what one camera missed is still in the hull in which a camera may be wrong.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+
+from hmc.camera.model import Camera, project
+from hmc.voxels.carving import CarvingTables, carve_levels
+from hmc.voxels.components import components
+
+__all__ = ["agreed_views"]
+
+#: Smaller blobs are nobody, cubic metres.
+LEAST_VOLUME = 0.01
+#: How far people may reach beyond the tolerant hull, metres.
+REACH_M = 0.1
+#: A hull that ends this near above the floor goes on to it: legs hold people up. Metres.
+LEGS_M = 1.2
+
+
+def agreed_views(
+    tables: CarvingTables, masks: Sequence[np.ndarray | None], tolerance: int = 1
+) -> tuple[list[np.ndarray | None], list[np.ndarray | None]]:
+    """Where in each image people surely are, and where they may be, as all cameras together tell.
+
+    Parameters
+    ----------
+    tables : CarvingTables
+        The first layer of the grid lies on the floor.
+    masks : sequence of ndarray of bool, shape (height, width), or None
+        One a camera.
+    tolerance : int
+        Cameras that may have missed somebody; none where fewer than four have a mask.
+
+    Returns
+    -------
+    surely, possibly : lists of ndarray of bool, shape (height, width), or None
+        The hull of all cameras in each view, and the one in which `tolerance` cameras may be wrong, down to the floor and a little
+        further all around. ``None`` where there is no mask.
+    """
+    n_masks = sum(mask is not None for mask in masks)
+    strict, tolerant = (_bodies(hull, tables) for hull in carve_levels(tables, masks, (0, tolerance if n_masks >= 4 else 0)))
+    size = tables.grid.voxel_size_m
+    lowest = tolerant.argmax(axis=2)
+    down = tolerant.any(axis=2) & (lowest * size < LEGS_M)
+    tolerant |= down[..., None] & (np.arange(tolerant.shape[2]) < lowest[..., None])
+    points = [tables.grid.centres(np.argwhere(hull)) for hull in (strict, tolerant)]
+    surely, possibly = (
+        [None if mask is None else _view(camera, centres, radius) for camera, mask in zip(tables.rig, masks, strict=True)]
+        for centres, radius in zip(points, (0.65 * size, 0.65 * size + REACH_M), strict=True)
+    )
+    return surely, possibly
+
+
+def _bodies(hull: np.ndarray, tables: CarvingTables) -> np.ndarray:
+    """The hull without blobs that are too small for anybody."""
+    blobs = components(hull, tables.grid, max(1, round(LEAST_VOLUME / tables.grid.voxel_size_m**3)))
+    kept = np.zeros_like(hull)
+    kept[tuple(blobs.voxels.T)] = True
+    return kept
+
+
+def _view(camera: Camera, points: np.ndarray, radius_m: float) -> np.ndarray:
+    """Image of balls, all drawn as large as one at the middle depth."""
+    uv, valid = project(camera, points)
+    width, height = camera.size
+    mask: np.ndarray = np.zeros((height, width), np.uint8)
+    pixel = np.round(np.where(valid[:, None], uv, -1)).astype(int)
+    seen = ((pixel >= 0) & (pixel < (width, height))).all(axis=1)
+    if seen.any():
+        mask[pixel[seen, 1], pixel[seen, 0]] = 1
+        depth = float(np.median((points[seen] @ camera.rotation.T + camera.translation)[:, 2]))
+        side = 2 * int(np.ceil(camera.matrix[0, 0] * radius_m / depth)) + 1
+        mask = cv2.dilate(mask, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side)))
+    return mask.view(bool)
