@@ -115,12 +115,14 @@ class HullStep(MaskStep):
 
     Attributes
     ----------
-    strict, tolerant : ndarray of bool, shape (nx, ny, nz)
-        The visual hull of all cameras, and the one in which a camera may be wrong. Empty where the frame is not `usable`.
+    strict, tolerant, loose : ndarray of bool, shape (nx, ny, nz)
+        The visual hull of all cameras, the one in which a camera may be wrong, and, of five cameras or more, the one in which one
+        more may be: what furniture hides from two cameras is still in it. Empty where the frame is not `usable`.
     """
 
     strict: np.ndarray
     tolerant: np.ndarray
+    loose: np.ndarray
 
 
 def stream_hulls(
@@ -249,13 +251,13 @@ def learn_backgrounds(recording: Recording, settings: FrontendSettings | None = 
     return tuple(models.get(c) for c in range(len(names)))
 
 
-def _hulls(tables: CarvingTables, step: MaskStep, settings: FrontendSettings) -> tuple[np.ndarray, np.ndarray]:
+def _hulls(tables: CarvingTables, step: MaskStep, settings: FrontendSettings) -> tuple[np.ndarray, ...]:
     if not step.usable:
-        return np.zeros(tables.grid.shape, bool), np.zeros(tables.grid.shape, bool)
+        return tuple(np.zeros(tables.grid.shape, bool) for _ in range(3))
     n_masks = sum(mask is not None for mask in step.masks)
-    levels = (0, settings.tolerance if n_masks >= 4 else 0)
-    strict, tolerant = carve_levels(tables, step.masks, levels, outside=settings.outside, min_views=settings.min_views)
-    return strict, tolerant
+    tolerance = settings.tolerance if n_masks >= 4 else 0
+    levels = (0, tolerance, tolerance + 1 if n_masks >= 5 else tolerance)
+    return carve_levels(tables, step.masks, levels, outside=settings.outside, min_views=settings.min_views)
 
 
 def _segment(frame: Frame, models: tuple, settings: FrontendSettings, pool: ThreadPoolExecutor) -> tuple[tuple, tuple]:

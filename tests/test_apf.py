@@ -81,7 +81,7 @@ def test_the_default_preset_follows_a_rendered_walker():
 def test_refinement_beats_the_particles_alone():
     acted = act("walk")
     full = filter_of("default", acted)
-    bare = replace(full, preset=replace(full.preset, refine=None, search=None))
+    bare = replace(full, preset=replace(full.preset, refine=None, search=None, fit_body=None, start="neutral"))
     errors = {}
     for name, filt in (("full", full), ("bare", bare)):
         state, errors[name] = pose_init(true_state(filt.body, acted)), []

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from hmc.cli.common import add_selection_options, open_selected, positive_float, print_problems, progress
+from hmc.cli.common import add_selection_options, open_selected, positive_float, print_problems, progress, whole_number
 from hmc.cli.track import JOURNAL, _last_change
 
 __all__ = ["add_parser", "run"]
@@ -31,7 +31,7 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     parser.add_argument("--preset", default="default", metavar="NAME", help="default, or canton2009 for the thesis's printed parameters")
     parser.add_argument("--voxel", type=positive_float, default=0.03, metavar="M", help="side of a voxel, metres (default: 0.03)")
     parser.add_argument("--track-voxel", type=positive_float, default=0.05, metavar="M", help="the same for the tracker (default: 0.05)")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of the random numbers (default: 0)")
+    parser.add_argument("--seed", type=whole_number, default=0, metavar="N", help="seed of the random numbers (default: 0)")
     parser.add_argument(
         "--height",
         default="recording",
@@ -53,13 +53,14 @@ def run(args: argparse.Namespace) -> int:
     from hmc.pose.sequence import pose_recording
     from hmc.results import read_run, write_joints, write_pose, write_run, write_tracks
     from hmc.tracking.naive import NaiveSettings
-    from hmc.tracking.resumable import track_recording
+    from hmc.tracking.resumable import person_grid, track_recording
 
     recording = open_selected(args)
     preset = pose_preset(args.preset)
     if args.out.is_file():
         raise InputError(f"--out {args.out}: is a file; give a folder")
     height = _height(args.height, recording)
+    person_grid(recording, args.voxel)  # voxels that will not do are refused before any work is done
     tracker, frontend = NaiveSettings(), FrontendSettings()
     parameters: dict[str, Any] = {
         "voxel_size_m": args.voxel,

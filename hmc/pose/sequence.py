@@ -30,7 +30,7 @@ from hmc.pose.body.proportions import make_body
 from hmc.pose.start import start_person
 from hmc.recording import Recording
 from hmc.results import PoseStates, PoseTable, TrackTable
-from hmc.tracking.resumable import observe_step
+from hmc.tracking.resumable import WARM_UP_FRAMES, observe_step, person_grid
 from hmc.tracking.tracks import person_voxels, velocities
 from hmc.voxels.grid import VoxelGrid
 
@@ -40,8 +40,6 @@ logger = logging.getLogger("hmc")
 
 #: How long a person is watched before the body and the first pose are decided, seconds, and at most this many frames.
 WINDOW_S, WINDOW_FRAMES = 1.5, 45
-#: Frames segmented before the one at which a stopped run goes on, so that the background has adapted.
-WARM_UP_FRAMES = 300
 
 
 @dataclass(frozen=True)
@@ -112,7 +110,7 @@ def pose_recording(
     InputError
         When the voxels are too many for the memory.
     """
-    grid = VoxelGrid.from_room(recording.room, voxel_size_m, len(recording.rig))
+    grid = person_grid(recording, voxel_size_m)
     records = _Records(journal, key)
     work = _Work(recording, tracks, grid, preset, seed, height_m, records)
     first, end = work.next_frame(), recording.start + recording.n_frames
@@ -130,6 +128,7 @@ class _Records:
     def __init__(self, path: str | Path | None, key: str) -> None:
         self.path = path
         self.kept: list[dict[str, Any]] = []
+        self.written: dict[int, int] = {}
         if path is not None:
             found = read_journal(path)
             if not found or found[0].get("key") != key:
@@ -145,25 +144,23 @@ class _Records:
     def keep_particles(self, person: int, frame: int, particles: ParticleState) -> None:
         """Beside the journal; those of the frame before stay until the frame after, should the run stop between two writes."""
         if self.path is not None:
-            with atomic_write(self._particle_file(person, frame), "wb") as file:
-                np.savez(file, particles=particles.particles, log_weights=particles.log_weights)
+            self.written[person] = self.written.get(person, 0) + 1
+            with atomic_write(self._particle_file(person, self.written[person] % 2), "wb") as file:
+                np.savez(file, frame=frame, particles=particles.particles, log_weights=particles.log_weights)
 
     def particles(self, person: int, frame: int) -> ParticleState | None:
-        if self.path is None or not self._particle_file(person, frame).exists():
-            return None
-        with np.load(self._particle_file(person, frame), allow_pickle=False) as data:
-            return ParticleState(data["particles"], data["log_weights"])
+        """Those kept for this frame; the next are then written to the other file."""
+        for turn in (0, 1) if self.path is not None else ():
+            if self._particle_file(person, turn).exists():
+                with np.load(self._particle_file(person, turn), allow_pickle=False) as data:
+                    if int(data["frame"]) == frame:
+                        self.written[person] = turn
+                        return ParticleState(data["particles"], data["log_weights"])
+        return None
 
-    def _particle_file(self, person: int, frame: int) -> Path:
+    def _particle_file(self, person: int, turn: int) -> Path:
         path = Path(self.path or "")
-        return path.with_name(f"{path.name}.{person}.{frame % 2}.npz")
-
-    def remove(self) -> None:
-        """Delete what was kept on disk."""
-        if self.path is not None:
-            path = Path(self.path)
-            for file in path.parent.glob(f"{path.name}*"):
-                file.unlink()
+        return path.with_name(f"{path.name}.{person}.{turn}.npz")
 
     def all(self) -> list[dict[str, Any]]:
         return self.kept if self.path is None else read_journal(self.path)[1:]
@@ -216,8 +213,10 @@ class _Work:
         targets: list[HullTarget | None] = [None] * len(rows)
         observation = observe_step(self.recording, self.grid, hull) if len(rows) else None
         if observation is not None:
+            # The tolerant hull is shared out among the people; the rest of the loose one is anybody's.
+            spare, floor_z = hull.loose & ~hull.tolerant, float(self.recording.room[0, 2])
             for k, voxels in enumerate(person_voxels(observation, self.tracks.positions[rows])):
-                targets[k] = make_target(self.grid, voxels[hull.strict[tuple(voxels.T)]], voxels)
+                targets[k] = make_target(self.grid, voxels[hull.strict[tuple(voxels.T)]], voxels, spare, floor_z)
         for person, target in zip(persons, targets, strict=True):
             if self.done_to.get(person, -1) >= hull.index:
                 continue

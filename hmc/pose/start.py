@@ -19,8 +19,7 @@ from hmc.pose.annealed.fit_body import FitBodyInfo, fit_body
 from hmc.pose.annealed.hull_target import HullTarget, sample_points
 from hmc.pose.annealed.limb_search import LIMBS, search_limbs
 from hmc.pose.annealed.presets import PosePreset
-from hmc.pose.annealed.refine import refine
-from hmc.pose.annealed.symmetric import symmetric_cost
+from hmc.pose.annealed.refine import refine, residual_values
 from hmc.pose.body.flesh import surface_coordinates
 from hmc.pose.body.kinematics import landmarks
 from hmc.pose.body.model import BodyModel, neutral_state
@@ -31,6 +30,8 @@ __all__ = ["StartSettings", "Started", "estimate_height", "follow", "start_perso
 
 #: Fewer frames say too little of a body: what they cannot tell apart, such as fat silhouettes from a tall person, would be fitted.
 LEAST_BODY_FRAMES = 6
+#: Fewer surface voxels are too little of a person to start from.
+LEAST_START_SURFACE = 50
 #: Random generator of a frame: the same whatever the order in which frames are visited.
 FrameRng = Callable[[int], np.random.Generator]
 
@@ -87,7 +88,7 @@ class Started:
 
 
 def estimate_height(targets: Sequence[HullTarget | None], floor_z: float = 0.0) -> float:
-    """Stature from the tracked volume: the highest that the top of the hull comes while it is as high as somebody who stands.
+    """Stature from the tracked volume: how high the top of the hull commonly comes, if that is as high as an adult who stands.
 
     Parameters
     ----------
@@ -101,10 +102,10 @@ def estimate_height(targets: Sequence[HullTarget | None], floor_z: float = 0.0) 
     float
         Metres; an adult's mean stature where the person never stood up.
     """
-    tops = [np.quantile(target.surface[:, 2], 0.995) - floor_z for target in targets if target is not None and len(target.surface) >= 20]
+    tops = [np.quantile(t.surface[:, 2], 0.995) - floor_z for t in targets if t is not None and len(t.surface) >= LEAST_START_SURFACE]
     # Arms held up, hats and stray voxels reach above the crown: the median of the frames resists all that does not last.
     top = float(np.median(tops)) if tops else 0.0
-    return float(np.clip(top, 1.45, 2.0)) if top > 1.3 else 1.7
+    return min(top, 2.0) if top > 1.45 else 1.7
 
 
 def start_person(
@@ -141,18 +142,18 @@ def start_person(
         None where no frame of the window has a hull to start from.
     """
     settings = settings or StartSettings()
-    usable = [k for k, target in enumerate(targets) if target is not None and len(target.surface) >= 50]
+    usable = [k for k, target in enumerate(targets) if target is not None and len(target.surface) >= LEAST_START_SURFACE]
     if not usable:
         return None
     velocities = np.zeros((len(targets), 3)) if velocities is None else velocities
     floor_z = 0.0 if room is None else float(room[0, 2])
     height = height_m or estimate_height(targets, floor_z)
     body = canton_body(height) if preset.body == "canton" else default_body(height)
-    voxel = targets[usable[0]].voxel_size_m
-    filt = make_filter(body, preset, fps, voxel, room)
+    earliest = next(target for target in targets if target is not None and len(target.surface) >= LEAST_START_SURFACE)
+    filt = make_filter(body, preset, fps, earliest.voxel_size_m, room)
     if preset.start == "neutral":
         anchor, costs = usable[0], np.array([np.nan])
-        state = _neutral_start(body, targets[anchor], velocities[: max(2, int(0.5 * fps))].mean(0), floor_z)
+        state = _neutral_start(body, earliest, velocities[: max(2, int(0.5 * fps))].mean(0), floor_z)
     else:
         anchor, state, costs = _best_hypothesis(frame_rng, filt, fps, targets, usable, velocities, floor_z, settings)
     fit = None
@@ -236,10 +237,10 @@ def _best_hypothesis(frame_rng, filt, fps, targets, usable, velocities, floor_z,
     first, last = max(0, anchor - reach), min(len(targets), anchor + reach + 1)
     scores = []
     for state in chosen:
-        states, infos = follow(lambda k: frame_rng(first + k), _quick(filt), state, anchor - first, targets[first:last])
-        costs = np.array([info.cost for info in infos])
-        headings = np.array([one.state[3] for one in states])
-        scores.append(np.nanmean(costs * _walk_factor(headings, velocities[first:last], settings)))
+        path, infos = follow(lambda k: frame_rng(first + k), _quick(filt), state, anchor - first, targets[first:last])
+        followed = np.array([info.cost for info in infos])
+        headings = np.array([one.state[3] for one in path])
+        scores.append(np.nanmean(followed * _walk_factor(headings, velocities[first:last], settings)))
     order = np.argsort(scores)
     return anchor, chosen[order[0]], np.array(scores)[order]
 
@@ -253,7 +254,8 @@ def _quick(filt: PoseFilter) -> PoseFilter:
 def _search_all(rng, filt, state, target, points):
     """A candidate with each limb where it explains the hulls best."""
     preset = filt.preset
-    cost = float(symmetric_cost(filt.body, filt.samples, state[None], target, points, preset.symmetric)[0])
+    values = residual_values(filt.body, filt.samples, state, target, points, preset.symmetric)
+    cost = float(values @ values)
     return search_limbs(
         rng, filt.body, filt.samples, state, cost, list(LIMBS), target, points, preset.symmetric, preset.refine, preset.search
     )[0]
@@ -275,8 +277,9 @@ def _fit(frame_rng, filt, fps, targets, states, infos, settings, height_known):
     # Frames in which the pose is in doubt teach nothing of the body: leave the worst third out.
     limit = np.quantile([infos[k].cost for k in good], 0.67)
     good = [k for k in good if infos[k].cost <= limit]
-    picks = sorted({good[round(q * (len(good) - 1))] for q in np.linspace(0, 1, settings.body_frames)})
-    held_out = [k for k in good if k not in picks][:: max(1, len(good) // 8)] or picks
+    held_out, rest = good[1::3], [k for k in good if k not in good[1::3]]
+    picks = sorted({rest[round(q * (len(rest) - 1))] for q in np.linspace(0, 1, settings.body_frames)})
+    held_out = held_out[:: max(1, len(held_out) // 8)]
     points = {k: sample_points(frame_rng(k), targets[k].surface, preset.fine_hull_points) for k in {*picks, *held_out}}
     fit_settings = replace(preset.fit_body, scale_deviation=0.015) if height_known else preset.fit_body
     body, _, info = fit_body(

@@ -29,7 +29,7 @@ from hmc.tracking.naive import NaiveSettings, NaiveState, finish, init, step
 from hmc.tracking.tracks import table_of
 from hmc.voxels.grid import VoxelGrid
 
-__all__ = ["observe_step", "track_recording"]
+__all__ = ["WARM_UP_FRAMES", "observe_step", "person_grid", "track_recording"]
 
 logger = logging.getLogger("hmc")
 
@@ -77,9 +77,7 @@ def track_recording(
     InputError
         When the voxels are too coarse, or too many for the memory.
     """
-    if not 0 < voxel_size_m <= MAX_VOXEL_M:
-        raise InputError(f"voxels of {voxel_size_m:g} m do not show people; choose at most {MAX_VOXEL_M:g} m")
-    grid = VoxelGrid.from_room(recording.room, voxel_size_m, len(recording.rig))
+    grid = person_grid(recording, voxel_size_m)
     done = _take_up(journal, key, recording)
     state, rows, problems = done.state, list(done.rows), list(done.problems)
     report = on_problem or logger.warning
@@ -104,6 +102,19 @@ def track_recording(
             done = Done(hull.index + 1, state, tuple(rows), tuple(problems))
     rows += finish(state, recording.n_frames, settings)
     return table_of(rows, recording.fps)
+
+
+def person_grid(recording: Recording, voxel_size_m: float) -> VoxelGrid:
+    """The recording's room in voxels that show people.
+
+    Raises
+    ------
+    InputError
+        When the voxels are too coarse, or too many for the memory.
+    """
+    if not 0 < voxel_size_m <= MAX_VOXEL_M:
+        raise InputError(f"voxels of {voxel_size_m:g} m do not show people; choose at most {MAX_VOXEL_M:g} m")
+    return VoxelGrid.from_room(recording.room, voxel_size_m, len(recording.rig))
 
 
 def observe_step(recording: Recording, grid: VoxelGrid, hull: HullStep) -> Observation | None:

@@ -14,7 +14,7 @@ from hmc.montecarlo.filters import AnnealedInfo, ParticleState, annealed_step, p
 from hmc.pose.annealed.hull_target import HullTarget, sample_points
 from hmc.pose.annealed.limb_search import lost_limbs, search_limbs
 from hmc.pose.annealed.presets import PosePreset, drift
-from hmc.pose.annealed.refine import refine
+from hmc.pose.annealed.refine import refine, residual_values
 from hmc.pose.annealed.scores import (
     ScoreTable,
     ScoreVariances,
@@ -86,7 +86,7 @@ class PoseInfo:
     Parameters
     ----------
     cost : float
-        Of the estimate, square metres; NaN where the four scores were used.
+        Of the estimate, square metres; minus the log likelihood where the four scores are used; NaN without a fit.
     searched : tuple of str
         Limbs that were looked for.
     evaluations : int
@@ -181,15 +181,15 @@ def _polish(rng, filt, preset, starts, anchor, target):
     points = sample_points(rng, target.surface, preset.fine_hull_points)
     trials = [refine(body, samples, start, target, points, preset.symmetric, preset.refine, anchor=anchor) for start in starts]
     evaluations = sum(info.evaluations for _, info in trials)
-    estimate, best = min(trials, key=lambda trial: trial[1].cost_after)
-    cost, searched = best.cost_after, []
+    estimate, _ = min(trials, key=lambda trial: trial[1].cost_after)
+    values = residual_values(body, samples, estimate, target, points, preset.symmetric)
+    cost, searched = float(values @ values), []
     if preset.search is not None:
         searched = lost_limbs(rng, body, samples, estimate, target, points, preset.search)
-        if searched:
-            estimate, cost, more = search_limbs(
-                rng, body, samples, estimate, cost, searched, target, points, preset.symmetric, preset.refine, preset.search
-            )
-            evaluations += more
+        estimate, cost, more = search_limbs(
+            rng, body, samples, estimate, cost, searched, target, points, preset.symmetric, preset.refine, preset.search
+        )
+        evaluations += more
     return estimate, cost, searched, evaluations
 
 

@@ -13,10 +13,14 @@ __all__ = ["HullTarget", "distance_at", "distance_gradient", "make_target", "sam
 
 #: Room left around a person's voxels in the distance field, metres: limbs of wrong guesses still see the way back.
 MARGIN_M = 0.35
+#: A strict hull smaller than this share of the tolerant one says that a camera lost the person: the tolerant one stands for it.
+LEAST_STRICT_SHARE = 0.1
 #: Between the strict and the tolerant hull a body may be, but had better not: this share of the distance to the strict hull,
 #: up to a bound, is added. With few cameras the tolerant hull is so fat that it hardly holds a body.
 STRICT_SHARE = np.float32(0.3)
 STRICT_CAP_M = np.float32(0.08)
+#: Distance that a place in the loose hull alone counts as, metres.
+LOOSE_M = np.float32(0.02)
 
 
 @dataclass(frozen=True)
@@ -37,6 +41,8 @@ class HullTarget:
         Centres of the strict hull's surface voxels, world, metres.
     volume_m3 : float
         Of the strict hull.
+    floor_z : float or None
+        Height of the floor, metres, where people stand on one.
     """
 
     distance: np.ndarray
@@ -45,17 +51,25 @@ class HullTarget:
     voxel_size_m: float
     surface: np.ndarray
     volume_m3: float
+    floor_z: float | None = None
 
 
-def make_target(grid: VoxelGrid, strict: np.ndarray, tolerant: np.ndarray) -> HullTarget | None:
+def make_target(
+    grid: VoxelGrid, strict: np.ndarray, tolerant: np.ndarray, loose: np.ndarray | None = None, floor_z: float | None = None
+) -> HullTarget | None:
     """Prepare one person's hulls.
 
     Parameters
     ----------
     grid : VoxelGrid
     strict, tolerant : ndarray of int, shape (n, 3) and (m, 3)
-        The person's voxels (i, j, k) in the strict hull and in the tolerant one. Where the strict one is empty the tolerant
-        one stands for it.
+        The person's voxels (i, j, k) in the strict hull and in the tolerant one. Where the strict one is
+        nearly empty the tolerant one stands for it.
+    loose : ndarray of bool, shape (nx, ny, nz), optional
+        Voxels of the whole grid where the person might be though more cameras speak against it than the tolerant hull allows:
+        behind furniture, say. A body may be there at a small price.
+    floor_z : float, optional
+        Height of the floor, metres.
 
     Returns
     -------
@@ -64,12 +78,15 @@ def make_target(grid: VoxelGrid, strict: np.ndarray, tolerant: np.ndarray) -> Hu
     """
     if not len(tolerant):
         tolerant = strict
-    if not len(strict):
+    if len(strict) < LEAST_STRICT_SHARE * len(tolerant):
         strict = tolerant
     if not len(strict):
         return None
     pad = int(np.ceil(MARGIN_M / grid.voxel_size_m))
     low = np.minimum(strict.min(0), tolerant.min(0)) - pad
+    if floor_z is not None:
+        # Hidden legs reach from what is left of the hull down to the floor.
+        low[2] = min(low[2], int(grid.index_of(np.array([0.0, 0.0, floor_z]))[2]) - 1)
     shape = np.maximum(strict.max(0), tolerant.max(0)) + pad + 1 - low
     occupied = np.zeros(shape, bool)
     occupied[tuple((tolerant - low).T)] = True
@@ -78,11 +95,26 @@ def make_target(grid: VoxelGrid, strict: np.ndarray, tolerant: np.ndarray) -> Hu
     core[tuple((strict - low).T)] = True
     distance = _distance_to(occupied, grid.voxel_size_m)
     distance += STRICT_SHARE * np.minimum(_distance_to(core, grid.voxel_size_m), STRICT_CAP_M)
+    if loose is not None:
+        distance = np.minimum(distance, _distance_to(_crop(loose, low, shape), grid.voxel_size_m) + LOOSE_M)
     surface = grid.centres(np.argwhere(core & ~ndimage.binary_erosion(core)) + low)
-    return HullTarget(distance, occupied, grid.centres(low), grid.voxel_size_m, surface, len(strict) * grid.voxel_size_m**3)
+    return HullTarget(distance, occupied, grid.centres(low), grid.voxel_size_m, surface, len(strict) * grid.voxel_size_m**3, floor_z)
+
+
+def _crop(volume: np.ndarray, low: np.ndarray, shape: np.ndarray) -> np.ndarray:
+    """A box of a volume, empty where it stands out of it."""
+    out = np.zeros(shape, bool)
+    first, last = np.maximum(low, 0), np.minimum(low + shape, volume.shape)
+    if np.all(first < last):
+        out[tuple(slice(a, b) for a, b in zip(first - low, last - low, strict=True))] = volume[
+            tuple(slice(a, b) for a, b in zip(first, last, strict=True))
+        ]
+    return out
 
 
 def _distance_to(occupied: np.ndarray, voxel_size_m: float) -> np.ndarray:
+    if not occupied.any():
+        return np.full(occupied.shape, np.inf, np.float32)
     distance = ndimage.distance_transform_edt(~occupied).astype(np.float32) * np.float32(voxel_size_m)
     # The transform measures to voxel centres; the hull's surface is half a voxel nearer.
     return np.maximum(distance - np.float32(0.5 * voxel_size_m), 0)

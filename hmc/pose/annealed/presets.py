@@ -94,6 +94,12 @@ class PosePreset:
     fit_body: FitBodySettings | None = None
     start: Literal["hypotheses", "neutral"] = "neutral"
 
+    def __post_init__(self) -> None:
+        if self.refine is None and (self.search is not None or self.fit_body is not None or self.start == "hypotheses"):
+            raise InputError(f"preset '{self.name}': search, fit_body and several starts need `refine`")
+        if self.refine is not None and self.likelihood != "symmetric":
+            raise InputError(f"preset '{self.name}': `refine` needs the symmetric likelihood")
+
 
 PRESETS: dict[str, PosePreset] = {
     "canton2009": PosePreset(

@@ -2,7 +2,7 @@
 
 Each body-surface sample outside the tolerant hull pulls its segment back along the hull's distance field; each point of the
 strict hull's surface outside the body pulls the nearest cone towards itself. Both move with the twists of the joints
-(Canton 2009, Eq. A.1), so the Jacobian is analytic.
+(Canton 2009, Eq. A.1), so the Jacobian needs no differences; it takes the flesh as round and straight near each point.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hmc.pose.annealed.floor import floor_gap, lowest_support
 from hmc.pose.annealed.hull_target import HullTarget, distance_gradient
 from hmc.pose.annealed.penetration import penetration_depth, penetration_rows
 from hmc.pose.annealed.symmetric import POSTURE, BodyPoints, SymmetricSettings, body_distance
@@ -145,7 +146,7 @@ def residual_rows(
     Returns
     -------
     residuals : ndarray, shape (n_residuals,)
-        Their squares sum to the cost; square metres.
+        Metres; their squares sum to the cost.
     jacobian : ndarray, shape (n_residuals, 27)
         Zero where a distance is zero or beyond the cap.
     """
@@ -173,6 +174,14 @@ def residual_rows(
     jacobian *= (_MASKS[other] - _MASKS[segment]) * (weight * (depth > 0))[:, None]
     residuals.append(weight * depth)
     jacobians.append(jacobian)
+    if target.floor_z is not None:
+        gap = floor_gap(body, rotations[None], positions[None], target.floor_z)
+        _, lowest, carrier = lowest_support(body, rotations[None], positions[None])
+        up = np.array([[0.0, 0.0, 1.0]])
+        jacobian = _cross(lowest, up) @ axes.T - up @ moments.T
+        jacobian[:, :3] = up
+        residuals.append(np.sqrt(settings.floor_weight) * gap)
+        jacobians.append(jacobian * _MASKS[carrier] * np.sqrt(settings.floor_weight) * (gap != 0))
     residuals.append(_posture(state, settings))
     jacobians.append(np.diag(np.sqrt(settings.posture_weight) / POSTURE[1]))
     return np.concatenate(residuals), np.concatenate(jacobians)
@@ -193,11 +202,13 @@ def residual_values(
     depth = penetration_depth(body, samples.axes, rotations[None], positions[None])[0]
     unexplained = body_distance(body, state[None], hull_points)[0]
     cap = settings.cap_m
+    floor = np.zeros(0) if target.floor_z is None else floor_gap(body, rotations[None], positions[None], target.floor_z)
     return np.concatenate(
         [
             np.sqrt(1 / len(outside)) * np.minimum(outside, cap).astype(float),
             np.sqrt(settings.explain_weight / len(hull_points)) * np.minimum(unexplained, cap).astype(float),
             np.sqrt(settings.overlap_weight / len(depth)) * depth,
+            np.sqrt(settings.floor_weight) * floor,
             _posture(state, settings),
         ]
     )

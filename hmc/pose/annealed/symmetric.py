@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hmc.pose.annealed.floor import floor_gap
 from hmc.pose.annealed.hull_target import HullTarget, distance_at
 from hmc.pose.annealed.penetration import AxisPoints, axis_points, penetration_depth
 from hmc.pose.body.flesh import SurfaceSamples, place_points, surface_samples
@@ -57,12 +58,15 @@ class SymmetricSettings:
     posture_weight : float
         Square metres that an angle one `POSTURE` spread away from rest costs: it decides between poses that the hulls do not
         tell apart, such as the ways to fold an arm before the chest.
+    floor_weight : float
+        Weight of hanging in the air or being sunk in the floor (`hmc.pose.annealed.floor`).
     """
 
     cap_m: float = 0.06
     explain_weight: float = 1.0
     overlap_weight: float = 2.0
     posture_weight: float = 3e-6
+    floor_weight: float = 0.015
 
 
 @dataclass(frozen=True)
@@ -175,8 +179,10 @@ def symmetric_cost(
     unexplained = np.minimum(body_distance(body, states, hull_points), cap)
     rotations, positions = segment_transforms(body, states)
     depth = penetration_depth(body, points.axes, rotations.astype(np.float32), positions.astype(np.float32))
+    floor = 0.0 if target.floor_z is None else settings.floor_weight * floor_gap(body, rotations, positions, target.floor_z) ** 2
     return (
-        np.einsum("ij,ij->i", outside, outside) / outside.shape[1]
+        floor
+        + np.einsum("ij,ij->i", outside, outside) / outside.shape[1]
         + settings.explain_weight / unexplained.shape[1] * np.einsum("ij,ij->i", unexplained, unexplained)
         + settings.overlap_weight / depth.shape[1] * np.einsum("ij,ij->i", depth, depth)
         + settings.posture_weight * (((states - POSTURE[0]) / POSTURE[1]) ** 2).sum(1)

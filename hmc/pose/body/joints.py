@@ -94,8 +94,8 @@ _CANTON_DEG: dict[str, tuple[float, float]] = {
 # Where the table is too tight for joint centres, or so wide that a limb can fold into the body.
 _DEFAULT_DEG: dict[str, tuple[float, float]] = _CANTON_DEG | {
     "neck_x": (-45, 45), "neck_y": (-50, 60),
-    "r_shoulder_x": (-120, 130), "r_shoulder_z": (-60, 135), "r_elbow_z": (-10, 155),
-    "l_shoulder_x": (-130, 120), "l_shoulder_z": (-135, 60), "l_elbow_z": (-155, 10),
+    "r_shoulder_x": (-120, 130), "r_shoulder_y": (-110, 90), "r_shoulder_z": (-60, 135), "r_elbow_z": (-10, 155),
+    "l_shoulder_x": (-130, 120), "l_shoulder_y": (-110, 90), "l_shoulder_z": (-135, 60), "l_elbow_z": (-155, 10),
     "r_hip_x": (-80, 40), "r_hip_y": (-140, 50), "r_knee_y": (-8, 155),
     "l_hip_x": (-40, 80), "l_hip_y": (-140, 50), "l_knee_y": (-8, 155),
     "torso_x": (-40, 40), "torso_y": (-35, 90), "torso_z": (-45, 45),

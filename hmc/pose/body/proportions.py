@@ -154,8 +154,8 @@ def _flesh(d: dict[str, float]) -> Cones:
         part = f"{side}_thigh"
         cone(part, part, (0, 0, 0.0), (0, 0, -d["thigh"]), (0.050, 0.050), (0.033, 0.033), x, thighs)
         part, shank, ankle = f"{side}_shank", d["shank"], d["ankle_height"]
-        cone(part, part, (0, 0, 0), (-0.004 * h, 0, -0.4 * shank), (0.032, 0.030), (0.033, 0.031), x, shanks)
-        cone(part, part, (-0.004 * h, 0, -0.4 * shank), (0, 0, -shank - 0.3 * ankle), (0.033, 0.031), (0.021, 0.020), x, shanks)
+        cone(part, part, (0, 0, 0), (-0.004 * h, 0, -0.4 * shank), (0.030, 0.032), (0.031, 0.033), y, shanks)
+        cone(part, part, (-0.004 * h, 0, -0.4 * shank), (0, 0, -shank - 0.3 * ankle), (0.031, 0.033), (0.020, 0.021), y, shanks)
         sole = -shank - 0.55 * ankle
         foot = d["foot"]
         if foot > 0:
