@@ -116,7 +116,7 @@ class HullStep(MaskStep):
     Attributes
     ----------
     strict, tolerant, loose : ndarray of bool, shape (nx, ny, nz)
-        The visual hull of all cameras, the one in which a camera may be wrong, and, of five cameras or more, the one in which one
+        The visual hull of all cameras, the one in which a camera may be wrong, and, of four cameras or more, the one in which one
         more may be: what furniture hides from two cameras is still in it. Empty where the frame is not `usable`.
     """
 
@@ -256,7 +256,7 @@ def _hulls(tables: CarvingTables, step: MaskStep, settings: FrontendSettings) ->
         return tuple(np.zeros(tables.grid.shape, bool) for _ in range(3))
     n_masks = sum(mask is not None for mask in step.masks)
     tolerance = settings.tolerance if n_masks >= 4 else 0
-    levels = (0, tolerance, tolerance + 1 if n_masks >= 5 else tolerance)
+    levels = (0, tolerance, tolerance + 1 if n_masks >= 4 else tolerance)
     return carve_levels(tables, step.masks, levels, outside=settings.outside, min_views=settings.min_views)
 
 
