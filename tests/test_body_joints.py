@@ -128,7 +128,7 @@ def test_flesh_is_well_formed(make):
     assert np.all(cones.radii > 0) and np.all(cones.lengths > 0)
     assert_allclose(np.linalg.norm(cones.across, axis=1), 1)
     assert np.all((cones.segment >= 0) & (cones.segment < len(SEGMENTS)))
-    assert_allclose(cones.bases @ cones.bases.transpose(0, 2, 1), np.tile(np.eye(3), (len(cones.part), 1, 1)), atol=0.05)
+    assert_allclose(cones.bases @ cones.bases.transpose(0, 2, 1), np.tile(np.eye(3), (len(cones.part), 1, 1)), atol=1e-9)
 
 
 @pytest.mark.parametrize("height", [0.2, 3.5, -1.0, np.nan])

@@ -158,7 +158,7 @@ def test_wrong_input_is_one_line(tmp_path, capsys, more, message):
     assert message in error and error.count("\n") == 1
 
 
-@pytest.mark.parametrize("more", [["--voxel", "0"], ["--voxel", "much"], ["--method", "guess"], ["--frames", "-1"], ["--seed", "x"]])
+@pytest.mark.parametrize("more", [["--voxel", "0"], ["--voxel", "much"], ["--method", "guess"], ["--frames", "-1"], ["--seed", "x"], ["--seed", "-1"]])
 def test_arguments_that_are_none(tmp_path, capsys, more):
     with pytest.raises(SystemExit) as stop:
         pose(tmp_path / "out", *more)

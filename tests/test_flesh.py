@@ -76,10 +76,7 @@ def test_flesh_fills_the_cones_and_nothing_else(make, spacing):
     assert 0.03 < len(table.points) * spacing**3 < 0.12
 
 
-CALVES = pytest.mark.xfail(reason="the calf's cross-section is not square to its axis")
-
-
-@pytest.mark.parametrize("part", [pytest.param(part, marks=CALVES if "shank" in part else ()) for part in PARTS])
+@pytest.mark.parametrize("part", PARTS)
 def test_samples_lie_on_the_surface_with_outward_normals(part):
     coordinates = surface_coordinates(BODY, 300)
     samples = surface_samples(BODY, coordinates)

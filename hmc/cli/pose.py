@@ -50,6 +50,7 @@ def run(args: argparse.Namespace) -> int:
     from hmc.files import to_toml
     from hmc.frontend import FrontendSettings
     from hmc.pose.annealed.presets import pose_preset
+    from hmc.pose.body.proportions import stature
     from hmc.pose.sequence import pose_recording
     from hmc.results import read_run, write_joints, write_pose, write_run, write_tracks
     from hmc.tracking.naive import NaiveSettings
@@ -121,7 +122,9 @@ def run(args: argparse.Namespace) -> int:
     for person in np.unique(people.poses.persons):
         rows = people.poses.persons == person
         frames, body = people.poses.frames[rows], people.states.bodies[int(person)]
-        print(f"person {person}: {rows.sum()} frames, from {frames.min()} to {frames.max()}, stature {float(body['height']):.2f} m")
+        print(
+            f"person {person}: {rows.sum()} frames, from {frames.min()} to {frames.max()}, stature about {stature({name: float(value) for name, value in body.items()}):.2f} m"
+        )
     if not len(people.poses.frames):
         print(f"nobody in {recording.n_frames} frames")
     print(f"wrote {paths['joints.csv']}")

@@ -7,6 +7,8 @@ than people's; it is the preset `canton_body`.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from hmc.errors import InputError
@@ -14,7 +16,7 @@ from hmc.landmarks import LANDMARKS
 from hmc.pose.body.joints import SEGMENTS, JointLimits, canton_limits, default_limits
 from hmc.pose.body.model import PARTS, BodyModel, Cones
 
-__all__ = ["CANTON_LENGTHS", "DEFAULT_LENGTHS", "GIRTHS", "canton_body", "default_body", "landmark_segments", "make_body"]
+__all__ = ["CANTON_LENGTHS", "DEFAULT_LENGTHS", "GIRTHS", "canton_body", "default_body", "landmark_segments", "make_body", "stature"]
 
 #: Joint-centre lengths over stature. Trunk: hip centres' middle to the base of the neck. Sources: Winter (2009), figure 4.1
 #: (limbs), and the ranges that rendered and captured people show (trunk, head, shoulders).
@@ -110,6 +112,20 @@ def canton_body(height_m: float) -> BodyModel:
         Stature, metres.
     """
     return make_body(_scaled(height_m, CANTON_LENGTHS), canton_limits())
+
+
+def stature(dimensions: Mapping[str, float]) -> float:
+    """The stature that a body's lengths from head to ankle speak for, metres.
+
+    The entry ``height`` is only the scale of a fitted body's flesh; its lengths have moved away from it.
+
+    Parameters
+    ----------
+    dimensions : mapping
+        As `make_body` takes them.
+    """
+    upright = ("trunk", "head", "thigh", "shank")
+    return float(sum(dimensions[name] for name in upright) / sum(DEFAULT_LENGTHS[name] for name in upright))
 
 
 def _scaled(height_m: float, lengths: dict[str, float]) -> dict[str, float]:
