@@ -298,9 +298,17 @@ def _learn_from_people(recording: Recording, cameras: list[int], settings: Front
     models = {}
     for i, c in enumerate(cameras):
         scene, unseen = scenes[i]
-        images = (replace_people(image, scene) for image in (frame[i] for frame in samples) if image is not None)
+        # Each image is let go once it is learnt from: large ones and the growing models would not fit side by side.
+        images = (replace_people(image, scene) for image in _take(samples, i) if image is not None)
         models[c] = train_background(images, settings.segmentation, unseen)
     return models
+
+
+def _take(samples: list[list[np.ndarray | None]], camera: int) -> Iterator[np.ndarray | None]:
+    """A camera's images, taken out of the samples one by one."""
+    for frame in samples:
+        image, frame[camera] = frame[camera], None
+        yield image
 
 
 def _read_ahead(items: Iterable[T], reader: ThreadPoolExecutor) -> Iterator[T]:

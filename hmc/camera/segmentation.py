@@ -22,6 +22,9 @@ from hmc.errors import InputError
 
 __all__ = ["BackgroundModel", "SegmentationSettings", "segment", "segment_views", "train_background"]
 
+#: Gaussians a pixel. OpenCV's five take 100 bytes a pixel and camera; an indoor scene needs no more than three (Stauffer and
+#: Grimson 1999 take three to five).
+MIXTURES = 3
 #: Least standard deviations of luma and chroma, grey levels: rounding and video compression.
 LEAST_DEVIATION = (1.5, 0.8)
 #: The same where too few frames were learnt from to know any.
@@ -150,6 +153,7 @@ def train_background(
     settings = settings or SegmentationSettings()
     mixture = cv2.createBackgroundSubtractorMOG2(varThreshold=settings.variance_threshold, detectShadows=True)
     mixture.setShadowThreshold(settings.shadow_factor)
+    mixture.setNMixtures(MIXTURES)
     mean = square = None
     count = 0
     for count, frame in enumerate(frames, start=1):

@@ -122,9 +122,8 @@ def run(args: argparse.Namespace) -> int:
     for person in np.unique(people.poses.persons):
         rows = people.poses.persons == person
         frames, body = people.poses.frames[rows], people.states.bodies[int(person)]
-        print(
-            f"person {person}: {rows.sum()} frames, from {frames.min()} to {frames.max()}, stature about {stature({name: float(value) for name, value in body.items()}):.2f} m"
-        )
+        tall = stature({name: float(value) for name, value in body.items()})
+        print(f"person {person}: {rows.sum()} frames, from {frames.min()} to {frames.max()}, stature about {tall:.2f} m")
     if not len(people.poses.frames):
         print(f"nobody in {recording.n_frames} frames")
     print(f"wrote {paths['joints.csv']}")
