@@ -12,7 +12,7 @@ from hmc.pose.body.flesh import surface_coordinates
 from hmc.pose.body.joints import dof_index
 from hmc.pose.body.kinematics import segment_transforms
 from hmc.pose.body.model import neutral_state
-from hmc.pose.body.proportions import default_body, stature
+from hmc.pose.body.proportions import canton_body, default_body, stature
 from hmc.voxels.grid import VoxelGrid
 
 BODY = default_body(1.8)
@@ -88,5 +88,6 @@ def test_loose_hull_is_cheap_and_reaches_the_floor():
 
 def test_stature_follows_the_lengths():
     assert stature(BODY.dimensions) == pytest.approx(1.8)
+    assert stature(canton_body(1.7).dimensions) == pytest.approx(1.7)
     longer = BODY.dimensions | {name: 1.1 * BODY.dimensions[name] for name in ("trunk", "head", "thigh", "shank")}
     assert stature(longer) == pytest.approx(1.98)

@@ -125,7 +125,9 @@ def stature(dimensions: Mapping[str, float]) -> float:
         As `make_body` takes them.
     """
     upright = ("trunk", "head", "thigh", "shank")
-    return float(sum(dimensions[name] for name in upright) / sum(DEFAULT_LENGTHS[name] for name in upright))
+    # Canton's lengths, which have no ankle, are of that table; he let them sum to the height.
+    table = DEFAULT_LENGTHS if dimensions["ankle_height"] > 0 else CANTON_LENGTHS
+    return float(sum(dimensions[name] for name in upright) / sum(table[name] for name in upright))
 
 
 def _scaled(height_m: float, lengths: dict[str, float]) -> dict[str, float]:
