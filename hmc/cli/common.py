@@ -6,11 +6,22 @@ import argparse
 import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
-__all__ = ["add_selection_options", "camera_names", "open_selected", "positive_float", "print_problems", "progress", "whole_number"]
+__all__ = [
+    "add_selection_options",
+    "camera_names",
+    "open_selected",
+    "positive_float",
+    "print_problems",
+    "progress",
+    "recording_source",
+    "whole_number",
+]
 
 T = TypeVar("T")
+#: Files of a recording on which its results depend.
+SOURCES = ("calibration*", "recording.toml", "videos/*", "images/*/*", "images/*", "silhouettes/*/*", "background/*", "background/*/*")
 
 
 def add_selection_options(parser: argparse.ArgumentParser) -> None:
@@ -69,3 +80,12 @@ def camera_names(text: str) -> list[str]:
     if not names:
         raise argparse.ArgumentTypeError("give camera names separated by commas")
     return names
+
+
+def recording_source(recording) -> dict[str, Any]:
+    """What a result says of the recording it was made from: where it lies, and when its files last changed."""
+    from datetime import UTC, datetime
+
+    times = [file.stat().st_mtime for pattern in SOURCES for file in recording.path.glob(pattern)]
+    changed = datetime.fromtimestamp(max(times, default=0.0), UTC).isoformat()
+    return {"recording": recording.path.resolve(), "recording_changed": changed}

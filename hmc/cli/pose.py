@@ -6,8 +6,8 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from hmc.cli.common import add_selection_options, open_selected, positive_float, print_problems, progress, whole_number
-from hmc.cli.track import JOURNAL, _last_change
+from hmc.cli.common import add_selection_options, open_selected, positive_float, print_problems, progress, recording_source, whole_number
+from hmc.cli.track import JOURNAL
 
 __all__ = ["add_parser", "run"]
 
@@ -76,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
         "tracker": tracker,
         "frontend": frontend,
     }
-    source = {"recording": recording.path.resolve(), "recording_changed": _last_change(recording.path)}
+    source = recording_source(recording)
     key = to_toml({"method": args.method, "seed": args.seed, **source, "parameters": parameters})
     paths = {name: args.out / name for name in ("tracks.csv", "joints.csv", "pose.npz", "run.toml")}
     if all(path.exists() for path in paths.values()):

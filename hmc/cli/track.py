@@ -6,15 +6,13 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from hmc.cli.common import add_selection_options, open_selected, positive_float, print_problems, progress
+from hmc.cli.common import add_selection_options, open_selected, positive_float, print_problems, progress, recording_source
 
 __all__ = ["add_parser", "run"]
 
 TRACKERS = ("naive",)
 #: The journal of a run that is not finished.
 JOURNAL = ".track.journal"
-#: Files of a recording on which its tracks depend.
-SOURCES = ("calibration*", "recording.toml", "videos/*", "images/*/*", "images/*", "silhouettes/*/*", "background/*", "background/*/*")
 
 
 def add_parser(subparsers) -> argparse.ArgumentParser:
@@ -59,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
         "tracker": settings,
         "frontend": frontend,
     }
-    source = {"recording": recording.path.resolve(), "recording_changed": _last_change(recording.path)}
+    source = recording_source(recording)
     key = to_toml({"method": args.tracker, **source, "parameters": parameters})
     if run_path.exists() and tracks_path.exists():
         before = read_run(run_path)
@@ -87,14 +85,6 @@ def run(args: argparse.Namespace) -> int:
     print(f"wrote {tracks_path}")
     print_problems(problems)
     return 0
-
-
-def _last_change(path: Path) -> str:
-    """When a recording's files were last changed."""
-    from datetime import UTC, datetime
-
-    times = [file.stat().st_mtime for pattern in SOURCES for file in path.glob(pattern)]
-    return datetime.fromtimestamp(max(times, default=0.0), UTC).isoformat()
 
 
 def _summary(table, n_frames: int) -> str:
