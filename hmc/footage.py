@@ -207,20 +207,27 @@ def read_footage(footage: Footage, first: int, last: int, on_problem: Callable[[
     images = footage.images
     frames = _read_video(footage, first, last) if images is None else _read_images(images, first, last)
     lost: list[int] = []
-    for index, image in enumerate(frames, first):
-        if image is not None and image.shape[1::-1] != footage.size:
-            on_problem(
-                f"{label}: frame {index} is {image.shape[1]} x {image.shape[0]} and not {footage.size[0]} x {footage.size[1]}; left out"
-            )
-            image = None
-        elif image is None and index < footage.n_frames and (images is None or index in images):
-            lost.append(index)
-        if image is not None and lost:
+
+    def say_lost() -> None:
+        if lost:
             on_problem(f"{label}: {_frames(lost)} cannot be read; left out")
             lost.clear()
-        yield image
-    if lost:
-        on_problem(f"{label}: {_frames(lost)} cannot be read; left out")
+
+    try:
+        for index, image in enumerate(frames, first):
+            if image is not None and image.shape[1::-1] != footage.size:
+                on_problem(
+                    f"{label}: frame {index} is {image.shape[1]} x {image.shape[0]} and not {footage.size[0]} x {footage.size[1]}; left out"
+                )
+                image = None
+            elif image is None and index < footage.n_frames and (images is None or index in images):
+                lost.append(index)
+            # Who knows how many frames there are asks for no more after the last.
+            if image is not None or index + 1 == last:
+                say_lost()
+            yield image
+    finally:
+        say_lost()
 
 
 def _frames(indices: list[int]) -> str:

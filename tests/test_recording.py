@@ -163,6 +163,30 @@ def test_unreadable_image_in_the_middle(recording_folder, ring, caplog):
     assert [record.name for record in caplog.records] == ["hmc", "hmc"]
 
 
+def test_unreadable_images_at_the_end(recording_folder, ring):
+    folder = write_images(recording_folder / "images" / "cam_00", range(5), (160, 120))
+    for camera in ring[1:]:
+        write_images(recording_folder / "images" / camera.name, range(5), (160, 120))
+    for number in (2, 3, 4):
+        (folder / f"{number:06d}.png").write_bytes(b"not an image")
+    for file in (recording_folder / "videos").iterdir():
+        file.unlink()
+    (recording_folder / "videos").rmdir()
+    assert read_all(recording_folder)[2] == ["cam_00: frames 2 to 4 cannot be read; left out"]
+    assert read_all(recording_folder, frames=3)[2] == ["cam_00: frame 2 cannot be read; left out"]
+    # The last frame's loss is known with the frame; what was lost so far is known to who stops before the end.
+    problems: list[str] = []
+    frames = iterate_frames(open_recording(recording_folder, frames=3), on_problem=problems.append)
+    for _ in range(3):
+        next(frames)
+    assert problems == ["cam_00: frame 2 cannot be read; left out"]
+    frames = iterate_frames(open_recording(recording_folder), on_problem=problems.append)
+    for _ in range(4):
+        next(frames)
+    frames.close()
+    assert problems[1:] == ["cam_00: frames 2 to 3 cannot be read; left out"]
+
+
 def test_a_camera_drops_out(recording_folder):
     write_video(recording_folder / "videos" / "cam_02.avi", 5, (160, 120))
     recording, frames, problems = read_all(recording_folder)
