@@ -15,7 +15,8 @@ from _scene import ROOM
 from _timing import interleaved, report
 
 from hmc.montecarlo import annealed_step, filter_layer, particle_init, truncated_drift, truncated_normal
-from hmc.pose.annealed.overlap import exact_overlap, quick_overlap
+from hmc.pose.annealed.overlap import quick_overlap
+from hmc.pose.annealed.overlap_exact import exact_overlap
 from hmc.pose.annealed.placing import place_segments
 from hmc.pose.annealed.presets import PRESETS, drift
 from hmc.pose.annealed.scores import ScoreVariances, log_likelihood_factorised, make_score_table, map_scores, observe, scores

@@ -18,7 +18,8 @@ import cv2
 import numpy as np
 from scipy import ndimage
 
-from hmc.pose.annealed.overlap import OverlapTable, exact_overlap, make_overlap_table, quick_overlap
+from hmc.pose.annealed.overlap import OverlapTable, make_overlap_table, quick_overlap
+from hmc.pose.annealed.overlap_exact import exact_overlap
 from hmc.pose.annealed.placing import place_segments
 from hmc.pose.body.flesh import FleshTable
 from hmc.pose.body.joints import SEGMENTS
