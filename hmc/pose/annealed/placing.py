@@ -18,6 +18,25 @@ __all__ = ["place_segments"]
 _TURNED = {"x": (1, 2), "y": (2, 0), "z": (0, 1)}
 
 
+def _alike() -> list[tuple[np.ndarray, np.ndarray, str]]:
+    """Segments that go through the same steps, such as both shanks: their places, those of their parents, and their axes.
+
+    Parents come before children; the root is left out.
+    """
+    depth = [0] * len(SEGMENTS)
+    for index, segment in enumerate(SEGMENTS):
+        depth[index] = 0 if segment.parent < 0 else depth[segment.parent] + 1
+    keys = sorted({(depth[index], segment.axes) for index, segment in enumerate(SEGMENTS) if segment.parent >= 0})
+    groups = [[index for index, segment in enumerate(SEGMENTS) if (depth[index], segment.axes) == key] for key in keys]
+    return [
+        (np.array(group), np.array([SEGMENTS[index].parent for index in group]), axes)
+        for group, (_, axes) in zip(groups, keys, strict=True)
+    ]
+
+
+_ALIKE = _alike()
+
+
 def place_segments(body: BodyModel, states: np.ndarray, origin: np.ndarray) -> np.ndarray:
     """Where every rigid segment is in every particle.
 
@@ -38,20 +57,28 @@ def place_segments(body: BodyModel, states: np.ndarray, origin: np.ndarray) -> n
     angles = states[:, 3:].T.astype(np.float32)
     cos, sin = np.cos(angles), np.sin(angles)
     placed = np.empty((len(SEGMENTS), 3, 4, len(states)), np.float32)
-    for index, segment in enumerate(SEGMENTS):
-        frame = placed[index]
-        if segment.parent < 0:
-            frame[:, :3] = np.eye(3)[:, :, None]
-            frame[:, 3] = (states[:, :3] - origin).T
-        else:
-            frame[...] = placed[segment.parent]
-            for axis in np.flatnonzero(body.offsets[index]):
-                frame[:, 3] += placed[segment.parent, :, axis] * np.float32(body.offsets[index, axis])
-        for name, dof in zip(segment.axes, SEGMENT_DOFS[index], strict=True):
-            first, second = _TURNED[name]
-            c, s, turned = cos[dof - 3], sin[dof - 3], frame[:, second]
-            ahead = c * frame[:, first] + s * turned
-            turned *= c
-            turned -= s * frame[:, first]
-            frame[:, first] = ahead
+    root = placed[:1]
+    root[0, :, :3] = np.eye(3)[:, :, None]
+    root[0, :, 3] = (states[:, :3] - origin).T
+    _turn(root, np.array([0]), SEGMENTS[0].axes, cos, sin)
+    for group, parents, axes in _ALIKE:
+        frames = placed[parents]
+        offsets = body.offsets[group].astype(np.float32)
+        for axis in np.flatnonzero(offsets.any(axis=0)):
+            frames[:, :, 3] += frames[:, :, axis] * offsets[:, axis, None, None]
+        _turn(frames, group, axes, cos, sin)
+        placed[group] = frames
     return placed
+
+
+def _turn(frames: np.ndarray, group: np.ndarray, axes: str, cos: np.ndarray, sin: np.ndarray) -> None:
+    """Turn the frames of some segments, shape (g, 3, 4, n), about their own axes in turn, in place."""
+    for place, name in enumerate(axes):
+        dofs = [SEGMENT_DOFS[index][place] - 3 for index in group]
+        c, s = cos[dofs, None], sin[dofs, None]
+        first, second = (frames[:, :, column] for column in _TURNED[name])
+        ahead = c * first
+        ahead += s * second
+        second *= c
+        second -= s * first
+        first[...] = ahead
