@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
-from hmc.camera.model import Camera, Rig, project
+from hmc.camera.model import Rig
 from hmc.errors import InputError
 from hmc.voxels.carving import pixel_of_voxel
 from hmc.voxels.grid import VoxelGrid
@@ -21,9 +21,9 @@ __all__ = ["color_voxels", "visibility"]
 
 #: Quick mode: a voxel is hidden when something is nearer to the camera by more than this many voxels.
 DEPTH_SLACK = 3.0
-#: Quick mode: width of what a voxel hides, and half of the largest width of the depth image, in cells of a voxel's size.
+#: Quick mode: width of what a voxel hides, and half of the largest width of a depth image, in cells of a voxel's size.
 SPLAT_CELLS = 2
-MOST_CELLS = 2000
+MOST_CELLS = 1000
 EMPTY, SOLID, BEYOND = 0, 1, 2
 
 
@@ -101,17 +101,13 @@ def visibility(occupied: np.ndarray, grid: VoxelGrid, rig: Rig, voxels: np.ndarr
     if mode == "exact":
         return np.stack([_walk(room, voxels - low, target) for target in targets])
     skin = surface(room == SOLID)
-    points = grid.centres(skin + low)
+    facing = _faces(room, skin, np.array(targets))
+    lit = np.zeros((len(rig), room.size), bool)
+    camera, point = np.nonzero(facing)
+    here = _nearest(rig, grid.centres(skin + low), camera, point, grid.voxel_size_m)
     strides = np.array([room.shape[1] * room.shape[2], room.shape[2], 1])
-    skin_place, place = skin @ strides, (voxels - low) @ strides
-    seen = np.empty((len(rig), len(voxels)), bool)
-    for c, (camera, target) in enumerate(zip(rig, targets, strict=True)):
-        near = np.flatnonzero(_faces(room, skin, target))
-        near = near[_splat(camera, points[near], grid.voxel_size_m)]
-        lit = np.zeros(room.size, bool)
-        lit[skin_place[near]] = True
-        seen[c] = lit.take(place)
-    return seen
+    lit[camera[here], (skin @ strides)[point[here]]] = True
+    return lit[:, (voxels - low) @ strides]
 
 
 def _walk(room: np.ndarray, starts: np.ndarray, target: np.ndarray) -> np.ndarray:
@@ -157,33 +153,44 @@ def _walk(room: np.ndarray, starts: np.ndarray, target: np.ndarray) -> np.ndarra
     return seen
 
 
-def _faces(room: np.ndarray, starts: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """Whether the first voxel on each Bresenham line is empty: that alone tells the side that faces the camera from the others."""
-    delta = (target - starts).astype(np.int32)
+def _faces(room: np.ndarray, starts: np.ndarray, targets: np.ndarray) -> np.ndarray:
+    """Whether the first voxel on each Bresenham line to each target is empty, shape (n_targets, n).
+
+    That alone tells the side that faces a camera from the others.
+    """
+    strides = np.array([room.shape[1] * room.shape[2], room.shape[2], 1], np.int32)
+    delta = (targets[:, :, None] - starts.T).astype(np.int32)
     length = np.abs(delta)
-    longest = np.maximum(np.maximum(length[:, 0], length[:, 1]), length[:, 2])
-    step = np.sign(delta) * (2 * length >= longest[:, None])
-    strides = np.array([room.shape[1] * room.shape[2], room.shape[2], 1])
-    return room.ravel().take((starts + step) @ strides) != SOLID
+    steps = 2 * length >= length.max(axis=1, keepdims=True)
+    place = (starts @ strides).astype(np.int32) + np.einsum("tan,a->tn", np.sign(delta, out=delta) * steps, strides)
+    return room.ravel().take(place) != SOLID
 
 
-def _splat(camera: Camera, points: np.ndarray, voxel_size_m: float) -> np.ndarray:
-    """Which of the points no other one hides, by depth in an image whose pixels are about as large as a voxel looks."""
-    uv, valid = project(camera, points)
-    seen = np.ones(len(points), bool)
-    some = np.flatnonzero(valid)
-    if some.size == 0:
+def _nearest(rig: Rig, points: np.ndarray, camera: np.ndarray, point: np.ndarray, voxel_size_m: float) -> np.ndarray:
+    """Which pairs of a camera and a point are hidden by no other pair, by depth in images whose pixels are as large as a voxel looks.
+
+    The images lie side by side in one. What is in front of what does not depend on the lens, so they have none; what lies
+    beside or behind a camera is seen.
+    """
+    turn = np.stack([c.rotation for c in rig]).astype(np.float32)
+    centre = np.stack([c.centre for c in rig])
+    x, y, depth = np.moveaxis(turn @ (points - centre[:, None]).astype(np.float32).swapaxes(1, 2), 1, 0)[:, camera, point]
+    seen = depth < voxel_size_m
+    ahead = np.flatnonzero(~seen)
+    camera, x, y, depth = camera[ahead], x[ahead], y[ahead], depth[ahead]
+    if ahead.size == 0:
         return seen
-    distance = ((points[some] - camera.centre) @ camera.rotation[2]).astype(np.float32)
-    cell = camera.matrix[0, 0] * voxel_size_m / distance.mean()
-    # Points far outside the image would make the depth image as large as the lens spreads them.
-    place = np.clip(np.floor(uv[some] / cell), -MOST_CELLS, MOST_CELLS).astype(np.int64)
-    place -= place.min(axis=0)
-    width, height = place.max(axis=0) + 1
-    place = place[:, 1] * width + place[:, 0]
-    depth = np.full(height * width, np.inf, np.float32)
-    order = np.argsort(-distance)
-    depth[place[order]] = distance[order]  # the nearest is written last, and stays
-    depth = cv2.erode(depth.reshape(height, width), np.ones((SPLAT_CELLS, SPLAT_CELLS), np.uint8)).ravel()
-    seen[some] = distance <= depth[place] + DEPTH_SLACK * voxel_size_m
+    mean = np.bincount(camera, depth, len(rig)) / np.maximum(np.bincount(camera, minlength=len(rig)), 1)
+    cells_a_depth = (mean / voxel_size_m).astype(np.float32)[camera] / depth
+    # Points far to the side would make the images as large as the view spreads them.
+    column, row = (np.clip(np.floor(values * cells_a_depth), -MOST_CELLS, MOST_CELLS).astype(np.int64) for values in (x, y))
+    column -= column.min()
+    row -= row.min()
+    width = column.max() + 2  # a column between two images, whose points are not to hide one another
+    place = (row * len(rig) + camera) * width + column
+    nearest = np.full((row.max() + 1) * len(rig) * width, np.inf, np.float32)
+    order = np.argsort(-depth)
+    nearest[place[order]] = depth[order]  # the nearest is written last, and stays
+    nearest = cv2.erode(nearest.reshape(-1, len(rig) * width), np.ones((SPLAT_CELLS, SPLAT_CELLS), np.uint8)).ravel()
+    seen[ahead] = depth <= nearest[place] + np.float32(DEPTH_SLACK * voxel_size_m)
     return seen
