@@ -9,7 +9,8 @@ from numpy.testing import assert_allclose
 from hmc.errors import InputError
 from hmc.landmarks import LANDMARKS, landmark_index
 from hmc.pose.body.joints import DOF_NAMES, N_DOF, SEGMENTS, canton_limits, default_limits, dof_index, mirror_state
-from hmc.pose.body.kinematics import landmarks
+from hmc.pose.body.flesh import flesh_points
+from hmc.pose.body.kinematics import landmarks, segment_transforms
 from hmc.pose.body.model import PARTS, neutral_state
 from hmc.pose.body.proportions import DEFAULT_LENGTHS, canton_body, default_body, make_body
 
@@ -164,3 +165,20 @@ def test_neutral_states():
         assert landmarks(body, down)[wrist, 2] < landmarks(body, down)[shoulder, 2] - 0.4
     with pytest.raises(ValueError, match="sideways"):
         neutral_state("up")
+
+
+def test_the_body_stands_on_its_soles_with_the_spine_behind():
+    """Flesh ends where the ankle's height says that the floor is; chest and crown lie before the line of hips and neck."""
+    body = default_body(1.8)
+    points = flesh_points(body, 0.01)
+    rotations, positions = segment_transforms(body, neutral_state("down")[None])
+    placed = np.einsum("nij,nj->ni", rotations[0, points.segment], points.points) + positions[0, points.segment]
+    legs = body.dimensions["thigh"] + body.dimensions["shank"] + body.dimensions["ankle_height"]
+    assert placed[:, 2].min() == pytest.approx(-legs, abs=0.012)
+    marks = landmarks(body, neutral_state("down"))
+    crown, neck = marks[LANDMARKS.index("head_top")], marks[LANDMARKS.index("neck")]
+    assert crown[0] - neck[0] == pytest.approx(0.020 * 1.8) and neck[0] == pytest.approx(0.0)
+    skull = placed[placed[:, 2] > crown[2] - 0.06]
+    assert skull[:, 0].mean() == pytest.approx(crown[0], abs=0.01)
+    chest = placed[(points.part == PARTS.index("torso")) & (np.abs(placed[:, 2] - 0.6 * neck[2]) < 0.03)]
+    assert chest[:, 0].mean() == pytest.approx(0.010 * 1.8, abs=0.006)

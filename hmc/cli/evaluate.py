@@ -8,6 +8,7 @@ from pathlib import Path
 
 from hmc.cli.common import whole_number
 from hmc.errors import InputError
+from hmc.files import atomic_write, write_toml
 
 __all__ = ["add_parser", "run"]
 
@@ -31,7 +32,6 @@ def add_parser(subparsers) -> None:
 def run(args: argparse.Namespace) -> int:
     """Score, print, write."""
     from hmc.evaluation import PoseEvaluation, evaluate_pose, evaluate_tracks, pelvis_tracks
-    from hmc.files import write_toml
     from hmc.metrics.mot import MotScores
     from hmc.results import read_centroids, read_joints, read_tracks, run_selection
 
@@ -135,8 +135,6 @@ def track_summary(tracks) -> dict:
 
 def write_rows(path: Path, rows) -> None:
     """The table as CSV: numbers with enough digits, NaN as an empty cell."""
-    from hmc.files import atomic_write
-
     with atomic_write(path) as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(rows[0])

@@ -8,7 +8,8 @@ import numpy as np
 from scipy import ndimage
 
 from hmc.pose.body.joints import SEGMENTS
-from hmc.pose.body.model import PARTS, BodyModel, Cones
+from hmc.pose.body.kinematics import segment_transforms
+from hmc.pose.body.model import PARTS, BodyModel, Cones, neutral_state
 
 __all__ = ["FleshTable", "SurfaceSamples", "cone_distance", "flesh_points", "place_points", "surface_coordinates", "surface_samples"]
 
@@ -148,9 +149,6 @@ def surface_coordinates(body: BodyModel, n: int, least: int = 8) -> tuple[np.nda
     along = (order + 0.5) / counts[cone]
     angle = (order * _GOLDEN) % (2 * np.pi)
     samples = surface_samples(body, (cone, along, angle))
-    from hmc.pose.body.kinematics import segment_transforms  # the neutral pose only; kinematics itself needs no flesh
-    from hmc.pose.body.model import neutral_state
-
     state = neutral_state("sideways", body.limits)
     rotations, positions = segment_transforms(body, state)
     world = place_points(rotations, positions, samples.points, samples.segment)

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from hmc.pose.body.joints import JointLimits, default_limits
+from hmc.pose.body.joints import N_DOF, JointLimits, default_limits, dof_index
 
 __all__ = ["PARTS", "BodyModel", "Cones", "neutral_state"]
 
@@ -96,8 +96,6 @@ def neutral_state(arms: str = "down", limits: JointLimits | None = None) -> np.n
     -------
     ndarray, shape (27,)
     """
-    from hmc.pose.body.joints import N_DOF, dof_index
-
     if arms not in ("sideways", "down"):
         raise ValueError(f"`arms` must be 'sideways' or 'down'; got {arms!r}")
     state = np.zeros(N_DOF)

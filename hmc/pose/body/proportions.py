@@ -19,16 +19,21 @@ from hmc.pose.body.model import PARTS, BodyModel, Cones
 __all__ = ["CANTON_LENGTHS", "DEFAULT_LENGTHS", "GIRTHS", "canton_body", "default_body", "landmark_segments", "make_body", "stature"]
 
 #: Joint-centre lengths over stature. Trunk: hip centres' middle to the base of the neck. Sources: Winter (2009), figure 4.1
-#: (limbs), and the ranges that rendered and captured people show (trunk, head, shoulders).
+#: (limbs; shoulders: half its width of .259, less some 4 cm from the tip of the shoulder to the joint's centre; ankle: .039 and a
+#: sole of 1 cm), and the ranges that rendered and captured people show (trunk, head). The spine is behind: a standing person's
+#: last neck vertebra is behind the hip centres (Mac-Thiong et al. 2010, Spine 35: E1193), while the chest and the skull are over or
+#: before them. From the line of hips and neck the chest's middle is `chest_forward` to the front, the crown `head_forward`.
 DEFAULT_LENGTHS: dict[str, float] = {
-    "trunk": 0.318, "head": 0.147, "shoulder_half_width": 0.098, "shoulder_drop": 0.060, "hip_half_width": 0.060,
-    "upper_arm": 0.157, "forearm": 0.150, "hand": 0.085, "thigh": 0.245, "shank": 0.250, "ankle_height": 0.058, "foot": 0.105,
+    "trunk": 0.318, "head": 0.147, "shoulder_half_width": 0.104, "shoulder_drop": 0.060, "hip_half_width": 0.060,
+    "upper_arm": 0.157, "forearm": 0.150, "hand": 0.085, "thigh": 0.245, "shank": 0.250, "ankle_height": 0.046, "foot": 0.105,
+    "chest_forward": 0.010, "head_forward": 0.020,
 }  # fmt: skip
 
-#: Table 6.1 of Canton (2009), which gives no widths (ours are taken) and no hand or foot.
+#: Table 6.1 of Canton (2009), which gives no widths (hips: ours; shoulders: so that the arms span about the height), no hand or foot.
 CANTON_LENGTHS: dict[str, float] = DEFAULT_LENGTHS | {
+    "shoulder_half_width": 0.098,
     "trunk": 0.33, "head": 0.16, "upper_arm": 0.20, "forearm": 0.20, "hand": 0.0, "thigh": 0.26, "shank": 0.25,
-    "ankle_height": 0.0, "foot": 0.0,
+    "ankle_height": 0.0, "foot": 0.0, "chest_forward": 0.0, "head_forward": 0.0,
 }  # fmt: skip
 
 #: Factors on the radii of the flesh, one a group of parts.
@@ -88,7 +93,7 @@ def make_body(dimensions: dict[str, float], limits: JointLimits | None = None) -
         put(f"{side}_shank", (0, 0, -d["thigh"]))
         tips[LANDMARKS.index(f"{side}_wrist")] = (0, sign * d["forearm"], 0)
         tips[LANDMARKS.index(f"{side}_ankle")] = (0, 0, -d["shank"])
-    tips[LANDMARKS.index("head_top")] = (0, 0, d["head"])
+    tips[LANDMARKS.index("head_top")] = (d["head_forward"], 0, d["head"])
     return BodyModel(float(d["height"]), offsets, tips, _flesh(d), limits or default_limits(), {name: float(d[name]) for name in wanted})
 
 
@@ -151,15 +156,18 @@ def _flesh(d: dict[str, float]) -> Cones:
 
     wide, deep, trunk = d["girth_torso"], d["girth_torso"] * d["girth_depth"], d["trunk"]
     y = (0, 1, 0)
+    chest, ahead = d["chest_forward"], d["head_forward"]
+    waist = nape = 0.4 * chest
     # [lateral, front to back] at both ends
-    cone("pelvis", "torso", (0, 0, -0.035 * h), (0, 0, 0.15 * trunk), (0.090, 0.062), (0.086, 0.060), y, (wide, deep))
-    cone("torso", "torso", (0, 0, 0.12 * trunk), (0, 0, 0.48 * trunk), (0.084, 0.059), (0.082, 0.057), y, (wide, deep))
-    cone("torso", "torso", (0, 0, 0.48 * trunk), (0, 0, 0.82 * trunk), (0.084, 0.058), (0.096, 0.058), y, (wide, deep))
-    cone("torso", "torso", (0, 0, 0.82 * trunk), (0, 0, trunk), (0.096, 0.056), (0.042, 0.036), y, (wide, deep))
+    cone("pelvis", "torso", (0, 0, -0.035 * h), (waist, 0, 0.15 * trunk), (0.090, 0.062), (0.086, 0.060), y, (wide, deep))
+    cone("torso", "torso", (waist, 0, 0.12 * trunk), (chest, 0, 0.48 * trunk), (0.084, 0.059), (0.082, 0.057), y, (wide, deep))
+    cone("torso", "torso", (chest, 0, 0.48 * trunk), (chest, 0, 0.82 * trunk), (0.084, 0.058), (0.096, 0.058), y, (wide, deep))
+    cone("torso", "torso", (chest, 0, 0.82 * trunk), (nape, 0, trunk), (0.096, 0.056), (0.042, 0.036), y, (wide, deep))
     head, g = d["head"], (d["girth_head"], d["girth_head"])
-    cone("head", "head", (0, 0, -0.02 * h), (0.004 * h, 0, 0.28 * head), (0.034, 0.034), (0.034, 0.040), y, g)
-    cone("head", "head", (0.006 * h, 0, 0.22 * head), (0.01 * h, 0, 0.65 * head), (0.036, 0.046), (0.045, 0.057), y, g)
-    cone("head", "head", (0.01 * h, 0, 0.65 * head), (0.008 * h, 0, head), (0.045, 0.057), (0.026, 0.032), y, g)
+    skull = 0.01 * h + 0.6 * ahead
+    cone("head", "head", (nape, 0, -0.02 * h), (0.004 * h + 0.4 * ahead, 0, 0.28 * head), (0.034, 0.034), (0.034, 0.040), y, g)
+    cone("head", "head", (0.006 * h + 0.4 * ahead, 0, 0.22 * head), (skull, 0, 0.65 * head), (0.036, 0.046), (0.045, 0.057), y, g)
+    cone("head", "head", (skull, 0, 0.65 * head), (skull - 0.002 * h, 0, head), (0.045, 0.057), (0.026, 0.032), y, g)
     x, arms = (1, 0, 0), (d["girth_arms"], d["girth_arms"])
     thighs, shanks = (d["girth_thighs"],) * 2, (d["girth_shanks"],) * 2
     for side, sign in (("r", -1.0), ("l", 1.0)):
@@ -174,7 +182,7 @@ def _flesh(d: dict[str, float]) -> Cones:
         part, shank, ankle = f"{side}_shank", d["shank"], d["ankle_height"]
         cone(part, part, (0, 0, 0), (-0.004 * h, 0, -0.4 * shank), (0.030, 0.032), (0.031, 0.033), y, shanks)
         cone(part, part, (-0.004 * h, 0, -0.4 * shank), (0, 0, -shank - 0.3 * ankle), (0.031, 0.033), (0.020, 0.021), y, shanks)
-        sole = -shank - 0.55 * ankle
+        sole = -shank - ankle + 0.024 * h  # the foot's axis at the heel: flesh reaches to the floor
         foot = d["foot"]
         if foot > 0:
             cone(
