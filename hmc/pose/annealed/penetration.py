@@ -7,18 +7,21 @@ that is stretched out. Points on the axes of the limbs are tested against the co
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
-from hmc.pose.body.flesh import place_points
-from hmc.pose.body.model import PARTS, BodyModel
+from hmc.pose.annealed.cone_maps import ConeMaps, cone_maps, cones_near, spread
+from hmc.pose.body.model import PARTS, BodyModel, Cones
 
-__all__ = ["AxisPoints", "axis_points", "penetration_depth", "penetration_rows"]
+__all__ = ["AxisPoints", "axis_points", "depths_placed", "penetration_depth", "penetration_rows"]
 
 #: Share of each limb part's length from which its axis is tested: what lies nearer to the joint is inside its neighbour anyway.
 _FROM = {"upper_arm": 0.6, "forearm": 0.25, "thigh": 0.6, "shank": 0.2}
 #: Points on the axis of each cone.
 POINTS_A_CONE = 3
+#: Elements (pairs of a cone and a point x states) worked on at a time: what stays in the second-level cache.
+CHUNK = 16384
 _NEIGHBOURS = {
     "upper_arm": ("upper_arm", "forearm"),
     "forearm": ("upper_arm", "forearm"),
@@ -88,8 +91,58 @@ def penetration_depth(body: BodyModel, axes: AxisPoints, rotations: np.ndarray, 
     ndarray, shape (n, n_points)
         Metres; 0 where a point is in none.
     """
-    points = place_points(rotations, positions, axes.points, axes.segment)
-    return _depths(body, axes, rotations, positions, points)[0].max(1)
+    placed = np.moveaxis(np.concatenate([rotations, positions[..., None]], axis=-1), 0, -1)
+    return depths_placed(body, axes, placed, cone_maps(body.cones, placed)).T
+
+
+def depths_placed(body: BodyModel, axes: AxisPoints, placed: np.ndarray, maps: ConeMaps) -> np.ndarray:
+    """The same for placed segments, particles last.
+
+    Parameters
+    ----------
+    body : BodyModel
+    axes : AxisPoints
+    placed : ndarray, shape (11, 3, 4, n)
+        As from `hmc.pose.annealed.placing.place_segments`.
+    maps : ConeMaps
+        Of the same.
+
+    Returns
+    -------
+    ndarray, shape (n_points, n)
+        Metres; 0 where a point is in no cone.
+    """
+    points = _place_points(axes, placed)
+    middle, far = spread(points)
+    cone, point = np.nonzero(cones_near(body.cones, maps, middle, far) & axes.against.T)
+    depth = np.empty((len(cone), placed.shape[-1]), placed.dtype)
+    step = max(1, CHUNK // placed.shape[-1])
+    for begin in range(0, len(cone), step):
+        rows = slice(begin, begin + step)
+        depth[rows] = _depth(body.cones, cone[rows], maps.to_cone[cone[rows]], points[point[rows]])
+    out = np.zeros((len(points), placed.shape[-1]), placed.dtype)
+    for start, stop in pairwise(np.searchsorted(cone, np.arange(len(maps.to_cone) + 1))):
+        out[point[start:stop]] = np.maximum(out[point[start:stop]], depth[start:stop])
+    return out
+
+
+def _place_points(axes: AxisPoints, placed: np.ndarray) -> np.ndarray:
+    """The points in the world, shape (n_points, 3, n)."""
+    local = np.c_[axes.points, np.ones(len(axes.points))].astype(placed.dtype)
+    return (local[:, None, None] @ placed[axes.segment])[:, :, 0]
+
+
+def _depth(cones: Cones, cone: np.ndarray, to_cone: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Depth of one point, shape (m, 3, n), in one cone in each row: shape (m, n)."""
+    x, y, along = (np.einsum("mjn,mjn->mn", to_cone[:, axis, :3], points) + to_cone[:, axis, 3] for axis in range(3))
+    length = cones.lengths.astype(x.dtype)[cone, None]
+    t = np.clip(along / length, 0, 1)
+    first = cones.radii[:, 0].astype(x.dtype)[cone, :, None]
+    slope = (cones.radii[:, 1] - cones.radii[:, 0]).astype(x.dtype)[cone, :, None]
+    a, b = first[:, 0] + slope[:, 0] * t, first[:, 1] + slope[:, 1] * t
+    level = np.sqrt((x / a) ** 2 + (y / b) ** 2)
+    inside = (level < 1) & (along > 0) & (along < length)
+    return np.where(inside, (1 - level) * np.minimum(a, b), 0)
 
 
 def penetration_rows(
@@ -107,29 +160,16 @@ def penetration_rows(
     segment, other : ndarray of int, shape (n_points,)
         Segments of the point and of the cone.
     """
-    points = place_points(rotations, positions, axes.points, axes.segment)
-    depths, turn, local = _depths(body, axes, rotations[None], positions[None], points[None])
-    deepest = depths[0].argmax(0)
-    k = np.arange(len(points))
-    lateral = local[0, deepest, :2, k]
+    placed = np.concatenate([rotations, positions[..., None]], axis=-1)[..., None]
+    maps = cone_maps(body.cones, placed)
+    points = _place_points(axes, placed)
+    cone, point = np.nonzero(axes.against.T)  # of one state it takes longer to tell which are near
+    depths = np.zeros((len(maps.to_cone), len(points)))
+    depths[cone, point] = _depth(body.cones, cone, maps.to_cone[cone], points[point])[:, 0]
+    deepest = depths.argmax(axis=0)
+    points, across = points[:, :, 0], maps.to_cone[deepest, :2, :, 0]
+    lateral = (across[:, :, :3] @ points[:, :, None])[:, :, 0] + across[:, :, 3]
     norm = np.linalg.norm(lateral, axis=1, keepdims=True)
     lateral = np.where(norm > 1e-9, lateral / np.maximum(norm, 1e-9), [1.0, 0.0])
-    outward = np.einsum("ki,kij->kj", lateral, turn[0, deepest, :2])
-    return depths[0, deepest, k], outward, points, axes.segment, body.cones.segment[deepest]
-
-
-def _depths(body, axes, rotations, positions, points):
-    """Depth of every point in every cone it must stay out of, (n, n_cones, n_points); world to cone; local coordinates."""
-    cones = body.cones
-    turn = cones.bases.astype(rotations.dtype) @ np.swapaxes(rotations[:, cones.segment], -1, -2)
-    start = positions[:, cones.segment] + (rotations[:, cones.segment] @ cones.start[..., None].astype(rotations.dtype))[..., 0]
-    shift = (turn @ start[..., None])[..., 0]
-    local = turn @ np.swapaxes(points, -1, -2)[:, None] - shift[..., None]
-    x, y, along = local[:, :, 0], local[:, :, 1], local[:, :, 2]
-    length = cones.lengths.astype(rotations.dtype)[:, None]
-    t = np.clip(along / length, 0, 1)
-    first, slope = cones.radii[:, 0].astype(rotations.dtype), (cones.radii[:, 1] - cones.radii[:, 0]).astype(rotations.dtype)
-    a, b = first[:, :1] + slope[:, :1] * t, first[:, 1:] + slope[:, 1:] * t
-    level = np.sqrt((x / a) ** 2 + (y / b) ** 2)
-    inside = (level < 1) & (along > 0) & (along < length) & axes.against.T
-    return np.where(inside, (1 - level) * np.minimum(a, b), 0), turn, local
+    outward = np.einsum("ki,kij->kj", lateral, across[:, :, :3])
+    return depths[deepest, np.arange(len(points))], outward, points, axes.segment, body.cones.segment[deepest]

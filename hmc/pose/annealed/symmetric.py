@@ -7,22 +7,24 @@ explained; the tolerant one (one camera may miss) is what the body must not leav
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
+from hmc.pose.annealed.cone_maps import ConeMaps, cone_maps, cones_near
 from hmc.pose.annealed.floor import floor_gap
 from hmc.pose.annealed.hull_target import HullTarget, distance_at
-from hmc.pose.annealed.penetration import AxisPoints, axis_points, penetration_depth
-from hmc.pose.body.flesh import SurfaceSamples, place_points, surface_samples
+from hmc.pose.annealed.penetration import AxisPoints, axis_points, depths_placed
+from hmc.pose.annealed.placing import place_segments
+from hmc.pose.body.flesh import SurfaceSamples, surface_samples
 from hmc.pose.body.joints import DOF_NAMES
-from hmc.pose.body.kinematics import segment_transforms
-from hmc.pose.body.model import BodyModel
+from hmc.pose.body.model import BodyModel, Cones
 
 __all__ = ["POSTURE", "BodyPoints", "SymmetricSettings", "body_distance", "body_points", "outside_distance", "symmetric_cost"]
 
-#: Elements (states x cones x points) worked on at a time: what stays in the second-level cache.
-CHUNK = 65536
+#: Elements (pairs of a cone and a point x states) worked on at a time: what stays in the second-level cache.
+CHUNK = 16384
 
 
 # Angles at rest and how far people commonly go from there, degrees; what is not named rests at 0.
@@ -97,9 +99,17 @@ def outside_distance(body: BodyModel, samples: SurfaceSamples, states: np.ndarra
     ndarray of float32, shape (n, n_samples)
         Metres; 0 inside.
     """
-    rotations, positions = segment_transforms(body, states)
-    points = place_points(rotations.astype(np.float32), positions.astype(np.float32), samples.points, samples.segment)
-    return distance_at(target, points)
+    return _outside(samples, place_segments(body, states, target.origin), target, target.origin).T
+
+
+def _outside(samples: SurfaceSamples, placed: np.ndarray, target: HullTarget, origin: np.ndarray) -> np.ndarray:
+    """The same for segments placed around an origin, shape (n_samples, n)."""
+    points = np.empty((3, len(samples.points), placed.shape[-1]), np.float32)
+    local = np.c_[samples.points, np.ones(len(samples.points))].astype(np.float32)
+    edges = np.r_[0, np.flatnonzero(np.diff(samples.segment)) + 1, len(local)]
+    for start, stop in pairwise(edges):
+        np.matmul(local[start:stop], placed[samples.segment[start]], out=points[:, start:stop])
+    return distance_at(replace(target, origin=target.origin - origin), np.moveaxis(points, 0, -1))
 
 
 def body_distance(body: BodyModel, states: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -117,36 +127,60 @@ def body_distance(body: BodyModel, states: np.ndarray, points: np.ndarray) -> np
     ndarray of float32, shape (n, k)
         Metres; 0 inside the body.
     """
-    rotations, positions = segment_transforms(body, states)
-    cones = body.cones
-    turn = (cones.bases @ np.swapaxes(rotations[:, cones.segment], -1, -2)).astype(np.float32)  # cone from world, (n, C, 3, 3)
-    # Work relative to the points' middle: float32 then has digits to spare.
-    middle = points.mean(0)
-    start = positions[:, cones.segment] + (rotations[:, cones.segment] @ cones.start[..., None])[..., 0] - middle
-    shift = (turn @ start[..., None].astype(np.float32))[..., 0]
-    pts = np.ascontiguousarray((points - middle).T, np.float32)
-    n, n_cones = turn.shape[:2]
-    length = cones.lengths.astype(np.float32)[:, None]
-    radii0, slope = cones.radii[:, 0].astype(np.float32), (cones.radii[:, 1] - cones.radii[:, 0]).astype(np.float32)
-    out = np.empty((n, points.shape[0]), np.float32)
-    step = max(1, CHUNK // (n_cones * points.shape[0]))
-    for first in range(0, n, step):
-        part = slice(first, min(first + step, n))
-        local = turn[part].reshape(-1, 3) @ pts
-        local = local.reshape(-1, n_cones, 3, pts.shape[1])
-        local -= shift[part][..., None]
-        x, y, along = local[:, :, 0], local[:, :, 1], local[:, :, 2]
-        clipped = np.clip(along, 0, length)
-        beyond = along - clipped
-        t = clipped / length
-        a = x / (radii0[:, :1] + slope[:, :1] * t)
-        b = y / (radii0[:, 1:] + slope[:, 1:] * t)
-        level2 = a * a + b * b
-        np.maximum(level2, 1.0, out=level2)
-        # lateral * (1 - 1 / level), squared
-        squared = (x * x + y * y) * (1 - 1 / np.sqrt(level2)) ** 2 + beyond * beyond
-        np.sqrt(squared.min(1), out=out[part])
-    return out
+    # Relative to the points' middle: float32 then has digits to spare.
+    origin = points.mean(axis=0)
+    maps = cone_maps(body.cones, place_segments(body, states, origin))
+    return _to_body(body.cones, maps, points - origin, np.ones((len(body.cones.part), len(points)), bool)).T
+
+
+def _to_body(cones: Cones, maps: ConeMaps, points: np.ndarray, near: np.ndarray) -> np.ndarray:
+    """Distance of points to the nearest of the cones that are near them, shape (k, n); infinite where none is.
+
+    `near`, shape (n_cones, k), says which are.
+    """
+    n = maps.start.shape[-1]
+    cone, point = np.nonzero(near)
+    local = np.empty((3, len(cone), n), np.float32)
+    homogeneous = np.c_[points, np.ones(len(points))].astype(np.float32)[point]
+    edges = np.searchsorted(cone, np.arange(len(near) + 1))
+    for to_cone, (start, stop) in zip(maps.to_cone, pairwise(edges), strict=True):
+        np.matmul(homogeneous[start:stop], to_cone, out=local[:, start:stop])
+    length = cones.lengths.astype(np.float32)[cone, None]
+    first = cones.radii[:, 0].astype(np.float32)[cone, :, None]
+    slope = ((cones.radii[:, 1] - cones.radii[:, 0]) / cones.lengths[:, None]).astype(np.float32)[cone, :, None]
+    squared = np.empty((len(cone), n), np.float32)
+    step = max(1, CHUNK // n)
+    for begin in range(0, len(cone), step):
+        rows = slice(begin, begin + step)
+        _squared_distance(local[:, rows], length[rows], first[rows], slope[rows], squared[rows])
+    out = np.full((len(points), n), np.inf, np.float32)
+    for start, stop in pairwise(edges):
+        out[point[start:stop]] = np.minimum(out[point[start:stop]], squared[start:stop])
+    return np.sqrt(out, out=out)
+
+
+def _squared_distance(local: np.ndarray, length: np.ndarray, first: np.ndarray, slope: np.ndarray, out: np.ndarray) -> None:
+    """Squared distance of points to cones, from their coordinates (3, m, n), which are written over."""
+    x, y, along = local
+    clipped = np.clip(along, 0, length)
+    along -= clipped
+    along *= along
+    x *= x
+    np.add(x, np.multiply(y, y, out=y), out=out)
+    for squares, axis in ((x, 0), (y, 1)):
+        radius = clipped * slope[:, axis]
+        radius += first[:, axis]
+        radius *= radius
+        squares /= radius
+    x += y
+    # lateral * (1 - 1 / level), squared
+    np.maximum(x, 1, out=x)
+    np.sqrt(x, out=x)
+    np.divide(-1, x, out=x)
+    x += 1
+    x *= x
+    out *= x
+    out += along
 
 
 def symmetric_cost(
@@ -175,15 +209,21 @@ def symmetric_cost(
         Square metres.
     """
     cap = np.float32(settings.cap_m)
-    outside = np.minimum(outside_distance(body, points.surface, states, target), cap)
-    unexplained = np.minimum(body_distance(body, states, hull_points), cap)
-    rotations, positions = segment_transforms(body, states)
-    depth = penetration_depth(body, points.axes, rotations.astype(np.float32), positions.astype(np.float32))
-    floor = 0.0 if target.floor_z is None else settings.floor_weight * floor_gap(body, rotations, positions, target.floor_z) ** 2
+    origin = hull_points.mean(axis=0)
+    placed = place_segments(body, states, origin)
+    maps = cone_maps(body.cones, placed)
+    outside = np.minimum(_outside(points.surface, placed, target, origin), cap)
+    near = cones_near(body.cones, maps, hull_points - origin, settings.cap_m)
+    unexplained = np.minimum(_to_body(body.cones, maps, hull_points - origin, near), cap)
+    depth = depths_placed(body, points.axes, placed, maps)
+    gap = np.zeros(len(states))
+    if target.floor_z is not None:
+        rotations, positions = np.moveaxis(placed[:, :, :3], -1, 0), np.moveaxis(placed[:, :, 3], -1, 0)
+        gap = floor_gap(body, rotations, positions, target.floor_z - origin[2])
     return (
-        floor
-        + np.einsum("ij,ij->i", outside, outside) / outside.shape[1]
-        + settings.explain_weight / unexplained.shape[1] * np.einsum("ij,ij->i", unexplained, unexplained)
-        + settings.overlap_weight / depth.shape[1] * np.einsum("ij,ij->i", depth, depth)
+        settings.floor_weight * gap**2
+        + np.einsum("ij,ij->j", outside, outside) / len(outside)
+        + settings.explain_weight / len(unexplained) * np.einsum("ij,ij->j", unexplained, unexplained)
+        + settings.overlap_weight / len(depth) * np.einsum("ij,ij->j", depth, depth)
         + settings.posture_weight * (((states - POSTURE[0]) / POSTURE[1]) ** 2).sum(1)
     )

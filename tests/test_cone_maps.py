@@ -1,0 +1,53 @@
+"""Cones of many particles: their coordinates against plain loops, and nothing near is ever left out."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from posed import body_of
+
+from hmc.pose.annealed.cone_maps import cone_maps, cones_near, spread
+from hmc.pose.annealed.placing import place_segments
+from hmc.pose.body.flesh import cone_distance
+from hmc.pose.body.kinematics import segment_transforms
+from hmc.pose.body.model import neutral_state
+
+BODY, _ = body_of()
+
+
+def states_around_standing(deviation: float, n: int = 12) -> np.ndarray:
+    return neutral_state("down") + np.random.default_rng(0).normal(0, deviation, (n, 27))
+
+
+def test_maps_lead_to_the_coordinates_of_the_cones():
+    states, cones = states_around_standing(0.5), BODY.cones
+    maps = cone_maps(cones, place_segments(BODY, states, np.zeros(3)))
+    point = np.array([0.2, -0.1, 0.3])
+    for n, state in enumerate(states):
+        rotations, positions = segment_transforms(BODY, state)
+        for c, segment in enumerate(cones.segment):
+            local = cones.bases[c] @ (rotations[segment].T @ (point - positions[segment]) - cones.start[c])
+            assert_allclose(maps.to_cone[c, :, :, n] @ [*point, 1], local, atol=1e-5)
+            assert_allclose(maps.start[c, :, n], rotations[segment] @ cones.start[c] + positions[segment], atol=1e-5)
+            assert_allclose(maps.axis[c, :, n], rotations[segment] @ cones.bases[c, 2], atol=1e-5)
+
+
+@pytest.mark.parametrize("deviation", [0.02, 0.2, 1.0])
+@pytest.mark.parametrize("reach", [0.0, 0.06])
+def test_what_is_not_near_is_farther_in_every_particle(deviation, reach):
+    states, cones = states_around_standing(deviation), BODY.cones
+    maps = cone_maps(cones, place_segments(BODY, states, np.zeros(3)))
+    points = np.random.default_rng(1).normal(0, 0.5, (60, 3))
+    near = cones_near(cones, maps, points, reach)
+    assert deviation > 0.5 or not near.all()
+    for state in states:
+        rotations, positions = segment_transforms(BODY, state)
+        for c, segment in enumerate(cones.segment):
+            distance = cone_distance(cones, c, (points - positions[segment]) @ rotations[segment])
+            assert np.all(distance[~near[c]] > reach)
+
+
+def test_spread_is_the_farthest_from_the_mean():
+    points = np.random.default_rng(2).normal(size=(4, 3, 9))
+    middle, far = spread(points)
+    assert_allclose(middle, points.mean(axis=2))
+    assert_allclose(far, [max(np.linalg.norm(p - m) for p in each.T) for each, m in zip(points, middle, strict=True)])
