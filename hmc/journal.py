@@ -14,7 +14,7 @@ import numpy as np
 
 from hmc.errors import InputError
 
-__all__ = ["append_journal", "read_journal"]
+__all__ = ["append_journal", "open_journal", "read_journal"]
 
 
 def append_journal(path: str | Path, record: Mapping[str, Any]) -> None:
@@ -32,6 +32,30 @@ def append_journal(path: str | Path, record: Mapping[str, Any]) -> None:
     line = json.dumps(record, default=_plain, separators=(",", ":")) + "\n"
     with open(path, "a", encoding="utf-8") as file:
         file.write(line)
+
+
+def open_journal(path: str | Path | None, key: str) -> list[dict[str, Any]]:
+    """What was done of a run: the records after the first, which holds the key that says what the run depends on.
+
+    Parameters
+    ----------
+    path : path or None
+        A journal that is not there, or of another key, is begun anew. None: nothing is done, and nothing kept.
+    key : str
+
+    Raises
+    ------
+    InputError
+        When the journal is damaged.
+    """
+    if path is None:
+        return []
+    records = read_journal(path)
+    if records and records[0].get("key") == key:
+        return records[1:]
+    Path(path).unlink(missing_ok=True)
+    append_journal(path, {"key": key})
+    return []
 
 
 def read_journal(path: str | Path) -> list[dict[str, Any]]:

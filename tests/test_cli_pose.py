@@ -1,7 +1,6 @@
 """The pose command on the small rendered clip: results, resuming, repeated runs and wrong input."""
 
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +10,11 @@ from numpy.testing import assert_array_equal
 
 from hmc.cli import main
 from hmc.montecarlo.filters import AnnealedSettings
-from hmc.pose import sequence
+from hmc.pose import person, sequence
 from hmc.pose.annealed import presets
-from hmc.pose.start import StartSettings, start_person
+from hmc.pose.legs import LegSettings
+from hmc.pose.person import FollowSettings
+from hmc.pose.start import StartSettings
 from hmc.results import read_joints, read_pose, read_run, read_tracks
 
 TINY = Path(__file__).resolve().parents[1] / "data" / "synthetic" / "tiny"
@@ -26,8 +27,8 @@ def little_work():
         for name, layers in (("default", {"survival_rate": 0.1, "spread": 0.5}), ("canton2009", {})):
             lean = replace(presets.PRESETS[name], annealed=AnnealedSettings(layers=2, particles=40, **layers))
             patch.setitem(presets.PRESETS, name, lean)
-        patch.setattr(sequence, "start_person", partial(start_person, settings=StartSettings(anchors=1, candidates=1)))
-        patch.setattr(sequence, "WINDOW_FRAMES", 3)
+        lean_start = FollowSettings(window_s=0.2, start=StartSettings(anchors=1, candidates=1), legs=LegSettings(lag_s=0.1))
+        patch.setattr(person, "FollowSettings", lambda: lean_start)
         yield
 
 

@@ -12,14 +12,15 @@ from numpy.testing import assert_array_equal
 from hmc.errors import InputError
 from hmc.landmarks import landmark_index
 from hmc.montecarlo.filters import AnnealedSettings
-from hmc.pose import sequence
 from hmc.pose.annealed.limb_search import SearchSettings
 from hmc.pose.annealed.presets import PRESETS
 from hmc.pose.body.joints import DOF_NAMES, canton_limits, default_limits
 from hmc.pose.body.kinematics import landmarks
 from hmc.pose.body.proportions import make_body
-from hmc.pose.sequence import pose_recording
-from hmc.pose.start import StartSettings, start_person
+from hmc.pose.legs import LegSettings
+from hmc.pose.person import FollowSettings
+from hmc.pose.sequence import pose_recording as pose_whole_recording
+from hmc.pose.start import StartSettings
 from hmc.recording import open_recording
 from hmc.results import TrackTable, read_centroids, read_joints
 
@@ -35,6 +36,10 @@ PRESET = {
     "canton2009": replace(PRESETS["canton2009"], annealed=AnnealedSettings(layers=3, particles=60)),
 }
 
+# People are watched for three frames, so that frames are left to follow them, and few starts are tried.
+SETTINGS = FollowSettings(window_s=0.2, start=StartSettings(anchors=1, candidates=1), legs=LegSettings(lag_s=0.1))
+pose_recording = partial(pose_whole_recording, settings=SETTINGS)
+
 
 @pytest.fixture(scope="module")
 def recording():
@@ -49,17 +54,8 @@ def tracks():
     return truth.where(truth.frames < FRAMES)
 
 
-@pytest.fixture(scope="module", autouse=True)
-def little_work():
-    """People are watched for three frames, so that frames are left to follow them, and few starts are tried."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sequence, "WINDOW_FRAMES", 3)
-        patch.setattr(sequence, "start_person", partial(start_person, settings=StartSettings(anchors=1, candidates=1)))
-        yield
-
-
 @pytest.fixture(scope="module", params=PRESET)
-def whole(request, recording, tracks, little_work):
+def whole(request, recording, tracks):
     """A run without a stop, and its preset's name."""
     return request.param, pose_recording(recording, tracks, VOXEL_M, PRESET[request.param], seed=3)
 
@@ -127,7 +123,8 @@ def test_a_stopped_run_goes_on_and_ends_as_if_it_had_not_been(whole, recording, 
             yield step
 
     equal(pose_recording(recording, tracks, VOXEL_M, PRESET[name], progress=count, **options), people)
-    assert seen[0] == (0 if stop < 3 else stop)  # what was kept is not computed again
+    # What was decided is not computed again; legs are decided two frames later.
+    assert seen[0] == (0 if stop < 3 else stop if name == "canton2009" else 3)
     # A finished run is read back without a frame being touched.
     seen.clear()
     equal(pose_recording(recording, tracks, VOXEL_M, PRESET[name], progress=count, **options), people)
@@ -164,7 +161,9 @@ def test_a_track_without_a_hull_gets_no_pose_and_a_note(recording, tracks):
         np.r_[tracks.frames, ghost.frames], np.r_[tracks.persons, ghost.persons], np.vstack([tracks.positions, ghost.positions])
     )
     people = pose_recording(recording, both, VOXEL_M, PRESET["canton2009"], seed=3)
-    assert np.isnan(people.poses.of(7).positions).all()
+    lost = people.poses.of(7)
+    assert lost.frames.tolist() == [1, 2, 3, 4, 5] and np.isnan(lost.positions).all()
+    assert people.states.frames.tolist() == people.poses.frames.tolist() and set(people.states.bodies) == {0}
     assert len(people.notes) == 1 and people.notes[0].startswith("person 7: 5 frames without a pose")
     equal_one = pose_recording(recording, tracks, VOXEL_M, PRESET["canton2009"], seed=3)
     assert_array_equal(people.poses.of(0).positions, equal_one.poses.positions)

@@ -51,6 +51,7 @@ def run(args: argparse.Namespace) -> int:
     from hmc.frontend import FrontendSettings
     from hmc.pose.annealed.presets import pose_preset
     from hmc.pose.body.proportions import stature
+    from hmc.pose.person import FollowSettings
     from hmc.pose.sequence import pose_recording
     from hmc.results import read_run, write_joints, write_pose, write_run, write_tracks
     from hmc.tracking.naive import NaiveSettings
@@ -62,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"--out {args.out}: is a file; give a folder")
     height = _height(args.height, recording)
     person_grid(recording, args.voxel)  # voxels that will not do are refused before any work is done
-    tracker, frontend = NaiveSettings(), FrontendSettings()
+    tracker, frontend, following = NaiveSettings(), FrontendSettings(), FollowSettings()
     parameters: dict[str, Any] = {
         "voxel_size_m": args.voxel,
         "track_voxel_size_m": args.track_voxel,
@@ -73,6 +74,7 @@ def run(args: argparse.Namespace) -> int:
         "fps": recording.fps,
         "height_m": height or "auto",
         "preset": preset,
+        "following": following,
         "tracker": tracker,
         "frontend": frontend,
     }
@@ -105,6 +107,7 @@ def run(args: argparse.Namespace) -> int:
         preset,
         args.seed,
         height_m=height,
+        settings=following,
         frontend=frontend,
         journal=pose_journal,
         key=key,
@@ -121,9 +124,9 @@ def run(args: argparse.Namespace) -> int:
             file.unlink()
     for person in np.unique(people.poses.persons):
         rows = people.poses.persons == person
-        frames, body = people.poses.frames[rows], people.states.bodies[int(person)]
-        tall = stature({name: float(value) for name, value in body.items()})
-        print(f"person {person}: {rows.sum()} frames, from {frames.min()} to {frames.max()}, stature about {tall:.2f} m")
+        frames, body = people.poses.frames[rows], people.states.bodies.get(int(person))
+        tall = "no pose" if body is None else f"stature about {stature({name: float(value) for name, value in body.items()}):.2f} m"
+        print(f"person {person}: {rows.sum()} frames, from {frames.min()} to {frames.max()}, {tall}")
     if not len(people.poses.frames):
         print(f"nobody in {recording.n_frames} frames")
     print(f"wrote {paths['joints.csv']}")

@@ -8,6 +8,8 @@ the best of each heading is refined, and the caller follows the most promising o
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 
 from hmc.landmarks import LANDMARKS
@@ -19,7 +21,7 @@ from hmc.pose.body.joints import dof_index
 from hmc.pose.body.kinematics import landmarks
 from hmc.pose.body.model import BodyModel, neutral_state
 
-__all__ = ["TEMPLATES", "first_poses", "swapped_poses", "template_states"]
+__all__ = ["TEMPLATES", "first_poses", "swapped_pose", "swapped_poses", "template_states"]
 
 #: Typical poses, degrees on top of hanging arms: (angles, height of the pelvis over the stature, lean included).
 TEMPLATES: dict[str, tuple[dict[str, float], float]] = {
@@ -40,6 +42,9 @@ TEMPLATES: dict[str, tuple[dict[str, float], float]] = {
     "bent down": ({"torso_y": 70, "r_hip_y": -15, "l_hip_y": -15, "r_shoulder_z": 70, "l_shoulder_z": -70}, 0.50),
     "kneeling": ({"r_hip_y": -20, "l_hip_y": -20, "r_knee_y": 100, "l_knee_y": 100}, 0.31),
 }
+
+#: Landmarks that move freely of the trunk.
+_LOOSE = {"legs": ("knee", "ankle"), "arms": ("elbow", "wrist")}
 
 
 def template_states(body: BodyModel, xy: np.ndarray, floor_z: float, headings: np.ndarray) -> np.ndarray:
@@ -132,10 +137,36 @@ def first_poses(
     return np.array([state for _, state in chosen]), np.array([cost for cost, _ in chosen])
 
 
-def swapped_poses(body: BodyModel, state: np.ndarray) -> np.ndarray:
-    """The same stick figure with left and right exchanged: the whole body turned about, the legs alone, the arms alone.
+def swapped_pose(body: BodyModel, state: np.ndarray, what: Literal["all", "legs", "arms"]) -> np.ndarray:
+    """The same stick figure with left and right exchanged: the whole body turned about, the legs alone, or the arms alone.
 
-    A hull hardly tells a person's front from their back; these are the alternatives that it confuses.
+    Parameters
+    ----------
+    body : BodyModel
+    state : ndarray, shape (27,)
+    what : {"all", "legs", "arms"}
+
+    Returns
+    -------
+    ndarray, shape (27,)
+        Within the joint limits, so it explains the hull as well as the body can that way round.
+    """
+    points = landmarks(body, state)
+    moved, start = points.copy(), state.copy()
+    for index, name in enumerate(LANDMARKS):
+        if name[:2] not in ("l_", "r_"):
+            continue
+        # Hips and shoulders stay where the trunk holds them unless the whole body turns.
+        if what == "all" or name[2:] in _LOOSE[what]:
+            moved[index] = points[LANDMARKS.index(("r_" if name[0] == "l" else "l_") + name[2:])]
+    if what == "all":
+        start[3] += np.pi
+        start[4:] = neutral_state("down", body.limits)[4:]
+    return fit_landmarks(body, moved, start)[0]
+
+
+def swapped_poses(body: BodyModel, state: np.ndarray) -> np.ndarray:
+    """All that a hull confuses with a pose: turned about, legs exchanged, arms exchanged (`swapped_pose`).
 
     Parameters
     ----------
@@ -145,23 +176,5 @@ def swapped_poses(body: BodyModel, state: np.ndarray) -> np.ndarray:
     Returns
     -------
     ndarray, shape (3, 27)
-        Within the joint limits, so they explain the hull as well as the body can that way round.
     """
-    points = landmarks(body, state)
-    sides = [i for i, name in enumerate(LANDMARKS) if name[:2] in ("l_", "r_")]
-    legs = [i for i in sides if LANDMARKS[i][2:] in ("hip", "knee", "ankle")]
-    arms = [i for i in sides if i not in legs]
-    out = []
-    for swapped, turn in ((sides, np.pi), (legs, 0.0), (arms, 0.0)):
-        moved = points.copy()
-        for index in swapped:
-            name = LANDMARKS[index]
-            # Hips and shoulders stay where the trunk holds them unless the whole body turns.
-            if turn or name[2:] not in ("hip", "shoulder"):
-                moved[index] = points[LANDMARKS.index(("r_" if name[0] == "l" else "l_") + name[2:])]
-        start = state.copy()
-        start[3] += turn
-        if turn:
-            start[4:] = neutral_state("down", body.limits)[4:]
-        out.append(fit_landmarks(body, moved, start)[0])
-    return np.array(out)
+    return np.array([swapped_pose(body, state, "all"), swapped_pose(body, state, "legs"), swapped_pose(body, state, "arms")])

@@ -32,6 +32,8 @@ __all__ = ["StartSettings", "Started", "estimate_height", "follow", "start_perso
 LEAST_BODY_FRAMES = 6
 #: Fewer surface voxels are too little of a person to start from.
 LEAST_START_SURFACE = 50
+#: The window's frames are thinned out to about so many a second before body and first pose are decided.
+DECIDE_FPS = 30.0
 #: Random generator of a frame: the same whatever the order in which frames are visited.
 FrameRng = Callable[[int], np.random.Generator]
 
@@ -142,14 +144,30 @@ def start_person(
         None where no frame of the window has a hull to start from.
     """
     settings = settings or StartSettings()
+    velocities = np.zeros((len(targets), 3)) if velocities is None else velocities
+    # Of a fast recording, every so many frames decide, as many as of a slow one; then all are followed.
+    stride = max(1, round(fps / DECIDE_FPS))
+    found = _decide(
+        lambda k: frame_rng(k * stride), preset, fps / stride, targets[::stride], height_m, velocities[::stride], room, settings
+    )
+    if found is None:
+        return None
+    filt, anchor, state, costs, fit = found
+    if stride > 1:
+        filt = replace(filt, drift=make_filter(filt.body, preset, fps).drift)
+    states, infos = follow(frame_rng, filt, state, anchor * stride, targets)
+    return Started(filt, states, infos, costs, fit)
+
+
+def _decide(frame_rng, preset, fps, targets, height_m, velocities, room, settings):
+    """The filter with the person's body, a frame and the pose in it, the candidates' costs and the fit; None without any hull."""
     usable = [k for k, target in enumerate(targets) if target is not None and len(target.surface) >= LEAST_START_SURFACE]
     if not usable:
         return None
-    velocities = np.zeros((len(targets), 3)) if velocities is None else velocities
     floor_z = 0.0 if room is None else float(room[0, 2])
     height = height_m or estimate_height(targets, floor_z)
     body = canton_body(height) if preset.body == "canton" else default_body(height)
-    earliest = next(target for target in targets if target is not None and len(target.surface) >= LEAST_START_SURFACE)
+    earliest = targets[usable[0]]
     filt = make_filter(body, preset, fps, earliest.voxel_size_m, room)
     if preset.start == "neutral":
         anchor, costs = usable[0], np.array([np.nan])
@@ -162,8 +180,7 @@ def start_person(
         states, infos = follow(frame_rng, _quick(filt), state, anchor, targets)
         filt, fit = _fit(frame_rng, filt, fps, targets, states, infos, settings, height_m is not None)
         state = states[anchor].state
-    states, infos = follow(frame_rng, filt, state, anchor, targets)
-    return Started(filt, states, infos, costs, fit)
+    return filt, anchor, state, costs, fit
 
 
 def follow(

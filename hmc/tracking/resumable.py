@@ -19,7 +19,7 @@ import numpy as np
 
 from hmc.errors import InputError
 from hmc.frontend import FrontendSettings, HullStep, stream_hulls
-from hmc.journal import append_journal, read_journal
+from hmc.journal import append_journal, open_journal
 from hmc.recording import Recording
 from hmc.results import TrackTable
 from hmc.tracking.blobs import Observation, observe
@@ -133,16 +133,9 @@ class Done:
 
 
 def _take_up(journal: str | Path | None, key: str, recording: Recording) -> Done:
-    """What the journal says is done; a journal that is not there, or of another key, is begun."""
+    """What the journal says is done."""
     done = Done(recording.start, init(recording.fps))
-    if journal is None:
-        return done
-    records = read_journal(journal)
-    if not records or records[0].get("key") != key:
-        Path(journal).unlink(missing_ok=True)
-        append_journal(journal, {"key": key})
-        return done
-    for record in records[1:]:
+    for record in open_journal(journal, key):
         done = Done(
             record["next_frame"],
             _state_of(record["state"]),

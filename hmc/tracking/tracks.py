@@ -122,12 +122,13 @@ def velocities(table: TrackTable, fps: float, window_s: float = 0.4) -> np.ndarr
     half = max(1.0, window_s * fps / 2)
     for person in np.unique(table.persons):
         rows = np.flatnonzero(table.persons == person)
-        frames = table.frames[rows].astype(float)
-        for row, frame in zip(rows, frames, strict=True):
-            near = np.abs(frames - frame) <= half
-            if near.sum() > 1:
+        rows = rows[np.argsort(table.frames[rows], kind="stable")]
+        frames, places = table.frames[rows].astype(float), table.positions[rows]
+        first, last = np.searchsorted(frames, frames - half, "left"), np.searchsorted(frames, frames + half, "right")
+        for row, near in zip(rows, map(slice, first, last), strict=True):
+            if near.stop - near.start > 1:
                 t = frames[near] - frames[near].mean()
-                result[row] = t @ table.positions[rows[near]] / (t @ t) * fps
+                result[row] = t @ places[near] / (t @ t) * fps
     return result
 
 

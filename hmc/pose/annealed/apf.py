@@ -86,7 +86,8 @@ class PoseInfo:
     Parameters
     ----------
     cost : float
-        Of the estimate, square metres; minus the log likelihood where the four scores are used; NaN without a fit.
+        Of the estimate, square metres; NaN without a fit, and where the four scores are used: there is a likelihood then
+        (`AnnealedInfo.best_log_likelihood`) and no cost.
     searched : tuple of str
         Limbs that were looked for.
     evaluations : int
@@ -163,7 +164,8 @@ def pose_step(rng: np.random.Generator, filt: PoseFilter, state: PoseState, targ
     if preset.refine is None:
         particles, annealed = annealed_step(rng, state.particles, likelihood, filt.drift, low, high, preset.annealed)
         estimate = annealed.estimate
-        info = PoseInfo(-annealed.best_log_likelihood, (), annealed.evaluations, annealed, "fitted")
+        cost = -annealed.best_log_likelihood if filt.table is None else np.nan
+        info = PoseInfo(cost, (), annealed.evaluations, annealed, "fitted")
         return PoseState(estimate, estimate - state.state, particles), info
     # A refined estimate is better than any particle: the next frame's particles start from it, half by the no-motion and
     # half by the smooth-motion assumption (Canton 2009, section 3.1.2.2).

@@ -1,0 +1,85 @@
+"""Decided rows as records of a journal, and back; particles in files beside it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hmc.files import atomic_write
+from hmc.montecarlo.filters import ParticleState
+from hmc.pose.annealed.apf import pose_init
+from hmc.pose.annealed.presets import PosePreset
+from hmc.pose.body.joints import DOF_NAMES, canton_limits, default_limits
+from hmc.pose.body.model import BodyModel
+from hmc.pose.body.proportions import make_body
+from hmc.pose.person import Decided
+
+__all__ = ["body_of", "from_record", "keep_particles", "kept_particles", "to_record"]
+
+
+def body_of(dimensions: dict[str, float], preset: PosePreset) -> BodyModel:
+    """The body of these dimensions with the preset's joint limits."""
+    return make_body(dimensions, canton_limits() if preset.body == "canton" else default_limits())
+
+
+def to_record(decided: Decided) -> dict[str, Any]:
+    """Plain values; the particles are not among them (`keep_particles`)."""
+    record: dict[str, Any] = {
+        "person": decided.person,
+        "frames": list(decided.frames),
+        "states": [None if np.isnan(state).any() else state for state in decided.states],
+        "costs": [cost if np.isfinite(cost) else None for cost in decided.costs],
+        "status": list(decided.status),
+    }
+    if decided.pose is not None and decided.body is not None:
+        record |= {"pose": decided.pose.state, "velocity": decided.pose.velocity, "body": decided.body.dimensions}
+    return record
+
+
+def from_record(record: dict[str, Any], preset: PosePreset, particles: ParticleState | None = None) -> Decided:
+    """What `to_record` made into a record, with these particles."""
+    started = "body" in record
+    return Decided(
+        record["person"],
+        tuple(record["frames"]),
+        np.array([np.full(len(DOF_NAMES), np.nan) if state is None else state for state in record["states"]], float),
+        tuple(np.nan if cost is None else cost for cost in record["costs"]),
+        tuple(record["status"]),
+        pose_init(np.array(record["pose"]), np.array(record["velocity"]), particles) if started else None,
+        body_of(record["body"], preset) if started else None,
+    )
+
+
+def keep_particles(journal: str | Path, person: int, frame: int, before: int | None, particles: ParticleState) -> None:
+    """Keep a person's particles beside the journal, to be called before the frame's record is added.
+
+    There are two files a person, and that of the frame `before`, which the last record is of, is left alone: it is needed should
+    the run stop between the two writes.
+    """
+    first, second = _particle_files(journal, person)
+    with atomic_write(second if before is not None and _frame_of(first) == before else first, "wb") as out:
+        np.savez(out, frame=frame, particles=particles.particles, log_weights=particles.log_weights)
+
+
+def kept_particles(journal: str | Path, person: int, frame: int) -> ParticleState | None:
+    """The particles kept for this frame, if any."""
+    for file in _particle_files(journal, person):
+        if _frame_of(file) == frame:
+            with np.load(file, allow_pickle=False) as data:
+                return ParticleState(data["particles"], data["log_weights"])
+    return None
+
+
+def _particle_files(journal: str | Path, person: int) -> list[Path]:
+    path = Path(journal)
+    return [path.with_name(f"{path.name}.{person}.{turn}.npz") for turn in (0, 1)]
+
+
+def _frame_of(file: Path) -> int | None:
+    """Frame of a file of particles, None where there is no file."""
+    if not file.exists():
+        return None
+    with np.load(file, allow_pickle=False) as data:
+        return int(data["frame"])
