@@ -30,6 +30,7 @@ from hmc.errors import InputError
 from hmc.recording import Frame, Recording, background_frames, iterate_frames, open_recording
 from hmc.voxels.agreement import agreed_views
 from hmc.voxels.carving import CarvingTables, carve_levels, make_tables
+from hmc.voxels.completion import complete_masks, make_completion_tables
 from hmc.voxels.grid import VoxelGrid
 
 __all__ = ["FrontendSettings", "HullStep", "MaskStep", "learn_backgrounds", "stream_hulls", "stream_masks"]
@@ -60,6 +61,8 @@ class FrontendSettings:
         At most this many frames of the empty scene are learnt from.
     median_frames, median_span : int
         Images of which the median is taken, and the number of frames, around the selection, over which they are spread.
+    complete : bool
+        Whether cameras decide one another's doubtful pixels (`hmc.voxels.completion`).
     tolerance : int
         Cameras that may miss a voxel of the tolerant hull. Used where four cameras or more have a silhouette; with fewer, the tolerant
         hull is the strict one.
@@ -76,6 +79,7 @@ class FrontendSettings:
     background_frames: int = 200
     median_frames: int = 20
     median_span: int = 1800
+    complete: bool = True
     tolerance: int = 1
     outside: str = "ignore"
     min_views: int | None = None
@@ -193,6 +197,7 @@ def stream_masks(
     start = max(recording.start, first - warm_up)
     models = learn_backgrounds(recording, settings, report)
     names = recording.rig.names
+    tables = make_completion_tables(recording.room, recording.rig) if settings.complete and any(models) else None
     changed: dict[int, int] = {}  # camera whose whole image changed -> the frame in which that began
     with ThreadPoolExecutor(settings.threads or os.cpu_count() or 1) as pool, ThreadPoolExecutor(1) as reader:
         for frame in _read_ahead(iterate_frames(recording, start, last, report), reader):
@@ -204,6 +209,8 @@ def stream_masks(
                 elif c in changed:
                     report(_say_changed(names[c], changed.pop(c), frame.index - 1))
             if frame.index >= first:
+                if tables is not None:
+                    masks = complete_masks(tables, masks, [None if model is None else model.doubtful for model in models])
                 yield MaskStep(frame.index, frame.images, masks)
         for c, began in changed.items():
             report(_say_changed(names[c], began, frame.index))

@@ -32,6 +32,9 @@ ASSUMED_DEVIATION = (3.0, 1.2)
 FEWEST_FRAMES = 5
 #: What OpenCV's mixture answers a pixel.
 SHADOW, FOREGROUND = 127, 255
+#: Near people, differences beyond this many standard deviations are doubtful. Of points on pale people before pale walls that have no
+#: silhouette, nine in ten are doubtful, most of them as shadows (measured).
+DOUBT = 3.0
 #: Share of the image that people's shadows may fill.
 MOST_SHADOW = 0.2
 #: Where people are, the foreground holds squares of this side, pixels.
@@ -115,6 +118,9 @@ class BackgroundModel:
         Images segmented so far.
     settling : int
         Frames left of learning quickly, after a light was switched.
+    doubtful : ndarray of bool, shape (height, width), or None
+        Where the last image is not quite the empty scene: the silhouette, shadows, and near people whatever differs a little. What
+        other cameras see decides there (`hmc.voxels.completion`). None before the first image.
     unseen : ndarray of bool, shape (height, width), or None
         Where the empty scene was never seen (`hmc.camera.background.stable_background`): foreground wherever it touches some.
     """
@@ -125,6 +131,7 @@ class BackgroundModel:
     people: np.ndarray
     frame: int = 0
     settling: int = 0
+    doubtful: np.ndarray | None = None
     unseen: np.ndarray | None = None
 
 
@@ -217,11 +224,12 @@ def segment(
     found = cv2.threshold(answer, FOREGROUND - 1, 1, cv2.THRESH_BINARY)[1]
     if cv2.countNonZero(found) > settings.max_foreground * found.size:
         return None, _adapt_to_switch(model, image, settings)
-    mask = _complete(found, image, model, settings)
+    mask, doubtful = _complete(found, cv2.threshold(answer, SHADOW - 1, 1, cv2.THRESH_BINARY)[1], image, model, settings)
     if model.unseen is not None:
         mask = _join_unseen(mask, model.unseen, settings)
     mask = mask.view(bool)
-    after = replace(model, people=mask, frame=model.frame + 1, settling=max(0, model.settling - 1))
+    doubtful = doubtful.view(bool) | mask
+    after = replace(model, people=mask, frame=model.frame + 1, settling=max(0, model.settling - 1), doubtful=doubtful)
     if after.settling or after.frame % settings.learn_every == 0:
         rate = SETTLING_RATE if after.settling else settings.learning_rate
         _learn(after, image, _hidden(mask, answer, settings), rate, settings)
@@ -253,14 +261,16 @@ def segment_views(
     return tuple(mask for mask, _ in results), tuple(model for _, model in results)
 
 
-def _complete(found: np.ndarray, image: np.ndarray, model: BackgroundModel, settings: SegmentationSettings) -> np.ndarray:
-    """Clean and complete what the mixture found; only the part of the image around it is looked at."""
+def _complete(
+    found: np.ndarray, doubtful: np.ndarray, image: np.ndarray, model: BackgroundModel, settings: SegmentationSettings
+) -> tuple[np.ndarray, np.ndarray]:
+    """Clean and complete what the mixture found, and what it doubts; only the part of the image around the former is looked at."""
     scale = max(image.shape[:2]) / 640
     mask = np.zeros_like(found)
     # Specks are all over the image; a person has some solid part.
     left, top, width, height = cv2.boundingRect(cv2.erode(found, np.ones((SOLID_PX, SOLID_PX), np.uint8)))
     if width == 0:
-        return mask
+        return mask, mask.copy()
     margin = round(MARGIN_PX * scale)
     rows = slice(max(0, top - margin), top + height + margin)
     columns = slice(max(0, left - margin), left + width + margin)
@@ -277,7 +287,8 @@ def _complete(found: np.ndarray, image: np.ndarray, model: BackgroundModel, sett
         scale=scale,
     )
     mask[rows, columns] = cut_halo(part, seen, settings.halo_share, scale)
-    return mask
+    doubtful[rows, columns] |= (seen.chroma2 > DOUBT**2) | (np.abs(seen.luma) > DOUBT)
+    return mask, cv2.morphologyEx(doubtful, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
 
 
 def _join_unseen(mask: np.ndarray, unseen: np.ndarray, settings: SegmentationSettings) -> np.ndarray:

@@ -1,0 +1,224 @@
+"""Silhouettes completed by what other cameras see: a camera's doubts are decided by the rest of the rig.
+
+A pale sleeve before a pale wall looks to one camera exactly as a shadow on that wall would: the wall's colour, a little darker. To the
+camera alone the two are the same, to a rig they are not:
+
+- A shadow lies on a surface. Where the ray of a doubtful pixel meets the floor, other cameras look at the same spot: if it is a shadow,
+  they see it as one too; if it was a leg before the floor, they see the bare floor there.
+- A sleeve takes up room. Somewhere along the ray lie voxels at which every camera sees a person or doubts, and several see one.
+
+So doubtful pixels become part of the silhouette where they are no shadow on the floor and look at such voxels. A miss on weak evidence
+is thereby no miss, while a camera that surely sees the empty scene, or furniture before the person, carves as ever.
+
+Measured against the true silhouettes: of pale clothes before pale walls (recipe `pale`) the overlap rises from .65 to .80 and that of the
+strict hull from .23 to .61; a walker in easy clothes (`demo`) stays at .95 and .89 to within .01.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from hmc.camera.model import Camera, Rig, undistort
+from hmc.voxels.carving import CarvingTables, carve, make_tables, pixel_of_voxel
+from hmc.voxels.grid import VoxelGrid
+
+__all__ = ["CompletionTables", "complete_masks", "floor_shadows", "make_completion_tables"]
+
+#: Voxels in which cameras are compared, metres (a forearm is two wide), and the most of them: in a hall they are larger.
+VOXEL_M, MOST_VOXELS = 0.04, 4e6
+#: Cameras that must see a person at a voxel, and the fewest with a silhouette for anything to be decided.
+LEAST_VIEWS, LEAST_MASKS = 3, 4
+#: Side of a cell of the floor, and how far beyond the room the floor is looked at, metres.
+CELL_M, AROUND_M = 0.03, 0.5
+#: Widths in cells: holes in shadows that are closed, and the rim added to them.
+SHADOW_CLOSE, SHADOW_RIM = 7, 3
+#: A doubt must lie this deep in the agreed shape's image; doubtful pixels this near to such a one go with it. Metres at the person.
+DEEP_M, NEAR_M = 0.02, 0.08
+#: Rounds: what is completed in one camera lets others complete more.
+ROUNDS = 2
+
+
+@dataclass(frozen=True)
+class CompletionTables:
+    """Where voxels and floor cells fall in the images; made once by `make_completion_tables`.
+
+    Attributes
+    ----------
+    carving : CarvingTables
+        Of the room in coarse voxels.
+    cells : tuple of int
+        Number of floor cells along x and y.
+    cell_pixels : tuple of ndarray of int32, shape (n_cells,), one a camera
+        Flat pixel on which each cell's centre falls; ``width * height`` where the camera does not see it.
+    pixel_cells : tuple of ndarray of int32, shape (height, width), one a camera
+        Flat cell at which each pixel's ray meets the floor; ``n_cells`` where it does not.
+    """
+
+    carving: CarvingTables
+    cells: tuple[int, int]
+    cell_pixels: tuple[np.ndarray, ...]
+    pixel_cells: tuple[np.ndarray, ...]
+
+
+def make_completion_tables(room: np.ndarray, rig: Rig) -> CompletionTables:
+    """Tables for a room with its floor at the lower z limit.
+
+    Parameters
+    ----------
+    room : ndarray, shape (2, 3)
+        Lower and upper corner, world, metres.
+    rig : Rig
+
+    Returns
+    -------
+    CompletionTables
+
+    Raises
+    ------
+    InputError
+        When the voxels would not fit in the memory there is.
+    """
+    first, floor_z = room[0, :2] - AROUND_M, float(room[0, 2])
+    nx, ny = (int(n) for n in np.ceil((room[1, :2] + AROUND_M - first) / CELL_M))
+    corners = np.indices((nx, ny)).reshape(2, -1).T
+    centres = np.column_stack([first + (corners + 0.5) * CELL_M, np.full(nx * ny, floor_z)])
+    cell_pixels, pixel_cells = [], []
+    for camera in rig:
+        column, row, seen = pixel_of_voxel(camera, centres)
+        width, height = camera.size
+        cell_pixels.append(np.where(seen, row * width + column, width * height).astype(np.int32))
+        place = np.floor((_floor_points(camera, floor_z) - first) / CELL_M)
+        inside = np.all((place >= 0) & (place < (nx, ny)), axis=-1)  # NaN compares as false
+        place = np.where(inside[..., None], place, 0).astype(np.int32)
+        pixel_cells.append(np.where(inside, place[..., 0] * ny + place[..., 1], nx * ny).astype(np.int32))
+    voxel_size_m = max(VOXEL_M, float(np.prod(room[1] - room[0]) / MOST_VOXELS) ** (1 / 3))
+    grid = VoxelGrid.from_room(room, voxel_size_m, len(rig))
+    return CompletionTables(make_tables(grid, rig), (nx, ny), tuple(cell_pixels), tuple(pixel_cells))
+
+
+def complete_masks(
+    tables: CompletionTables, masks: Sequence[np.ndarray | None], doubtful: Sequence[np.ndarray | None]
+) -> tuple[np.ndarray | None, ...]:
+    """Silhouettes with those doubtful pixels that the other cameras show to be people.
+
+    Parameters
+    ----------
+    tables : CompletionTables
+    masks : sequence of ndarray of bool, shape (height, width), or None
+        One a camera.
+    doubtful : sequence of ndarray of bool, shape (height, width), or None
+        Where each image is not quite the empty scene (`hmc.camera.segmentation.BackgroundModel.doubtful`); ``None`` where a
+        camera has no doubts.
+
+    Returns
+    -------
+    tuple of ndarray of bool, shape (height, width), or None
+        Each holds the mask it came from. With fewer than four masks, the masks as they are.
+    """
+    given = {c: mask for c, mask in enumerate(masks) if mask is not None}
+    if len(given) < LEAST_MASKS or all(doubtful[c] is None for c in given):
+        return tuple(masks)
+    shadow = np.append(floor_shadows(tables, masks, doubtful), False)
+    possible = {c: _possible(mask, doubtful[c], shadow, tables.pixel_cells[c]) for c, mask in given.items()}
+    grid = tables.carving.grid
+    # Of a flat array: much quicker than of a volume.
+    voxels = np.flatnonzero(carve(tables.carving, [possible.get(c) for c in range(len(masks))]))
+    if not len(voxels):
+        return tuple(masks)
+    points = grid.centres(np.stack(np.unravel_index(voxels, grid.shape), axis=-1))
+    pixels = {c: pixel_of_voxel(tables.carving.rig[c], points) for c in given}
+    done = {c: mask.astype(np.uint8) for c, mask in given.items()}
+    for _ in range(ROUNDS):
+        votes = np.sum([done[c][row, column] & seen for c, (column, row, seen) in pixels.items()], axis=0)
+        agreed = votes >= LEAST_VIEWS
+        done = {c: _join(tables.carving, c, points, pixels[c], agreed, done[c], possible[c]) for c in given}
+    return tuple(done[c].view(bool) if c in done else None for c in range(len(masks)))
+
+
+def floor_shadows(tables: CompletionTables, masks: Sequence[np.ndarray | None], doubtful: Sequence[np.ndarray | None]) -> np.ndarray:
+    """Shadows on the floor: most cameras that see the spot doubt it, and two at least.
+
+    Cameras before which a person hides it do not count.
+
+    Parameters
+    ----------
+    tables, masks, doubtful
+        As for `complete_masks`.
+
+    Returns
+    -------
+    ndarray of bool, shape `tables.cells`
+    """
+    doubting = np.zeros(tables.cells, np.int32)
+    bare = np.zeros(tables.cells, np.int32)
+    for pixels, mask, doubt in zip(tables.cell_pixels, masks, doubtful, strict=True):
+        if mask is None or doubt is None:
+            continue
+        counts = (pixels < mask.size) & ~mask.ravel().take(pixels, mode="clip")
+        doubted = doubt.ravel().take(pixels, mode="clip")
+        doubting += (counts & doubted).reshape(tables.cells)
+        bare += (counts & ~doubted).reshape(tables.cells)
+    seeds = ((doubting >= 2) & (doubting > bare)).view(np.uint8)
+    shadow = cv2.morphologyEx(seeds, cv2.MORPH_CLOSE, np.ones((SHADOW_CLOSE,) * 2, np.uint8))
+    return cv2.dilate(shadow, np.ones((SHADOW_RIM,) * 2, np.uint8)).view(bool)
+
+
+def _possible(mask: np.ndarray, doubt: np.ndarray | None, shadow: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """The mask with its doubts, but for shadows on the floor."""
+    if doubt is None:
+        return mask
+    out = mask.copy()
+    doubts = np.flatnonzero(doubt & ~mask)
+    out.ravel()[doubts] = ~shadow.take(cells.ravel().take(doubts))
+    return out
+
+
+def _join(
+    tables: CarvingTables, c: int, points: np.ndarray, pixels: tuple, agreed: np.ndarray, mask: np.ndarray, possible: np.ndarray
+) -> np.ndarray:
+    """A mask with the possible pixels that lie deep in the agreed voxels' image, and their neighbours."""
+    camera, voxel_m = tables.rig[c], tables.grid.voxel_size_m
+    column, row, seen = pixels
+    shown = agreed & seen
+    if not shown.any():
+        return mask
+    depth = float(camera.rotation[2] @ points[shown].mean(axis=0) + camera.translation[2])
+    scale = float(camera.matrix[0, 0]) / depth  # pixels a metre
+    width, height = camera.size
+    margin = round((voxel_m + NEAR_M) * scale) + 4
+    box = (
+        slice(max(0, int(row[shown].min()) - margin), int(row[shown].max()) + margin),
+        slice(max(0, int(column[shown].min()) - margin), int(column[shown].max()) + margin),
+    )
+    shape: np.ndarray = np.zeros((height, width), np.uint8)
+    shape[row[shown], column[shown]] = 1
+    shape = cv2.morphologyEx(shape[box], cv2.MORPH_CLOSE, np.ones((round(voxel_m * scale) + 3,) * 2, np.uint8))
+    old = np.ascontiguousarray(mask[box])
+    free = shape & possible[box].view(np.uint8) & (1 - old)
+    three = np.ones((3, 3), np.uint8)
+    sure = cv2.morphologyEx(free & cv2.erode(shape, _square(DEEP_M * scale)), cv2.MORPH_OPEN, three)
+    if not sure.any():
+        return mask
+    grown = cv2.morphologyEx((cv2.dilate(sure, _square(NEAR_M * scale)) & free) | old, cv2.MORPH_OPEN, three) | old
+    out = mask.copy()
+    out[box] |= cv2.morphologyEx(grown, cv2.MORPH_CLOSE, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (5, 5)))
+    return out
+
+
+def _floor_points(camera: Camera, floor_z: float) -> np.ndarray:
+    """Where each pixel's ray meets the floor, (height, width, 2), world, metres; NaN where it does not."""
+    width, height = camera.size
+    uv = np.stack(np.meshgrid(np.arange(width), np.arange(height)), axis=-1).astype(float)
+    rays = np.concatenate([undistort(camera, uv), np.ones((height, width, 1))], axis=-1) @ camera.rotation
+    with np.errstate(divide="ignore", invalid="ignore"):
+        far = (floor_z - camera.centre[2]) / rays[..., 2]
+    return camera.centre[:2] + np.where(far > 0, far, np.nan)[..., None] * rays[..., :2]
+
+
+def _square(reach: float) -> np.ndarray:
+    """A square that reaches so many pixels to each side."""
+    return np.ones((2 * round(reach) + 1,) * 2, np.uint8)

@@ -1,0 +1,113 @@
+"""Silhouettes completed by the other cameras, against bodies whose silhouettes and shadows are drawn exactly."""
+
+import cv2
+import numpy as np
+import pytest
+from drawn import silhouette
+
+from hmc.camera.model import project
+from hmc.voxels.completion import complete_masks, floor_shadows, make_completion_tables
+
+ROOM = np.array([[-1.5, -1.5, 0.0], [1.5, 1.5, 2.2]])
+SHADOW = (-0.9, 0.2), (-0.1, 0.7)  # on the floor, beside the body: x and y from, to
+
+
+@pytest.fixture(scope="module")
+def tables(ring):
+    return make_completion_tables(ROOM, ring)
+
+
+@pytest.fixture(scope="module")
+def truth(ring):
+    return [silhouette(camera, 0.3, 0.1) for camera in ring]
+
+
+def floor_patch(camera):
+    """A camera's view of the shadow."""
+    (x0, y0), (x1, y1) = SHADOW
+    uv, valid = project(camera, np.array([[x0, y0, 0], [x1, y0, 0], [x1, y1, 0], [x0, y1, 0]]))
+    assert valid.all()
+    view = np.zeros(camera.size[::-1], np.uint8)
+    cv2.fillConvexPoly(view, np.rint(uv).astype(np.int32), 1)
+    return view.view(bool)
+
+
+def lose(mask, where):
+    """The mask without a band of rows: where in the mask it lies, from 0 (top) to 1."""
+    rows = np.flatnonzero(mask.any(axis=1))
+    first, last = (int(rows[0] + share * len(rows)) for share in where)
+    out = mask.copy()
+    out[first:last] = False
+    return out
+
+
+def overlap(a, b):
+    return (a & b).sum() / (a | b).sum()
+
+
+def test_what_a_camera_doubts_is_decided_by_the_others(tables, truth):
+    masks = [lose(truth[0], (0.2, 0.6)), *truth[1:]]
+    done = complete_masks(tables, masks, truth)
+    assert overlap(masks[0], truth[0]) < 0.65 and overlap(done[0], truth[0]) > 0.95
+    for before, after in zip(masks, done, strict=True):
+        assert after.dtype == bool and not (before & ~after).any()
+
+
+def test_what_a_camera_surely_sees_empty_stays_empty(tables, truth):
+    masks = [lose(truth[0], (0.5, 1.0)), *truth[1:]]  # a table before the legs
+    done = complete_masks(tables, masks, [masks[0], *truth[1:]])
+    np.testing.assert_array_equal(done[0], masks[0])
+
+
+def test_doubts_that_nobody_shares_are_dropped(tables, truth):
+    rng = np.random.default_rng(0)
+    blot = np.zeros_like(truth[0])
+    blot[5:30, 5:40] = True
+    doubtful = [truth[0] | blot, *(mask | (rng.random(mask.shape) < 0.02) for mask in truth[1:])]
+    for mask, after in zip(truth, complete_masks(tables, truth, doubtful), strict=True):
+        assert overlap(mask, after) > 0.97 and not (after & ~mask & blot).any()
+
+
+def test_shadows_on_the_floor_are_told_from_legs(tables, truth, ring):
+    shadows = [floor_patch(camera) for camera in ring]
+    masks = [lose(truth[0], (0.6, 1.0)), *truth[1:]]
+    doubtful = [shadow | mask for shadow, mask in zip(shadows, truth, strict=True)]
+    cells = floor_shadows(tables, masks, doubtful)
+    x, y = (ROOM[0, i] - 0.5 + (np.arange(n) + 0.5) * 0.03 for i, n in enumerate(cells.shape))
+    (x0, y0), (x1, y1) = SHADOW
+    inside = ((x > x0) & (x < x1))[:, None] & ((y > y0) & (y < y1))
+    far = ~(((x > x0 - 0.1) & (x < x1 + 0.1))[:, None] & ((y > y0 - 0.1) & (y < y1 + 0.1)))
+    assert cells[inside].mean() > 0.9 and not cells[far].any()
+    done = complete_masks(tables, masks, doubtful)
+    for mask, shadow, after in zip(truth, shadows, done, strict=True):
+        assert (after & shadow & ~mask).sum() < 0.03 * mask.sum()
+    # The lost legs come back where they are not before the shadow.
+    lost = truth[0] & ~masks[0] & ~shadows[0]
+    assert lost.sum() > 100 and (done[0] & lost).sum() > 0.8 * lost.sum()
+
+
+def test_missing_cameras_and_cameras_without_doubts(tables, truth):
+    masks = [lose(truth[0], (0.2, 0.6)), truth[1], None, *truth[3:]]
+    doubtful = [truth[0], None, truth[2], *truth[3:]]
+    done = complete_masks(tables, masks, doubtful)
+    assert done[2] is None and overlap(done[0], truth[0]) > 0.95
+    np.testing.assert_array_equal(done[1], truth[1])
+
+
+@pytest.mark.parametrize("left", [0, 3])
+def test_too_few_masks_are_left_as_they_are(tables, truth, left):
+    masks = [mask if c < left else None for c, mask in enumerate(truth)]
+    done = complete_masks(tables, masks, truth)
+    assert all(after is before for after, before in zip(done, masks, strict=True))
+
+
+def test_nobody_and_no_doubts_change_nothing(tables, truth):
+    empty = [np.zeros_like(mask) for mask in truth]
+    assert not any(mask.any() for mask in complete_masks(tables, empty, empty))
+    done = complete_masks(tables, truth, [None] * len(truth))
+    assert all(after is before for after, before in zip(done, truth, strict=True))
+
+
+def test_a_hall_is_looked_at_more_coarsely(ring):
+    tables = make_completion_tables(np.array([[-15.0, -15.0, 0.0], [15.0, 15.0, 5.0]]), ring)
+    assert tables.carving.grid.n_voxels < 5e6 and tables.carving.grid.voxel_size_m > 0.1
