@@ -255,5 +255,6 @@ def shared_volume(
     node += second * NODES
     counts = pieces.radius.ravel().take(node)
     counts -= lateral
-    np.clip(counts, 0, pieces.along.ravel().take(node), out=counts)
+    np.maximum(counts, 0, out=counts)
+    np.minimum(counts, pieces.along.ravel().take(node), out=counts)
     return counts.sum(axis=0) * (pieces.volume / points.shape[1]).astype(np.float32)[first]

@@ -29,7 +29,7 @@ def near_pieces(pieces: Pieces, pairs: np.ndarray, frames: np.ndarray) -> tuple[
         In the order of `pairs`.
     """
     n = frames.shape[-1]
-    axis, middle = frames[:, :, 2], frames[:, :, 3]
+    axis, middle = frames[:, :, 2], frames[:, :, 3] - frames[0, :, 3]  # whole bodies that move must not widen the boxes
     half, margin = pieces.half_length, np.float32(pieces.spacing_m / 2)
     widest = pieces.ends.max(axis=1)
     reach = half[:, None] * np.abs(axis).max(axis=2) + (widest + margin)[:, None]
@@ -49,13 +49,13 @@ def near_pieces(pieces: Pieces, pairs: np.ndarray, frames: np.ndarray) -> tuple[
     s = cos * along_j
     s -= along_i
     s /= sin2
-    np.clip(s, -half_i, half_i, out=s)
+    _clip(s, half_i, out=s)
     t = cos * s
     t += along_j
-    np.clip(t, -half_j, half_j, out=t)
+    _clip(t, half_j, out=t)
     leaning = cos * t
     leaning -= along_i
-    np.clip(leaning, -half_i, half_i, out=s)
+    _clip(leaning, half_i, out=s)
     # |between + s axis_i - t axis_j| squared
     leaning *= 2
     squared += s * (s - leaning)
@@ -78,8 +78,11 @@ def near_pieces(pieces: Pieces, pairs: np.ndarray, frames: np.ndarray) -> tuple[
 
 
 def _dot(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Dot products of vectors along the second axis, of length 3."""
-    total = first[:, 0] * second[:, 0]
-    total += first[:, 1] * second[:, 1]
-    total += first[:, 2] * second[:, 2]
-    return total
+    """Dot products of vectors along the second axis."""
+    return np.einsum("pin,pin->pn", first, second)
+
+
+def _clip(values: np.ndarray, bound: np.ndarray, out: np.ndarray) -> None:
+    """Between minus a bound a row and it; `numpy.clip` takes twice as long."""
+    np.maximum(values, -bound, out=out)
+    np.minimum(out, bound, out=out)
