@@ -197,6 +197,13 @@ def test_a_selection_counts_frames_absolutely(tracks):
     assert people.poses.frames.tolist() == [2, 3, 4]
 
 
+@pytest.mark.parametrize("name", PRESET)
+def test_tracks_that_go_on_after_the_selection(tracks, name):
+    part = open_recording(TINY, start=1, frames=3)
+    people = pose_recording(part, tracks, VOXEL_M, PRESET[name])
+    assert people.poses.frames.tolist() == [1, 2, 3] and np.isfinite(people.poses.positions).all()
+
+
 def test_one_frame_is_enough(tracks):
     one = open_recording(TINY, frames=1)
     people = pose_recording(one, tracks.where(tracks.frames < 1), VOXEL_M, PRESET["canton2009"])

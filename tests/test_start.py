@@ -68,6 +68,23 @@ def test_the_same_seed_gives_the_same_start():
     assert np.abs(one.states[1].state - other.states[1].state).max() > 1e-6
 
 
+def test_a_fast_recording_is_decided_from_some_frames_and_followed_in_all():
+    acted = act("walk", frames=9, fps=90)
+    looked_at = []
+
+    def rng(frame):
+        looked_at.append(frame)
+        return np.random.default_rng([2, frame])
+
+    started = start_person(rng, LEAN, acted.fps, acted.targets, None, acted.velocities, ROOM, LEAST)
+    assert len(started.states) == len(started.infos) == 9
+    first_of_all = next(k for k, frame in enumerate(looked_at) if frame % 3)
+    assert set(looked_at[: first_of_all - 1]) <= {0, 3, 6} and set(looked_at) == set(range(9))
+    assert_allclose(started.filter.drift, make_filter(started.filter.body, LEAN, 90).drift)
+    errors = [mean_error(landmarks(started.filter.body, s.state), truth) for s, truth in zip(started.states, acted.landmarks, strict=True)]
+    assert np.mean(errors) < 0.12
+
+
 def test_somebody_who_stands_still_is_found(heading_deg=-100):
     acted = act("gesture", frames=4, heading_deg=heading_deg)
     started = start_person(rng_of(1), LEAN, acted.fps, acted.targets, None, acted.velocities, ROOM, QUICK)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from hmc.results import TrackTable
 from hmc.tracking.blobs import observe
 from hmc.tracking.naive import NaiveSettings, assign_voxels, finish, init, step
 from hmc.tracking.tracks import fill_gaps, from_rows, person_voxels, run, velocities
@@ -221,6 +222,18 @@ def test_velocities_are_the_slope():
     slope = velocities(table, FPS)
     assert np.abs(slope[5:-5, :2] - (1.0, 0.25)).max() < 0.12
     assert np.abs(slope[:, 2]).max() < 0.05
+
+
+def test_velocities_are_polyfit_s_over_the_window_whatever_the_order_and_gaps():
+    rng = np.random.default_rng(3)
+    frames = np.concatenate([rng.permutation(60)[:45], rng.permutation(60)[:30], [7]])
+    persons = np.repeat([4, 1, 2], [45, 30, 1])
+    table = TrackTable(frames, persons, rng.standard_normal((76, 3)))
+    slope = velocities(table, FPS, window_s=0.5)
+    for row in range(76):
+        near = (persons == persons[row]) & (np.abs(frames - frames[row]) <= 5)
+        expected = np.polyfit(frames[near], table.positions[near], 1)[0] * FPS if near.sum() > 1 else np.zeros(3)
+        assert np.allclose(slope[row], expected, atol=1e-9)
 
 
 def test_gaps_longer_than_asked_stay():

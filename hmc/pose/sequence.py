@@ -106,6 +106,8 @@ def pose_recording(
         When the voxels are too many for the memory.
     """
     grid = person_grid(recording, voxel_size_m)
+    end = recording.start + recording.n_frames
+    tracks = tracks.where((tracks.frames >= recording.start) & (tracks.frames < end))
     task = PoseTask(preset, settings or FollowSettings(), recording.fps, recording.room, voxel_size_m, seed, height_m)
     persons = _persons(tracks, recording.fps)
     states = dict.fromkeys(persons, PersonState())
@@ -113,8 +115,8 @@ def pose_recording(
     for decided in _decided(open_journal(journal, key), preset, journal):
         done.append(replace(decided, pose=None))
         states[decided.person] = taken_up(task, states[decided.person], decided)
-    first, end = _next_frame(persons, states), recording.start + recording.n_frames
-    if first is None or first >= end:
+    first = _next_frame(persons, states)
+    if first is None:
         return _assemble(done)
     report = on_problem or logger.warning
     stream = stream_hulls(recording, grid, frontend, first=first, warm_up=WARM_UP_FRAMES, on_problem=report)

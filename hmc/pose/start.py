@@ -147,6 +147,8 @@ def start_person(
     velocities = np.zeros((len(targets), 3)) if velocities is None else velocities
     # Of a fast recording, every so many frames decide, as many as of a slow one; then all are followed.
     stride = max(1, round(fps / DECIDE_FPS))
+    if not _usable(targets[::stride]):
+        stride = 1
     found = _decide(
         lambda k: frame_rng(k * stride), preset, fps / stride, targets[::stride], height_m, velocities[::stride], room, settings
     )
@@ -159,9 +161,14 @@ def start_person(
     return Started(filt, states, infos, costs, fit)
 
 
+def _usable(targets: Sequence[HullTarget | None]) -> list[int]:
+    """Frames with enough of a person to start from."""
+    return [k for k, target in enumerate(targets) if target is not None and len(target.surface) >= LEAST_START_SURFACE]
+
+
 def _decide(frame_rng, preset, fps, targets, height_m, velocities, room, settings):
     """The filter with the person's body, a frame and the pose in it, the candidates' costs and the fit; None without any hull."""
-    usable = [k for k, target in enumerate(targets) if target is not None and len(target.surface) >= LEAST_START_SURFACE]
+    usable = _usable(targets)
     if not usable:
         return None
     floor_z = 0.0 if room is None else float(room[0, 2])
