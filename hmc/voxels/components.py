@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
+from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from hmc.voxels.grid import VoxelGrid
@@ -145,13 +145,13 @@ def _label_runs(occupied: np.ndarray) -> tuple[Runs, np.ndarray]:
     stride_x = (ny + 1) * stride_y
     low = runs.x * stride_x + runs.y * stride_y + runs.z
     high = low + length - 1
-    rows, columns = [], []
-    for step in (stride_y, stride_x - stride_y, stride_x, stride_x + stride_y):  # the four neighbouring columns that lie ahead
-        begin = np.searchsorted(high, low + (step - 1))
-        count = np.maximum(np.searchsorted(low, high + (step + 1), side="right") - begin, 0)
-        row = np.repeat(np.arange(len(low)), count)
-        rows.append(row)
-        columns.append(np.arange(row.size) + np.repeat(begin - np.cumsum(count) + count, count))
-    row, other = np.concatenate(rows), np.concatenate(columns)
-    graph = coo_array((np.ones(row.size, bool), (row, other)), shape=(len(low), len(low)))
-    return runs, connected_components(graph, directed=False)[1] if len(low) else np.zeros(0, np.int32)
+    if not len(low):
+        return runs, np.zeros(0, np.int32)
+    steps = np.array([stride_y, stride_x - stride_y, stride_x, stride_x + stride_y])  # the four neighbouring columns that lie ahead
+    begin = np.searchsorted(high, low[:, None] + (steps - 1)).ravel()
+    count = np.maximum(np.searchsorted(low, high[:, None] + (steps + 1), side="right").ravel() - begin, 0)
+    ends = np.cumsum(count)
+    neighbours = np.arange(ends[-1]) + np.repeat(begin - ends + count, count)
+    pointers = np.concatenate([[0], ends[len(steps) - 1 :: len(steps)]])
+    graph = csr_array((np.ones(neighbours.size), neighbours.astype(np.int32), pointers.astype(np.int32)), shape=(len(low), len(low)))
+    return runs, connected_components(graph, directed=False)[1]
