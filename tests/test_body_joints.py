@@ -8,8 +8,8 @@ from numpy.testing import assert_allclose
 
 from hmc.errors import InputError
 from hmc.landmarks import LANDMARKS, landmark_index
-from hmc.pose.body.joints import DOF_NAMES, N_DOF, SEGMENTS, canton_limits, default_limits, dof_index, mirror_state
 from hmc.pose.body.flesh import flesh_points
+from hmc.pose.body.joints import DOF_NAMES, N_DOF, SEGMENTS, canton_limits, default_limits, dof_index, mirror_state
 from hmc.pose.body.kinematics import landmarks, segment_transforms
 from hmc.pose.body.model import PARTS, neutral_state
 from hmc.pose.body.proportions import DEFAULT_LENGTHS, canton_body, default_body, make_body

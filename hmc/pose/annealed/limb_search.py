@@ -12,6 +12,7 @@ from hmc.pose.annealed.refine import RefineSettings, refine
 from hmc.pose.annealed.symmetric import POSTURE, BodyPoints, SymmetricSettings, body_distance, outside_distance, symmetric_cost
 from hmc.pose.body.joints import DOF_NAMES, dof_index
 from hmc.pose.body.model import PARTS, BodyModel
+from hmc.pose.body.reach import limb_joint, limb_lengths, reach
 
 __all__ = ["LIMBS", "SearchSettings", "lost_limbs", "search_limbs"]
 
@@ -45,6 +46,8 @@ class SearchSettings:
         ... or when more than this share of the hull's surface is that far from the body (then every limb is looked for).
     draws : int
         Random poses a limb.
+    reach_share : float
+        Share of them that reach for hull points which the body does not explain, where there are any.
     gain : float
         The new pose is taken when the cost falls by at least this share.
     """
@@ -53,6 +56,7 @@ class SearchSettings:
     outside_share: float = 0.25
     unexplained_share: float = 0.02
     draws: int = 200
+    reach_share: float = 0.5
     gain: float = 0.03
 
 
@@ -116,13 +120,12 @@ def search_limbs(
     cost : float
     evaluations : int
     """
-    low, high = body.limits.low, body.limits.high
     coarse = sample_points(rng, hull_points, 200)
     evaluations = 0
     for limb in limbs:
         dofs = LIMBS[limb]
         trials = np.repeat(state[None], settings.draws, axis=0)
-        trials[:, dofs] = _draw(rng, settings.draws, low[dofs], high[dofs], dofs)
+        trials[:, dofs] = _draw(rng, settings, body, state, limb, hull_points)
         costs = symmetric_cost(body, samples, trials, target, coarse, cost_settings)
         evaluations += settings.draws
         for pick in np.argsort(costs)[:2]:
@@ -133,12 +136,20 @@ def search_limbs(
     return state, cost, evaluations
 
 
-def _draw(rng: np.random.Generator, n: int, low: np.ndarray, high: np.ndarray, dofs: np.ndarray) -> np.ndarray:
-    """Random poses of a limb: half are common ones, half may be any."""
-    common = n // 2
-    return np.concatenate(
-        [
-            truncated_normal(rng, np.tile(POSTURE[0][dofs], (common, 1)), POSTURE[1][dofs], low, high),
-            rng.uniform(low, high, (n - common, len(dofs))),
-        ]
-    )
+def _draw(rng: np.random.Generator, settings: SearchSettings, body: BodyModel, state: np.ndarray, limb: str, hull_points: np.ndarray):
+    """Random poses of a limb: some reach for hull points that no part explains, some are common ones, and some may be any."""
+    dofs = LIMBS[limb]
+    low, high = body.limits.low[dofs], body.limits.high[dofs]
+    centre, _ = limb_joint(body, state, limb)
+    near = np.linalg.norm(hull_points - centre, axis=1) < sum(limb_lengths(body, limb)) + settings.far_m
+    goals = hull_points[near & (body_distance(body, state[None], hull_points)[0] > settings.far_m)]
+    n_reach = round(settings.reach_share * settings.draws) if len(goals) else 0
+    n_common = (settings.draws - n_reach) // 2
+    n_any = settings.draws - n_reach - n_common
+    drawn = [
+        truncated_normal(rng, np.tile(POSTURE[0][dofs], (n_common, 1)), POSTURE[1][dofs], low, high),
+        rng.uniform(low, high, (n_any, len(dofs))),
+    ]
+    if n_reach:
+        drawn.append(reach(body, state, limb, goals[rng.integers(len(goals), size=n_reach)], rng.uniform(-np.pi, np.pi, n_reach)))
+    return np.concatenate(drawn)
