@@ -121,7 +121,7 @@ def depths_placed(body: BodyModel, axes: AxisPoints, placed: np.ndarray, maps: C
         rows = slice(begin, begin + step)
         depth[rows] = _depth(body.cones, cone[rows], maps.to_cone[cone[rows]], points[point[rows]])
     out = np.zeros((len(points), placed.shape[-1]), placed.dtype)
-    for start, stop in pairwise(np.searchsorted(cone, np.arange(len(maps.to_cone) + 1))):
+    for start, stop in pairwise([*np.flatnonzero(np.diff(cone, prepend=-1)), len(cone)]):
         out[point[start:stop]] = np.maximum(out[point[start:stop]], depth[start:stop])
     return out
 

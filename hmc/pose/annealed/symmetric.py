@@ -130,21 +130,25 @@ def body_distance(body: BodyModel, states: np.ndarray, points: np.ndarray) -> np
     # Relative to the points' middle: float32 then has digits to spare.
     origin = points.mean(axis=0)
     maps = cone_maps(body.cones, place_segments(body, states, origin))
-    return _to_body(body.cones, maps, points - origin, np.ones((len(body.cones.part), len(points)), bool)).T
+    return _to_body(body.cones, maps, points - origin).T
 
 
-def _to_body(cones: Cones, maps: ConeMaps, points: np.ndarray, near: np.ndarray) -> np.ndarray:
+def _to_body(cones: Cones, maps: ConeMaps, points: np.ndarray, near: np.ndarray | None = None) -> np.ndarray:
     """Distance of points to the nearest of the cones that are near them, shape (k, n); infinite where none is.
 
-    `near`, shape (n_cones, k), says which are.
+    `near`, shape (n_cones, k), says which are; all by default.
     """
-    n = maps.start.shape[-1]
-    cone, point = np.nonzero(near)
-    local = np.empty((3, len(cone), n), np.float32)
-    homogeneous = np.c_[points, np.ones(len(points))].astype(np.float32)[point]
-    edges = np.searchsorted(cone, np.arange(len(near) + 1))
-    for to_cone, (start, stop) in zip(maps.to_cone, pairwise(edges), strict=True):
-        np.matmul(homogeneous[start:stop], to_cone, out=local[:, start:stop])
+    n_cones, n = len(maps.start), maps.start.shape[-1]
+    homogeneous = np.c_[points, np.ones(len(points))].astype(np.float32)
+    if near is None:
+        cone = np.repeat(np.arange(n_cones), len(points))
+        local = (homogeneous @ maps.to_cone.swapaxes(0, 1)).reshape(3, -1, n)
+    else:
+        cone, point = np.nonzero(near)
+        local = np.empty((3, len(cone), n), np.float32)
+        edges = np.searchsorted(cone, np.arange(n_cones + 1))
+        for to_cone, (start, stop) in zip(maps.to_cone, pairwise(edges), strict=True):
+            np.matmul(homogeneous[point[start:stop]], to_cone, out=local[:, start:stop])
     length = cones.lengths.astype(np.float32)[cone, None]
     first = cones.radii[:, 0].astype(np.float32)[cone, :, None]
     slope = ((cones.radii[:, 1] - cones.radii[:, 0]) / cones.lengths[:, None]).astype(np.float32)[cone, :, None]
@@ -153,6 +157,8 @@ def _to_body(cones: Cones, maps: ConeMaps, points: np.ndarray, near: np.ndarray)
     for begin in range(0, len(cone), step):
         rows = slice(begin, begin + step)
         _squared_distance(local[:, rows], length[rows], first[rows], slope[rows], squared[rows])
+    if near is None:
+        return np.sqrt(squared.reshape(n_cones, -1, n).min(axis=0))
     out = np.full((len(points), n), np.inf, np.float32)
     for start, stop in pairwise(edges):
         out[point[start:stop]] = np.minimum(out[point[start:stop]], squared[start:stop])
