@@ -49,9 +49,9 @@ def main() -> None:
     values = {}
     for _ in range(3):
         for name, function in (("ours", ours), ("theirs", theirs)):
-            start = time.perf_counter()
+            start = time.thread_time()
             values[name] = function(truth, estimate)
-            times[name].append(time.perf_counter() - start)
+            times[name].append(time.thread_time() - start)
     ratio = statistics.median(times["ours"]) / statistics.median(times["theirs"])
     difference = max(abs(a - b) for a, b in zip(values["ours"], values["theirs"], strict=True))
     print(f"MOTP {values['ours'][0]:.6f}, MOTA {values['ours'][1]:.6f}; largest difference {difference:.1e} (at most 1e-9)")
