@@ -24,6 +24,7 @@ FPS = 15.0
 def path_cost(path, frames, costs, legs, settings):
     """The cost of one path, a frame at a time."""
     reach = round(settings.reach_s * FPS)
+    costs = costs * [1, 1 + settings.doubt]
     total = costs[0][path[0]]
     for k in range(1, len(path)):
         here, there = path[k - 1], path[k]

@@ -32,6 +32,8 @@ class LegSettings:
     ----------
     lag_s : float
         A frame is decided when the person has been followed this much longer, seconds.
+    doubt : float
+        Share by which exchanged legs count more than they cost: where hulls are poor, small differences say nothing.
     jump_weight : float
         Cost, square metres, of a jump of the legs' velocity by one metre a second.
     largest_jump_m_s : float
@@ -41,6 +43,7 @@ class LegSettings:
     """
 
     lag_s: float = 1.0
+    doubt: float = 0.2
     jump_weight: float = 3e-5
     largest_jump_m_s: float = 2.8
     reach_s: float = 0.2
@@ -103,7 +106,7 @@ def choose_legs(frames: np.ndarray, costs: np.ndarray, legs: np.ndarray, fps: fl
     frames : ndarray of int, shape (n,)
         Rising; frames may be missing.
     costs : ndarray, shape (n, m)
-        Of the m poses a frame, square metres.
+        Of the m poses a frame, that of the filter first; square metres.
     legs : ndarray, shape (n, m, 4, 3)
         Their knees and ankles, metres.
     fps : float
@@ -114,6 +117,7 @@ def choose_legs(frames: np.ndarray, costs: np.ndarray, legs: np.ndarray, fps: fl
     ndarray of int, shape (n,)
     """
     reach = settings.reach(fps)
+    costs = costs * np.where(np.arange(costs.shape[1]) == 0, 1.0, 1.0 + settings.doubt)
     best = costs[0]
     came_from = []
     for k in range(1, len(frames)):
