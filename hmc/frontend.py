@@ -30,7 +30,7 @@ from hmc.errors import InputError
 from hmc.recording import Frame, Recording, background_frames, iterate_frames, open_recording
 from hmc.voxels.agreement import agreed_views
 from hmc.voxels.carving import CarvingTables, carve_levels, make_tables
-from hmc.voxels.completion import complete_masks, make_completion_tables
+from hmc.voxels.completion import complete_masks, doubtful_hull, make_completion_tables
 from hmc.voxels.grid import VoxelGrid
 
 __all__ = ["FrontendSettings", "HullStep", "MaskStep", "learn_backgrounds", "stream_hulls", "stream_masks"]
@@ -101,11 +101,14 @@ class MaskStep:
     images : tuple of ndarray of uint8, shape (h, w, 3), or None; one a camera
     masks : tuple of ndarray of bool, shape (h, w), or None; one a camera
         None where the camera tells nothing in this frame.
+    doubtful : tuple of ndarray of bool, shape (h, w), or None; one a camera
+        Where people may be besides; None in a frame whose silhouettes seem whole, and for silhouettes from disk.
     """
 
     index: int
     images: tuple[np.ndarray | None, ...]
     masks: tuple[np.ndarray | None, ...]
+    doubtful: tuple[np.ndarray | None, ...]
 
     @property
     def usable(self) -> bool:
@@ -121,7 +124,8 @@ class HullStep(MaskStep):
     ----------
     strict, tolerant, loose : ndarray of bool, shape (nx, ny, nz)
         The visual hull of all cameras, the one in which a camera may be wrong, and, of four cameras or more, the one in which one
-        more may be: what furniture hides from two cameras is still in it. Empty where the frame is not `usable`.
+        more may be: what furniture hides from two cameras is still in it, and so is what most cameras only doubt
+        (`hmc.voxels.completion.doubtful_hull`). Empty where the frame is not `usable`.
     """
 
     strict: np.ndarray
@@ -156,7 +160,7 @@ def stream_hulls(
     settings = settings or FrontendSettings()
     tables = make_tables(grid, recording.rig)
     for step in stream_masks(recording, settings, first=first, last=last, warm_up=warm_up, on_problem=on_problem):
-        yield HullStep(step.index, step.images, step.masks, *_hulls(tables, step, settings))
+        yield HullStep(step.index, step.images, step.masks, step.doubtful, *_hulls(tables, step, settings))
 
 
 def stream_masks(
@@ -209,9 +213,11 @@ def stream_masks(
                 elif c in changed:
                     report(_say_changed(names[c], changed.pop(c), frame.index - 1))
             if frame.index >= first:
-                if tables is not None:
-                    masks = complete_masks(tables, masks, [None if model is None else model.doubtful for model in models])
-                yield MaskStep(frame.index, frame.images, masks)
+                doubtful = tuple(None if model is None else model.doubtful for model in models)
+                completed = masks if tables is None else complete_masks(tables, masks, doubtful)
+                if all(after is before for after, before in zip(completed, masks, strict=True)):
+                    doubtful = (None,) * len(masks)
+                yield MaskStep(frame.index, frame.images, completed, doubtful)
         for c, began in changed.items():
             report(_say_changed(names[c], began, frame.index))
 
@@ -264,7 +270,10 @@ def _hulls(tables: CarvingTables, step: MaskStep, settings: FrontendSettings) ->
     n_masks = sum(mask is not None for mask in step.masks)
     tolerance = settings.tolerance if n_masks >= 4 else 0
     levels = (0, tolerance, tolerance + 1 if n_masks >= 4 else tolerance)
-    return carve_levels(tables, step.masks, levels, outside=settings.outside, min_views=settings.min_views)
+    hulls = carve_levels(tables, step.masks, levels, outside=settings.outside, min_views=settings.min_views)
+    if any(doubt is not None for doubt in step.doubtful):
+        hulls[2][doubtful_hull(tables, step.masks, step.doubtful)] = True
+    return hulls
 
 
 def _segment(frame: Frame, models: tuple, settings: FrontendSettings, pool: ThreadPoolExecutor) -> tuple[tuple, tuple]:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from hmc.camera.model import Camera, Rig, backproject, look_at
 from hmc.errors import InputError
-from hmc.voxels.carving import carve, carve_levels, make_tables, pixel_of_voxel
+from hmc.voxels.carving import carve, carve_levels, make_tables, pixel_of_voxel, pixels_at
 from hmc.voxels.grid import VoxelGrid
 
 ROOM = [[-1.0, -0.8, 0.0], [1.0, 0.8, 1.3]]
@@ -115,6 +115,14 @@ def test_equals_votes_counted_over_the_room(scene, seed, share, absent, toleranc
     agreeing = votes - misses >= min(needed, max(1, n_masks - tolerance))
     expected = (misses <= tolerance) & (votes >= needed) & agreeing & (n_masks > 0)
     np.testing.assert_array_equal(carve(tables, masks, tolerance, outside=outside, min_views=min_views), expected)
+
+
+def test_pixels_of_voxels_are_those_of_their_centres(scene):
+    grid, rig, tables = scene
+    voxels = np.random.default_rng(3).integers(0, grid.shape, (500, 3))
+    for camera, pixels in zip(rig, pixels_at(tables, voxels), strict=True):
+        column, row, seen = pixel_of_voxel(camera, grid.centres(voxels))
+        np.testing.assert_array_equal(pixels, np.where(seen, row * camera.size[0] + column, camera.size[0] * camera.size[1]))
 
 
 def test_levels_are_the_single_hulls_and_nested(scene):

@@ -6,7 +6,8 @@ import pytest
 from drawn import silhouette
 
 from hmc.camera.model import project
-from hmc.voxels.completion import complete_masks, floor_shadows, make_completion_tables
+from hmc.voxels.carving import carve
+from hmc.voxels.completion import complete_masks, doubtful_hull, floor_shadows, make_completion_tables
 
 ROOM = np.array([[-1.5, -1.5, 0.0], [1.5, 1.5, 2.2]])
 SHADOW = (-0.9, 0.2), (-0.1, 0.7)  # on the floor, beside the body: x and y from, to
@@ -46,7 +47,7 @@ def overlap(a, b):
 
 
 def test_what_a_camera_doubts_is_decided_by_the_others(tables, truth):
-    masks = [lose(truth[0], (0.2, 0.6)), *truth[1:]]
+    masks = [lose(truth[0], (0.2, 0.6)), lose(truth[1], (0.3, 0.7)), *truth[2:]]
     done = complete_masks(tables, masks, truth)
     assert overlap(masks[0], truth[0]) < 0.65 and overlap(done[0], truth[0]) > 0.95
     for before, after in zip(masks, done, strict=True):
@@ -54,9 +55,16 @@ def test_what_a_camera_doubts_is_decided_by_the_others(tables, truth):
 
 
 def test_what_a_camera_surely_sees_empty_stays_empty(tables, truth):
-    masks = [lose(truth[0], (0.5, 1.0)), *truth[1:]]  # a table before the legs
+    # A table before the legs; two others lost an arm's height, which comes back.
+    masks = [lose(truth[0], (0.5, 1.0)), lose(truth[1], (0.2, 0.4)), lose(truth[2], (0.2, 0.4)), *truth[3:]]
     done = complete_masks(tables, masks, [masks[0], *truth[1:]])
+    assert done[1].sum() > 1.1 * masks[1].sum() and done[2].sum() > 1.1 * masks[2].sum()
     np.testing.assert_array_equal(done[0], masks[0])
+
+
+def test_one_camera_s_loss_is_left_to_the_tolerant_hull(tables, truth):
+    masks = [lose(truth[0], (0.2, 0.6)), *truth[1:]]
+    assert all(after is before for after, before in zip(complete_masks(tables, masks, truth), masks, strict=True))
 
 
 def test_doubts_that_nobody_shares_are_dropped(tables, truth):
@@ -70,7 +78,7 @@ def test_doubts_that_nobody_shares_are_dropped(tables, truth):
 
 def test_shadows_on_the_floor_are_told_from_legs(tables, truth, ring):
     shadows = [floor_patch(camera) for camera in ring]
-    masks = [lose(truth[0], (0.6, 1.0)), *truth[1:]]
+    masks = [lose(truth[0], (0.6, 1.0)), lose(truth[1], (0.1, 0.4)), *truth[2:]]
     doubtful = [shadow | mask for shadow, mask in zip(shadows, truth, strict=True)]
     cells = floor_shadows(tables, masks, doubtful)
     x, y = (ROOM[0, i] - 0.5 + (np.arange(n) + 0.5) * 0.03 for i, n in enumerate(cells.shape))
@@ -87,7 +95,7 @@ def test_shadows_on_the_floor_are_told_from_legs(tables, truth, ring):
 
 
 def test_missing_cameras_and_cameras_without_doubts(tables, truth):
-    masks = [lose(truth[0], (0.2, 0.6)), truth[1], None, *truth[3:]]
+    masks = [lose(truth[0], (0.2, 0.6)), truth[1], None, lose(truth[3], (0.62, 0.9)), *truth[4:]]
     doubtful = [truth[0], None, truth[2], *truth[3:]]
     done = complete_masks(tables, masks, doubtful)
     assert done[2] is None and overlap(done[0], truth[0]) > 0.95
@@ -111,3 +119,28 @@ def test_nobody_and_no_doubts_change_nothing(tables, truth):
 def test_a_hall_is_looked_at_more_coarsely(ring):
     tables = make_completion_tables(np.array([[-15.0, -15.0, 0.0], [15.0, 15.0, 5.0]]), ring)
     assert tables.carving.grid.n_voxels < 5e6 and tables.carving.grid.voxel_size_m > 0.1
+
+
+def test_each_pixel_looks_at_the_cell_that_falls_on_it(tables, ring):
+    for camera, pixels, cells in zip(ring, tables.cell_pixels, tables.pixel_cells, strict=True):
+        width, height = camera.size
+        seen = np.flatnonzero(pixels < width * height)
+        assert len(seen) > 1000
+        back = cells.ravel()[pixels[seen]]
+        on_floor = back < tables.cells[0] * tables.cells[1]
+        assert on_floor.mean() > 0.95  # at the floor's border the pixel's centre may lie beyond it
+        there, here = (np.unravel_index(places[on_floor], tables.cells) for places in (back, seen))
+        # There and back again ends within half a pixel, which is some cells far away.
+        off = np.hypot(there[0] - here[0], there[1] - here[1])
+        assert np.median(off) <= 1 and np.quantile(off, 0.99) <= 3
+
+
+def test_the_doubtful_hull_has_what_two_cameras_see_and_none_denies(tables, truth):
+    masks = [np.zeros_like(mask) if c >= 2 else mask for c, mask in enumerate(truth)]
+    hull = doubtful_hull(tables.carving, masks, truth)
+    np.testing.assert_array_equal(hull, carve(tables.carving, truth) & carve(tables.carving, masks, tolerance=3, outside="carve"))
+    assert hull.sum() > 1000
+    assert not doubtful_hull(tables.carving, masks, [*truth[:-1], masks[-1]]).any()
+    assert not doubtful_hull(tables.carving, masks, truth, min_views=3).any()
+    without = [*masks[:-1], None]
+    assert (hull & ~doubtful_hull(tables.carving, without, truth)).sum() == 0

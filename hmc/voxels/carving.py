@@ -28,7 +28,7 @@ from hmc.camera.model import Camera, Rig, project
 from hmc.errors import InputError
 from hmc.voxels.grid import VoxelGrid, check_memory
 
-__all__ = ["CarvingTables", "carve", "carve_levels", "make_tables", "pixel_of_voxel"]
+__all__ = ["CarvingTables", "carve", "carve_levels", "make_tables", "pixel_of_voxel", "pixels_at"]
 
 #: Side of a block of voxels, which is judged as a whole where it can be.
 BLOCK = 8
@@ -145,6 +145,26 @@ def pixel_of_voxel(camera: Camera, points: np.ndarray) -> tuple[np.ndarray, np.n
     seen = valid & (uv[..., 0] >= -0.5) & (uv[..., 0] < width - 0.5) & (uv[..., 1] >= -0.5) & (uv[..., 1] < height - 0.5)
     pixel = np.floor(np.where(seen[..., None], uv, 0.0) + 0.5).astype(np.int32)
     return pixel[..., 0], pixel[..., 1], seen
+
+
+def pixels_at(tables: CarvingTables, voxels: np.ndarray) -> np.ndarray:
+    """Where some voxels fall in the images, from the tables.
+
+    Parameters
+    ----------
+    tables : CarvingTables
+    voxels : ndarray of int, shape (n, 3)
+        (i, j, k) in the grid.
+
+    Returns
+    -------
+    ndarray of int32, shape (n_cameras, n)
+        Flat pixel ``row * width + column``; ``width * height`` where the camera does not see the voxel.
+    """
+    block = np.ravel_multi_index(tuple((voxels // BLOCK).T), tables.blocks)
+    place = np.ravel_multi_index(tuple((voxels % BLOCK).T), (BLOCK,) * 3)
+    flat = block * BLOCK_VOXELS + place
+    return np.stack([pixels.ravel().take(flat) for pixels in tables.pixels])
 
 
 def carve(
