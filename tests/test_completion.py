@@ -47,7 +47,7 @@ def overlap(a, b):
 
 
 def test_what_a_camera_doubts_is_decided_by_the_others(tables, truth):
-    masks = [lose(truth[0], (0.2, 0.6)), lose(truth[1], (0.3, 0.7)), *truth[2:]]
+    masks = [lose(truth[0], (0.2, 0.6)), lose(truth[1], (0.3, 0.7)), lose(truth[2], (0.72, 0.9)), *truth[3:]]
     done = complete_masks(tables, masks, truth)
     assert overlap(masks[0], truth[0]) < 0.65 and overlap(done[0], truth[0]) > 0.95
     for before, after in zip(masks, done, strict=True):
@@ -55,8 +55,8 @@ def test_what_a_camera_doubts_is_decided_by_the_others(tables, truth):
 
 
 def test_what_a_camera_surely_sees_empty_stays_empty(tables, truth):
-    # A table before the legs; two others lost an arm's height, which comes back.
-    masks = [lose(truth[0], (0.5, 1.0)), lose(truth[1], (0.2, 0.4)), lose(truth[2], (0.2, 0.4)), *truth[3:]]
+    # A table before the legs; three others lost an arm's height, which comes back.
+    masks = [lose(truth[0], (0.5, 1.0)), lose(truth[1], (0.1, 0.25)), lose(truth[2], (0.1, 0.25)), lose(truth[3], (0.3, 0.45)), truth[4]]
     done = complete_masks(tables, masks, [masks[0], *truth[1:]])
     assert done[1].sum() > 1.1 * masks[1].sum() and done[2].sum() > 1.1 * masks[2].sum()
     np.testing.assert_array_equal(done[0], masks[0])
@@ -78,7 +78,7 @@ def test_doubts_that_nobody_shares_are_dropped(tables, truth):
 
 def test_shadows_on_the_floor_are_told_from_legs(tables, truth, ring):
     shadows = [floor_patch(camera) for camera in ring]
-    masks = [lose(truth[0], (0.6, 1.0)), lose(truth[1], (0.1, 0.4)), *truth[2:]]
+    masks = [lose(truth[0], (0.6, 1.0)), lose(truth[1], (0.1, 0.4)), lose(truth[2], (0.1, 0.3)), *truth[3:]]
     doubtful = [shadow | mask for shadow, mask in zip(shadows, truth, strict=True)]
     cells = floor_shadows(tables, masks, doubtful)
     x, y = (ROOM[0, i] - 0.5 + (np.arange(n) + 0.5) * 0.03 for i, n in enumerate(cells.shape))

@@ -41,7 +41,7 @@ DEEP_M, NEAR_M = 0.02, 0.08
 #: Masks are completed in frames in which this share of the cameras, and two, lost this share of their silhouettes. One camera's loss the
 #: tolerant hull forgives, and what is added where nothing was lost makes rims fat and shadows between people solid: without these bounds
 #: the first 60 frames of three people in a small room went from 78 to 94 mm.
-LEAST_LOSS, LEAST_LOSERS = 0.06, 1 / 3
+LEAST_LOSS, LEAST_LOSERS = 0.06, 1 / 2
 #: Rows of an image whose rays are cast at once.
 BAND_PX = 128
 #: Rounds: what is completed in one camera lets others complete more.
