@@ -10,10 +10,8 @@ How a camera votes on a voxel:
   (a miss) or "keep" (a vote for it);
 - the camera has no mask in this frame (``None``): no vote on any voxel.
 
-A voxel is occupied when at most `tolerance` cameras miss it, at least `min_views` cameras voted on it, and so many voted for it (fewer
-where the tolerance leaves fewer of all cameras). Tolerance 0 is the strict visual hull, 1 the tolerant one, which keeps limbs that one
-silhouette lost and is fatter. Without the last condition a tolerance of 2 fills the borders of the room, which three cameras see, with
-whatever one of them shows: 4,000 litres about one person, 180 with it (recipe `demo`).
+A voxel is occupied when at most `tolerance` cameras miss it and at least `min_views` cameras voted on it. Tolerance 0 is the
+strict visual hull, 1 the tolerant one, which keeps limbs that one silhouette lost and is fatter.
 """
 
 from __future__ import annotations
@@ -188,8 +186,7 @@ def carve(
     outside : {"ignore", "carve", "keep"}
         What a camera says of a voxel that it does not see.
     min_views : int, optional
-        Cameras that must have voted on a voxel, and for it (for it no more than the tolerance leaves of all). Where left out: 3, or
-        all that have a mask if they are fewer.
+        Cameras that must have voted on a voxel. Where left out: 3, or all that have a mask if they are fewer.
     despeckle : bool
         Take a 3 x 3 median of each mask first. Single wrong pixels do not change the hull's shape but keep whole blocks from
         being judged at once; use it on masks that were not cleaned.
@@ -239,11 +236,10 @@ def carve_levels(
     if voting:
         needed = min(DEFAULT_MIN_VIEWS, len(voting)) if min_views is None else min_views
         whole, undecided, order = _judge_blocks(tables, images, voting, max(tolerances), outside, needed)
-        voxels, misses, views = _judge_voxels(tables, images, order, undecided, max(tolerances), outside, needed)
+        voxels, misses = _judge_voxels(tables, images, order, undecided, max(tolerances), outside, needed)
         for hull, tolerance in zip(hulls, tolerances, strict=True):
             _mark(hull, tables, (whole[:, None] * BLOCK_VOXELS + np.arange(BLOCK_VOXELS)).ravel())
-            least = min(needed, max(1, len(voting) - tolerance))
-            _mark(hull, tables, voxels[(misses <= tolerance) & (views - misses >= least)])
+            _mark(hull, tables, voxels[misses <= tolerance])
     return hulls
 
 
@@ -290,8 +286,8 @@ def _judge_blocks(tables, images, voting, tolerance, outside, min_views) -> tupl
     return blocks[occupied], blocks[~occupied], order
 
 
-def _judge_voxels(tables, images, order, blocks, tolerance, outside, min_views) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The occupied voxels of the blocks, as block * 512 + place in the block, how many cameras miss each, and how many voted."""
+def _judge_voxels(tables, images, order, blocks, tolerance, outside, min_views) -> tuple[np.ndarray, np.ndarray]:
+    """The occupied voxels of the blocks, as block * 512 + place in the block, and how many cameras miss each."""
     # One number a pixel: `vote` for having voted plus 1 for a miss; in the sum over cameras the low part is the number of misses.
     vote: int = 16 if len(order) < 16 else 1 << 16
     dtype: type = np.uint8 if len(order) < 16 else np.uint32
@@ -312,8 +308,7 @@ def _judge_voxels(tables, images, order, blocks, tolerance, outside, min_views) 
     if voxels is None:  # more cameras may miss than there are
         voxels = _number_voxels(blocks, np.arange(total.size))
     seen = np.flatnonzero(total // vote >= min_views)
-    total = total.take(seen)
-    return voxels.take(seen), total & (vote - 1), total // vote
+    return voxels.take(seen), (total & (vote - 1)).take(seen)
 
 
 def _number_voxels(blocks: np.ndarray, places: np.ndarray) -> np.ndarray:
