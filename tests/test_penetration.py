@@ -5,6 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 from posed import body_of, crossed_arms, with_cylinders
 
+from hmc.pose.annealed.cone_maps import cone_maps
 from hmc.pose.annealed.penetration import axis_points, penetration_depth, penetration_rows
 from hmc.pose.body.flesh import place_points
 from hmc.pose.body.joints import N_DOF, SEGMENTS, dof_index
@@ -105,7 +106,8 @@ def test_rows_say_the_same_as_depths_and_point_the_way_out():
     rng = np.random.default_rng(3)
     for state in crossed_arms() + np.stack([np.zeros(N_DOF), *rng.normal(0, 0.1, (3, N_DOF))]):
         rotations, positions = segment_transforms(body, state)
-        depth, outward, points, segment, other = penetration_rows(body, axes, rotations, positions)
+        maps = cone_maps(body.cones, np.concatenate([rotations, positions[..., None]], axis=-1)[..., None])
+        depth, outward, points, segment, other = penetration_rows(body, axes, rotations, positions, maps)
         assert_allclose(depth, penetration_depth(body, axes, rotations[None], positions[None])[0], atol=1e-12)
         assert_allclose(np.linalg.norm(outward, axis=1), 1)
         assert_allclose(points, place_points(rotations, positions, axes.points, axes.segment))

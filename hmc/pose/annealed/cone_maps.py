@@ -8,7 +8,7 @@ import numpy as np
 
 from hmc.pose.body.model import Cones
 
-__all__ = ["ConeMaps", "cone_maps", "cones_near", "spread"]
+__all__ = ["ConeMaps", "cone_maps", "cones_near", "spread", "to_cones"]
 
 
 @dataclass(frozen=True)
@@ -47,6 +47,22 @@ def cone_maps(cones: Cones, placed: np.ndarray) -> ConeMaps:
     to_cone[:, :, 3] -= shift[:, 1]
     to_cone[:, :, 3] -= shift[:, 2]
     return ConeMaps(to_cone, frames[:, :, 3], frames[:, :, 2])
+
+
+def to_cones(maps: ConeMaps, points: np.ndarray) -> np.ndarray:
+    """Points in the coordinates of all cones of one state, shape (n_cones, 3, m).
+
+    Parameters
+    ----------
+    maps : ConeMaps
+        Of one state.
+    points : ndarray, shape (m, 3)
+        World, metres.
+    """
+    matrices = maps.to_cone.reshape(-1, 4)
+    local = matrices[:, :3] @ points.T
+    local += matrices[:, 3:]
+    return local.reshape(-1, 3, len(points))
 
 
 def spread(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from hmc.pose.annealed.cone_maps import ConeMaps, cone_maps, cones_near, spread
+from hmc.pose.annealed.cone_maps import ConeMaps, cone_maps, cones_near, spread, to_cones
 from hmc.pose.body.model import PARTS, BodyModel, Cones
 
 __all__ = ["AxisPoints", "axis_points", "depths_placed", "penetration_depth", "penetration_rows"]
@@ -119,7 +119,9 @@ def depths_placed(body: BodyModel, axes: AxisPoints, placed: np.ndarray, maps: C
     step = max(1, CHUNK // placed.shape[-1])
     for begin in range(0, len(cone), step):
         rows = slice(begin, begin + step)
-        depth[rows] = _depth(body.cones, cone[rows], maps.to_cone[cone[rows]], points[point[rows]])
+        to_cone, members = maps.to_cone[cone[rows]], points[point[rows]]
+        local = [np.einsum("mjn,mjn->mn", to_cone[:, axis, :3], members) + to_cone[:, axis, 3] for axis in range(3)]
+        depth[rows] = _depth(body.cones, cone[rows], *local)
     out = np.zeros((len(points), placed.shape[-1]), placed.dtype)
     for start, stop in pairwise([*np.flatnonzero(np.diff(cone, prepend=-1)), len(cone)]):
         out[point[start:stop]] = np.maximum(out[point[start:stop]], depth[start:stop])
@@ -132,9 +134,8 @@ def _place_points(axes: AxisPoints, placed: np.ndarray) -> np.ndarray:
     return (local[:, None, None] @ placed[axes.segment])[:, :, 0]
 
 
-def _depth(cones: Cones, cone: np.ndarray, to_cone: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Depth of one point, shape (m, 3, n), in one cone in each row: shape (m, n)."""
-    x, y, along = (np.einsum("mjn,mjn->mn", to_cone[:, axis, :3], points) + to_cone[:, axis, 3] for axis in range(3))
+def _depth(cones: Cones, cone: np.ndarray, x: np.ndarray, y: np.ndarray, along: np.ndarray) -> np.ndarray:
+    """Depth of points in one cone a row, from their coordinates there: shape (m, n)."""
     length = cones.lengths.astype(x.dtype)[cone, None]
     t = np.clip(along / length, 0, 1)
     first = cones.radii[:, 0].astype(x.dtype)[cone, :, None]
@@ -146,9 +147,18 @@ def _depth(cones: Cones, cone: np.ndarray, to_cone: np.ndarray, points: np.ndarr
 
 
 def penetration_rows(
-    body: BodyModel, axes: AxisPoints, rotations: np.ndarray, positions: np.ndarray
+    body: BodyModel, axes: AxisPoints, rotations: np.ndarray, positions: np.ndarray, maps: ConeMaps
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """The same for one state, with what is needed to move the parts apart.
+
+    Parameters
+    ----------
+    body : BodyModel
+    axes : AxisPoints
+    rotations : ndarray, shape (11, 3, 3)
+    positions : ndarray, shape (11, 3)
+    maps : ConeMaps
+        Of the one state.
 
     Returns
     -------
@@ -160,16 +170,14 @@ def penetration_rows(
     segment, other : ndarray of int, shape (n_points,)
         Segments of the point and of the cone.
     """
-    placed = np.concatenate([rotations, positions[..., None]], axis=-1)[..., None]
-    maps = cone_maps(body.cones, placed)
-    points = _place_points(axes, placed)
-    cone, point = np.nonzero(axes.against.T)  # of one state it takes longer to tell which are near
-    depths = np.zeros((len(maps.to_cone), len(points)))
-    depths[cone, point] = _depth(body.cones, cone, maps.to_cone[cone], points[point])[:, 0]
-    deepest = depths.argmax(axis=0)
-    points, across = points[:, :, 0], maps.to_cone[deepest, :2, :, 0]
-    lateral = (across[:, :, :3] @ points[:, :, None])[:, :, 0] + across[:, :, 3]
-    norm = np.linalg.norm(lateral, axis=1, keepdims=True)
+    cones = body.cones
+    points = np.einsum("kij,kj->ki", rotations[axes.segment], axes.points) + positions[axes.segment]
+    local = to_cones(maps, points)
+    depths = _depth(cones, np.arange(len(local)), local[:, 0], local[:, 1], local[:, 2])
+    depths *= axes.against.T  # of one state it takes longer to tell which are near
+    deepest, k = depths.argmax(axis=0), np.arange(len(points))
+    lateral = local[deepest, :2, k]
+    norm = np.sqrt(np.einsum("ki,ki->k", lateral, lateral))[:, None]
     lateral = np.where(norm > 1e-9, lateral / np.maximum(norm, 1e-9), [1.0, 0.0])
-    outward = np.einsum("ki,kij->kj", lateral, across[:, :, :3])
-    return depths[deepest, np.arange(len(points))], outward, points, axes.segment, body.cones.segment[deepest]
+    outward = np.einsum("ki,kij->kj", lateral, maps.to_cone[deepest, :2, :3, 0])
+    return depths[deepest, k], outward, points, axes.segment, cones.segment[deepest]

@@ -11,18 +11,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hmc.pose.annealed.cone_maps import ConeMaps, cone_maps, to_cones
 from hmc.pose.annealed.floor import floor_gap, lowest_support
 from hmc.pose.annealed.hull_target import HullTarget, distance_gradient
 from hmc.pose.annealed.penetration import penetration_depth, penetration_rows
-from hmc.pose.annealed.symmetric import POSTURE, BodyPoints, SymmetricSettings, body_distance
+from hmc.pose.annealed.symmetric import POSTURE, BodyPoints, SymmetricSettings, body_distance, cone_shapes, squared_distance
 from hmc.pose.body.flesh import place_points
 from hmc.pose.body.joints import N_DOF
 from hmc.pose.body.kinematics import dof_masks, joint_twists, segment_transforms
-from hmc.pose.body.model import BodyModel
+from hmc.pose.body.model import BodyModel, Cones
 
 __all__ = ["RefineInfo", "RefineSettings", "refine", "residual_rows", "residual_values"]
 
-_MASKS = dof_masks().astype(float)
+#: Which degrees of freedom move each segment, and last the world.
+_MASKS = np.concatenate([dof_masks().astype(float), np.zeros((1, N_DOF))])
+#: The same of one segment relative to another, in rows ``len(_MASKS) * other + segment``, and the first row relative to the world.
+_RELATIVE = (_MASKS - _MASKS[:, None]).reshape(-1, N_DOF)
+_TO_WORLD = len(_MASKS) * (len(_MASKS) - 1)
 
 
 @dataclass(frozen=True)
@@ -97,14 +102,17 @@ def refine(
     hold = settings.stay_weight / deviation**2
 
     def evaluate(s):
-        residuals, jacobian = residual_rows(body, samples, s, target, hull_points, cost_settings)
-        offset = s - anchor
-        cost = float(residuals @ residuals + hold @ offset**2)
-        return jacobian.T @ residuals + hold * offset, jacobian.T @ jacobian + np.diag(hold), cost
+        found = _distances(body, samples, s, target, hull_points, cost_settings)
+        return found, float(found.residuals @ found.residuals + hold @ (s - anchor) ** 2)
 
-    gradient, normal, cost = evaluate(state)
+    found, cost = evaluate(state)
     first, evaluations, damping, accepted = cost, 1, 1e-2, 0
+    improved = True
     while accepted < settings.iterations and damping < 1e4:
+        if improved:
+            pulled, jacobian = _pulls(found, cost_settings)
+            gradient = jacobian.T @ found.residuals[pulled] + hold * (state - anchor)
+            normal = jacobian.T @ jacobian + np.diag(hold)
         # An angle at its limit that wants further out takes no part in this step.
         stuck = ((state <= low) & (gradient > 0)) | ((state >= high) & (gradient < 0)) | ~free
         active = np.flatnonzero(~stuck)
@@ -113,11 +121,12 @@ def refine(
         step = np.zeros(N_DOF)
         step[active] = -np.linalg.solve(matrix, gradient[active])
         trial = np.clip(state + np.clip(step, -0.5, 0.5), low, high)
-        trial_gradient, trial_normal, trial_cost = evaluate(trial)
+        trial_found, trial_cost = evaluate(trial)
         evaluations += 1
-        if trial_cost < cost:
+        improved = trial_cost < cost
+        if improved:
             gain = (cost - trial_cost) / max(cost, 1e-12)
-            state, gradient, normal, cost = trial, trial_gradient, trial_normal, trial_cost
+            state, found, cost = trial, trial_found, trial_cost
             damping = max(damping * 0.3, 1e-4)
             accepted += 1
             if gain < settings.tolerance:
@@ -150,41 +159,89 @@ def residual_rows(
     jacobian : ndarray, shape (n_residuals, 27)
         Zero where a distance is zero or beyond the cap.
     """
+    distances = _distances(body, samples, state, target, hull_points, settings)
+    pulled, rows = _pulls(distances, settings)
+    jacobian = np.zeros((len(distances.residuals), N_DOF))
+    jacobian[pulled] = rows
+    return distances.residuals, jacobian
+
+
+@dataclass(frozen=True)
+class _Distances:
+    """The distances of one state, group by group, and what it takes to tell how they change with it.
+
+    Parameters
+    ----------
+    residuals : ndarray, shape (n + 27,)
+        The posture's last.
+    distance, cap, weight : ndarray, shape (n,)
+    directions, places : tuple of ndarray, shape (..., 3)
+        The way in which a point has to move to add to the distance, and where the point is.
+    movers : tuple of ndarray of int, shape (...)
+        Rows of `_RELATIVE`.
+    axes, centres : ndarray, shape (27, 3)
+        The joints' twists.
+    """
+
+    residuals: np.ndarray
+    distance: np.ndarray
+    cap: np.ndarray
+    weight: np.ndarray
+    directions: tuple[np.ndarray, ...]
+    places: tuple[np.ndarray, ...]
+    movers: tuple[np.ndarray, ...]
+    axes: np.ndarray
+    centres: np.ndarray
+
+
+def _distances(body, samples, state, target, hull_points, settings) -> _Distances:
     axes, centres, rotations, positions = joint_twists(body, state)
-    moments = _cross(axes, centres)
-    surface = samples.surface
-    points = place_points(rotations, positions, surface.points, surface.segment)
-    value, slope = distance_gradient(target, points)
-    residuals, jacobians = [], []
-    for distance, direction, where, segment, weight in (
-        (value, slope, points, surface.segment, 1.0 / len(points)),
-        (*_hull_to_body(body, rotations, positions, hull_points), settings.explain_weight / len(hull_points)),
-    ):
-        # g . (axis x (p - centre)) = (p x g) . axis - g . (axis x centre)
-        jacobian = _cross(where, direction) @ axes.T - direction @ moments.T
-        jacobian[:, :3] = direction
-        pull = (distance > 0) & (distance < settings.cap_m)
-        jacobian *= _MASKS[segment] * (np.sqrt(weight) * pull)[:, None]
-        residuals.append(np.sqrt(weight) * np.minimum(distance, settings.cap_m))
-        jacobians.append(jacobian)
-    depth, outward, where, segment, other = penetration_rows(body, samples.axes, rotations, positions)
-    weight = np.sqrt(settings.overlap_weight / len(depth))
-    jacobian = _cross(where, outward) @ axes.T - outward @ moments.T
-    # What carries both parts leaves them where they are to one another.
-    jacobian *= (_MASKS[other] - _MASKS[segment]) * (weight * (depth > 0))[:, None]
-    residuals.append(weight * depth)
-    jacobians.append(jacobian)
+    maps = cone_maps(body.cones, np.concatenate([rotations, positions[..., None]], axis=-1)[..., None])
+    carrier = samples.surface.segment
+    points = np.einsum("nij,nj->ni", rotations[carrier], samples.surface.points) + positions[carrier]
+    outside, slope = distance_gradient(target, points)
+    unexplained, towards, nearest = _hull_to_body(body.cones, maps, hull_points)
+    depth, outward, axis_places, segment, other = penetration_rows(body, samples.axes, rotations, positions, maps)
+    gap, lowest, shank = np.zeros(0), np.zeros((0, 3)), np.zeros(0, int)
     if target.floor_z is not None:
         gap = floor_gap(body, rotations[None], positions[None], target.floor_z)
-        _, lowest, carrier = lowest_support(body, rotations[None], positions[None])
-        up = np.array([[0.0, 0.0, 1.0]])
-        jacobian = _cross(lowest, up) @ axes.T - up @ moments.T
-        jacobian[:, :3] = up
-        residuals.append(np.sqrt(settings.floor_weight) * gap)
-        jacobians.append(jacobian * _MASKS[carrier] * np.sqrt(settings.floor_weight) * (gap != 0))
-    residuals.append(_posture(state, settings))
-    jacobians.append(np.diag(np.sqrt(settings.posture_weight) / POSTURE[1]))
-    return np.concatenate(residuals), np.concatenate(jacobians)
+        _, lowest, shank = lowest_support(body, rotations[None], positions[None])
+
+    sizes = np.array([len(outside), len(unexplained), len(depth), len(gap)])
+    shares = np.array([1, settings.explain_weight, settings.overlap_weight, settings.floor_weight]) / np.maximum(sizes, 1)
+    distance = np.concatenate([outside, unexplained, depth, gap])
+    weight = np.repeat(np.sqrt(shares), sizes)
+    cap = np.repeat([settings.cap_m, settings.cap_m, np.inf, np.inf], sizes)
+    return _Distances(
+        residuals=np.concatenate([weight * np.minimum(distance, cap), _posture(state, settings)]),
+        distance=distance,
+        cap=cap,
+        weight=weight,
+        directions=(slope, towards, -outward, np.tile([0.0, 0.0, 1.0], (len(gap), 1))),
+        places=(points, hull_points, axis_places, lowest),
+        # What carries both parts leaves them where they are to one another.
+        movers=(_TO_WORLD + carrier, _TO_WORLD + nearest, len(_MASKS) * other + segment, _TO_WORLD + shank),
+        axes=axes,
+        centres=centres,
+    )
+
+
+def _pulls(found: _Distances, settings: SymmetricSettings) -> tuple[np.ndarray, np.ndarray]:
+    """Which residuals change with the state, and how: shapes (m,) and (m, 27)."""
+    rows = np.flatnonzero((found.distance != 0) & (found.distance < found.cap))
+    wrenches = np.empty((len(rows), 6))
+    directions = np.concatenate(found.directions).take(rows, axis=0)
+    directions *= found.weight[rows, None]
+    # g . (axis x (p - centre)) = (p x g) . axis - g . (axis x centre)
+    wrenches[:, :3] = _cross(np.concatenate(found.places).take(rows, axis=0), directions)
+    wrenches[:, 3:] = directions
+    twists = np.concatenate([found.axes, -_cross(found.axes, found.centres)], axis=1)
+    twists[:3] = np.eye(6)[3:]  # translations
+    jacobian = np.empty((len(rows) + N_DOF, N_DOF))
+    np.matmul(wrenches, twists.T, out=jacobian[:-N_DOF])
+    jacobian[:-N_DOF] *= _RELATIVE.take(np.concatenate(found.movers).take(rows), axis=0)
+    jacobian[-N_DOF:] = np.diag(np.sqrt(settings.posture_weight) / POSTURE[1])
+    return np.concatenate([rows, len(found.distance) + np.arange(N_DOF)]), jacobian
 
 
 def residual_values(
@@ -225,27 +282,21 @@ def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=1)
 
 
-def _hull_to_body(body: BodyModel, rotations, positions, points):
-    """Distance of hull points to the nearest cone; how it changes when that cone moves (minus the outward direction)."""
-    cones = body.cones
-    turn = cones.bases @ np.swapaxes(rotations[cones.segment], -1, -2)
-    start = positions[cones.segment] + (rotations[cones.segment] @ cones.start[..., None])[..., 0]
-    shift = (turn @ start[..., None])[..., 0]
-    local = (turn.reshape(-1, 3) @ points.T).reshape(len(turn), 3, -1) - shift[..., None]
-    x, y, along = local[:, 0], local[:, 1], local[:, 2]
-    length = cones.lengths[:, None]
-    clipped = np.clip(along, 0, length)
-    beyond = along - clipped
-    t = clipped / length
-    first, slope = cones.radii[:, 0], cones.radii[:, 1] - cones.radii[:, 0]
-    level = (x / (first[:, :1] + slope[:, :1] * t)) ** 2 + (y / (first[:, 1:] + slope[:, 1:] * t)) ** 2
-    shrink = 1 - 1 / np.sqrt(np.maximum(level, 1.0))
-    squared = (x * x + y * y) * shrink**2 + beyond**2
+def _hull_to_body(cones: Cones, maps: ConeMaps, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Distance of hull points to the nearest cone; how it changes when that cone moves (minus the outward direction); its segment.
+
+    Which cone is nearest is found in single precision.
+    """
+    local = to_cones(maps, points)
+    squared = np.empty((len(local), len(points)), np.float32)
+    squared_distance(local.swapaxes(0, 1).astype(np.float32), *cone_shapes(cones), out=squared)
     nearest = squared.argmin(0)
-    k = np.arange(len(points))
-    distance = np.sqrt(squared[nearest, k])
-    shrink = shrink[nearest, k]
-    outward = np.stack([x[nearest, k] * shrink, y[nearest, k] * shrink, beyond[nearest, k]], -1)
+    x, y, along = local[nearest, :, np.arange(len(points))].T
+    clipped = np.clip(along, 0, cones.lengths[nearest])
+    t = (clipped / cones.lengths[nearest])[:, None]
+    a, b = ((1 - t) * cones.radii[nearest, 0] + t * cones.radii[nearest, 1]).T
+    shrink = 1 - 1 / np.sqrt(np.maximum((x / a) ** 2 + (y / b) ** 2, 1.0))
+    outward = np.stack([x * shrink, y * shrink, along - clipped], axis=1)
+    distance = np.sqrt(np.einsum("ki,ki->k", outward, outward))
     outward /= np.maximum(distance, 1e-9)[:, None]
-    direction = (outward[:, None, :] @ turn[nearest])[:, 0]
-    return distance, -direction, points, cones.segment[nearest]
+    return distance, -np.einsum("ki,kij->kj", outward, maps.to_cone[nearest, :, :3, 0]), cones.segment[nearest]
