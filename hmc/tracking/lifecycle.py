@@ -2,13 +2,14 @@
 
 A person-like set of voxels that no track owns becomes a candidate. A candidate that was seen in enough frames becomes a person,
 from the first frame in which it was seen. A track whose voxels have not looked like a person for a while is deleted, and so is
-the younger of two tracks that stand in one place. Source: Canton (2009), Figure 4.1 and section 4.2.3; the person rules stand in
-place of its trained classifier (Table 4.1, Figure 4.4).
+the younger of two tracks that stand in one place, and one whose filter hardly finds anything any more. Source: Canton (2009), Figure
+4.1 and section 4.2.3. What looks like a person is decided by a trained tree (Table 4.1, Figure 4.4) or by rules written by hand.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -16,6 +17,8 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from hmc.tracking.blobs import Blobs, Observation, blob_features
+from hmc.tracking.features import feature_matrix
+from hmc.tracking.person_tree import PersonTree, default_tree, predict_person, read_tree
 from hmc.voxels.components import label_voxels
 
 __all__ = [
@@ -38,6 +41,9 @@ class LifecycleSettings:
 
     Attributes
     ----------
+    person : str
+        What decides whether a set of voxels looks like a person: "tree", the decision tree that comes with the package; "rules", the
+        limits from `least_top_m` to `least_side_m`; or the path of a tree of the user's own (`hmc.tracking.train_person_tree`).
     least_top_m, most_top_m : float
         Height of the highest point of a person who appears: bent down or on the knees, and with a hand up.
     least_height_m : float
@@ -60,14 +66,23 @@ class LifecycleSettings:
         A track is deleted after this time without support; the second holds for people who were last seen at the edge of the room.
     edge_m : float
         Width of that edge.
+    unlike_s : float
+        A track is deleted when its voxels have not looked like a person for so long without a break, however many they are: furniture
+        that somebody left behind (Canton, section 4.2.3, third criterion of deletion).
+    least_efficiency, efficiency_s : float
+        A track is deleted when the survival rate of its filter's particles (Canton, Eq. 3.11) has been below this share for so long
+        (section 4.2.3, second criterion).
     least_distance_m : float
-        No candidate nearer to a track than this, horizontally.
+        No candidate nearer to a track than this, horizontally (section 4.2.3, criterion of creation).
     same_place_m, same_place_s : float
-        Two tracks nearer than this for so long follow one person.
+        Two tracks nearer than this for so long follow one person; the younger is deleted (section 4.2.3, first criterion of deletion).
     fragment_gap_m : float
         Unowned pieces that stand nearer than this, seen from above, are judged together.
+    tree : PersonTree or None
+        What `person` names; None for "rules". Not to be given.
     """
 
+    person: str = "rules"
     least_top_m: float = 0.9
     most_top_m: float = 2.6
     least_height_m: float = 0.6
@@ -85,10 +100,18 @@ class LifecycleSettings:
     patience_s: float = 1.0
     edge_patience_s: float = 0.3
     edge_m: float = 0.3
+    unlike_s: float = 5.0
+    least_efficiency: float = 0.05
+    efficiency_s: float = 0.5
     least_distance_m: float = 0.45
     same_place_m: float = 0.2
     same_place_s: float = 0.5
     fragment_gap_m: float = 0.2
+    tree: PersonTree | None = field(init=False, default=None)
+
+    def __post_init__(self) -> None:
+        if self.person != "rules":
+            object.__setattr__(self, "tree", default_tree() if self.person == "tree" else read_tree(self.person))
 
 
 @dataclass(frozen=True)
@@ -141,6 +164,10 @@ class Track:
         First frame seen and last frame with support.
     crowded : int
         Frames in a row in which another, older track stood in the same place.
+    unlike : int
+        Frames in a row in which its voxels did not look like a person.
+    inefficient : int
+        Frames in a row in which hardly any of its filter's particles survived.
     """
 
     person: int
@@ -151,10 +178,17 @@ class Track:
     first_frame: int
     last_frame: int
     crowded: int = 0
+    unlike: int = 0
+    inefficient: int = 0
 
 
 def looks_like_person(blobs: Blobs, settings: LifecycleSettings) -> np.ndarray:
-    """Which sets of voxels may be a person who appears; shape (n,) bool. For people who stand, bend, kneel or sit."""
+    """Which sets of voxels may be a person who appears; shape (n,) bool. For people who stand, bend, kneel or sit.
+
+    By the tree where the settings have one, else by their limits.
+    """
+    if settings.tree is not None:
+        return (blobs.counts > 0) & predict_person(settings.tree, feature_matrix(blobs))
     longer = blobs.sides_m[:, 0]
     top, bottom = blobs.top_m, blobs.lowest[:, 2]
     return (
@@ -342,8 +376,17 @@ def confirm(
     return tuple(left), tuple(tracks), rows
 
 
-def delete(tracks: tuple[Track, ...], frame: int, fps: float, room: np.ndarray, settings: LifecycleSettings) -> tuple[Track, ...]:
-    """The tracks that stay: supported lately, and not standing where an older one stands.
+def delete(
+    tracks: tuple[Track, ...],
+    frame: int,
+    fps: float,
+    room: np.ndarray,
+    settings: LifecycleSettings,
+    *,
+    like_person: Mapping[int, bool] | None = None,
+    efficiency: Mapping[int, float] | None = None,
+) -> tuple[Track, ...]:
+    """The tracks that stay: supported lately, not standing where an older one stands, and doing well.
 
     Parameters
     ----------
@@ -353,6 +396,11 @@ def delete(tracks: tuple[Track, ...], frame: int, fps: float, room: np.ndarray, 
     room : ndarray, shape (2, 3)
         Lowest and highest corner of the grid, metres.
     settings : LifecycleSettings
+    like_person : mapping of int to bool, optional
+        By person number, whether the voxels of the track looked like a person in this frame (`looks_like_person`). Who is left out is
+        not judged, and keeps the count of bad frames.
+    efficiency : mapping of int to float, optional
+        By person number, the share of the filter's particles that survive, in [0, 1]; for trackers that have particles.
 
     Returns
     -------
@@ -366,8 +414,13 @@ def delete(tracks: tuple[Track, ...], frame: int, fps: float, room: np.ndarray, 
             continue
         near = any(_gap(track.position, older.position) < settings.same_place_m for older in kept)
         crowded = track.crowded + 1 if near else 0
-        if crowded <= settings.same_place_s * fps:
-            kept.append(replace(track, crowded=crowded))
+        unlike, inefficient = track.unlike, track.inefficient
+        if like_person is not None and track.person in like_person:
+            unlike = 0 if like_person[track.person] else unlike + 1
+        if efficiency is not None and track.person in efficiency:
+            inefficient = inefficient + 1 if efficiency[track.person] < settings.least_efficiency else 0
+        if crowded <= settings.same_place_s * fps and unlike <= settings.unlike_s * fps and inefficient <= settings.efficiency_s * fps:
+            kept.append(replace(track, crowded=crowded, unlike=unlike, inefficient=inefficient))
     return tuple(kept)
 
 
