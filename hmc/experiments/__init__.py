@@ -1,0 +1,11 @@
+"""The papers' tables and figures, computed again: one module an experiment, `python -m hmc.experiments list | run ID... | status`."""
+
+from hmc.experiments.experiment import Cell, Claim, Experiment, Plan, Report, Source, Table
+from hmc.experiments.inputs import Inputs
+from hmc.experiments.library import EXPERIMENTS, find_experiment
+from hmc.experiments.sweep import Outcome, plan_of, run_experiment
+
+__all__ = [
+    "EXPERIMENTS", "Cell", "Claim", "Experiment", "Inputs", "Outcome", "Plan", "Report", "Source", "Table", "find_experiment", "plan_of",
+    "run_experiment",
+]  # fmt: skip

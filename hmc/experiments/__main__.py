@@ -1,0 +1,129 @@
+"""``python -m hmc.experiments list | run ID... | status``."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from pathlib import Path
+
+from hmc.errors import InputError
+from hmc.experiments.library import EXPERIMENTS, find_experiment
+from hmc.experiments.sweep import plan_of, run_experiment, stored_cells
+from hmc.experiments.writing import write_report
+
+#: What wrong input, a failed cell and an interrupt leave as exit code.
+EXIT_INPUT, EXIT_FAILED, EXIT_INTERRUPTED = 2, 1, 130
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the command line; returns the exit code."""
+    args = _make_parser().parse_args(argv)
+    try:
+        return args.act(args)
+    except InputError as error:
+        _tell(f"hmc.experiments: {error}", sys.stderr)
+        return EXIT_INPUT
+    except KeyboardInterrupt:
+        _tell("hmc.experiments: interrupted; what is computed stays, the same command goes on", sys.stderr)
+        return EXIT_INTERRUPTED
+
+
+def _make_parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="python -m hmc.experiments", description="The papers' tables and figures, computed again.")
+    actions = parser.add_subparsers(required=True, metavar="{list,run,status}")
+    listing = actions.add_parser("list", help="all experiments")
+    listing.set_defaults(act=_list)
+    run = actions.add_parser("run", help="compute experiments and write their tables and figures")
+    run.add_argument("ids", nargs="+", metavar="ID", help="experiments, 'all', or a Python file that holds one")
+    run.add_argument("--workers", type=_count, default=os.cpu_count() or 1, metavar="N", help="processes (default: one a core)")
+    run.add_argument("--again", action="store_true", help="compute stored cells anew")
+    run.add_argument("--quiet", action="store_true", help="no progress bar")
+    run.set_defaults(act=_run)
+    status = actions.add_parser("status", help="how much of each experiment is computed")
+    status.add_argument("ids", nargs="*", metavar="ID", help="experiments (default: all)")
+    status.set_defaults(act=_status)
+    for action in (run, status):
+        action.add_argument("--quick", action="store_true", help="a small grid that shows the shape, in minutes")
+        action.add_argument("--out", type=Path, default=Path("experiments"), metavar="DIR", help="folder of cells, inputs and reports")
+        action.add_argument(
+            "--recordings", type=Path, nargs="+", default=[], metavar="FOLDER", help="your recordings in place of rendered ones"
+        )
+    return parser
+
+
+def _list(args: argparse.Namespace) -> int:
+    for name in EXPERIMENTS:
+        experiment = find_experiment(name)
+        _tell(f"{name:10} {experiment.title} ({experiment.source})")
+    return 0
+
+
+def _run(args: argparse.Namespace) -> int:
+    plan = plan_of(args.quick, args.recordings)
+    out = _folder(args.out)
+    names = _names(args.ids)
+    experiments = {name: find_experiment(name) for name in names}  # wrong ids are told before anything is computed
+    failed = False
+    for name, experiment in experiments.items():
+        from tqdm import tqdm
+
+        from hmc.experiments.style import house_style
+
+        with house_style(), tqdm(desc=experiment.id, unit="cell", dynamic_ncols=True, disable=args.quiet, file=sys.stderr) as bar:
+
+            def show(done: int, total: int, bar=bar) -> None:
+                if bar.total is None:
+                    bar.reset(total)
+                    bar.initial = bar.n = done  # found cells say nothing of the speed
+                bar.update(done - bar.n)
+
+            outcome = run_experiment(name, out, plan, args.workers, args.again, show)
+            folder = write_report(out, experiment, plan, outcome.report) if outcome.report else None
+        _tell(f"{experiment.id}: {outcome.computed} cells computed, {outcome.found} found")
+        for failure in outcome.failures:
+            _tell(failure, sys.stderr)
+        if outcome.report is None:
+            failed = True
+            _tell(f"{experiment.id}: {len(outcome.failures)} cells failed; the same command tries them again", sys.stderr)
+            continue
+        for claim in outcome.report.claims:
+            _tell(f"  {'holds  ' if claim.holds else 'DIFFERS'} {claim.text}{': ' if claim.detail else ''}{claim.detail}")
+        _tell(f"  wrote {folder}")
+    return EXIT_FAILED if failed else 0
+
+
+def _status(args: argparse.Namespace) -> int:
+    plan = plan_of(args.quick, args.recordings)
+    for name in _names(args.ids or ["all"]):
+        experiment = find_experiment(name)
+        cells = stored_cells(experiment, args.out, experiment.grid(plan))
+        done = sum(cell is not None for cell in cells)
+        _tell(f"{experiment.id:10} {done:5} of {len(cells):5} cells")
+    return 0
+
+
+def _names(ids: list[str]) -> list[str]:
+    return list(dict.fromkeys(name for item in ids for name in (EXPERIMENTS if item == "all" else [item])))
+
+
+def _folder(path: Path) -> Path:
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"--out {path}: cannot be made ({error.strerror}); give a folder") from error
+    return path
+
+
+def _count(text: str) -> int:
+    if not text.isdigit() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"must be a whole number, 1 or more; got {text!r}")
+    return int(text)
+
+
+def _tell(text: str, file=None) -> None:
+    (file or sys.stdout).write(text + "\n")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,203 @@
+"""What many cells need and one makes: recordings and what was seen in them, kept beside the cells.
+
+Each is made once. A lock of the operating system's, which dies with its holder, keeps two workers from making the same thing at once, and
+what is made appears under its name only when it is whole; so a run may be killed at any time.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from hmc.errors import InputError
+from hmc.experiments.experiment import Source
+from hmc.experiments.store import digest
+from hmc.frontend import FrontendSettings, HullStep, stream_hulls
+from hmc.recording import Recording, open_recording
+from hmc.synthetic.recipe import load_recipe
+from hmc.synthetic.render import render_recording
+from hmc.voxels.grid import VoxelGrid
+
+try:
+    import fcntl
+except ImportError:  # no such locks on Windows: two workers may then make the same thing, and the first to finish keeps it
+    fcntl = None  # type: ignore[assignment]
+
+__all__ = ["Inputs", "once", "rendered", "source_of"]
+
+#: Files of a recording on which a cell's result depends.
+_CONTENT = ("calibration*", "recording.toml", "videos/*", "images/*/*", "silhouettes/*/*", "background/*", "background/*/*", "truth/*.csv")
+#: The person tracker's input is computed with one thread: workers share the cores.
+_FRONTEND = FrontendSettings(threads=1)
+
+
+def rendered(recipe: str) -> Source:
+    """A shipped recipe as a source; the label changes when the recipe does.
+
+    Raises
+    ------
+    InputError
+        When there is no such recipe.
+    """
+    return Source(f"{recipe}@{digest(repr(load_recipe(recipe)), 8)}")
+
+
+def source_of(folder: Path) -> Source:
+    """A recording of the user's as a source; the label changes when a file's size or the calibration does, not with the place.
+
+    Raises
+    ------
+    InputError
+        When the folder is no recording.
+    """
+    open_recording(folder)
+    files = sorted({file for pattern in _CONTENT for file in folder.glob(pattern) if file.is_file()})
+    sizes = [[str(file.relative_to(folder)), file.stat().st_size] for file in files]
+    text = [file.read_text(encoding="utf-8", errors="replace") for file in files if file.parent == folder]
+    return Source(f"{folder.resolve().name}@{digest([sizes, text], 8)}", folder.resolve())
+
+
+def once(path: Path, make: Callable[[Path], object]) -> Path:
+    """A file or folder that is made where it is not there yet.
+
+    Parameters
+    ----------
+    path : Path
+    make : callable
+        ``make(part)`` makes it at `part`, a sibling of `path`, which is then renamed.
+
+    Returns
+    -------
+    Path
+        `path`.
+    """
+    if path.exists():
+        return path
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with _locked(path.with_name(f".{path.name}.lock")) as alone:
+        if path.exists():
+            return path
+        if alone:
+            for left in path.parent.glob(f".*{path.name}.*.part"):
+                _remove(left)
+        part = path.with_name(f".{path.name}.{os.getpid()}.part")
+        try:
+            make(part)
+            with contextlib.suppress(FileExistsError if alone else OSError):
+                os.replace(part, path)
+        finally:
+            _remove(part)
+    return path
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """Shared inputs of cells.
+
+    Attributes
+    ----------
+    folder : Path
+        Where they are kept.
+    recordings : mapping of str to Path
+        The user's recordings by label.
+    """
+
+    folder: Path
+    recordings: Mapping[str, Path] = field(default_factory=dict)
+
+    def recording_folder(self, label: str) -> Path:
+        """The folder of a recording; one of a shipped recipe is rendered where it is not there.
+
+        Parameters
+        ----------
+        label : str
+            A `Source`'s.
+
+        Raises
+        ------
+        InputError
+            When the label is of a recording that was not given, or of an earlier form of a recipe.
+        """
+        if label in self.recordings:
+            return self.recordings[label]
+        recipe = label.rpartition("@")[0]
+        if rendered(recipe).label != label:
+            raise InputError(f"the recording {label} is neither among --recordings nor a shipped recipe as it is now")
+        return once(self.folder / label / "recording", lambda part: render_recording(recipe, part))
+
+    def recording(self, label: str) -> Recording:
+        """A recording, opened."""
+        return open_recording(self.recording_folder(label))
+
+    def truth(self, label: str) -> Path:
+        """The file of true centroids of a recording.
+
+        Raises
+        ------
+        InputError
+            When the recording has none.
+        """
+        path = self.recording_folder(label) / "truth" / "centroids.csv"
+        if not path.is_file():
+            raise InputError(f"{path.parent.parent}: has no truth/centroids.csv; this experiment scores tracks against it")
+        return path
+
+    def hulls(self, label: str, voxel_size_m: float) -> Iterator[HullStep]:
+        """Silhouettes and hulls of a whole recording, in order, without images.
+
+        Parameters
+        ----------
+        label : str
+        voxel_size_m : float
+
+        Yields
+        ------
+        HullStep
+            As from `hmc.frontend.stream_hulls`, with None for images and doubts.
+        """
+        recording = self.recording(label)
+        grid = VoxelGrid.from_room(recording.room, voxel_size_m, len(recording.rig))
+        folder = once(self.folder / label / f"hulls-{1000 * voxel_size_m:g}mm", lambda part: _write_hulls(part, recording, grid))
+        sizes = [camera.size for camera in recording.rig]
+        for path in sorted(folder.glob("*.npz")):
+            with np.load(path, allow_pickle=False) as data:
+                levels = np.zeros(grid.shape, np.uint8)
+                levels.ravel()[data["voxels"]] = data["levels"]
+                masks = tuple(_unpack(data[f"mask_{c}"], size) if f"mask_{c}" in data else None for c, size in enumerate(sizes))
+            nothing = (None,) * len(sizes)
+            yield HullStep(int(path.stem), nothing, masks, nothing, levels == 3, levels >= 2, levels >= 1)
+
+
+def _write_hulls(folder: Path, recording: Recording, grid: VoxelGrid) -> None:
+    folder.mkdir()
+    for step in stream_hulls(recording, grid, _FRONTEND, on_problem=lambda line: None):
+        levels = step.strict.astype(np.uint8) + step.tolerant + step.loose
+        voxels = np.flatnonzero(levels).astype(np.int64 if levels.size > np.iinfo(np.int32).max else np.int32)
+        masks = {f"mask_{c}": np.packbits(mask) for c, mask in enumerate(step.masks) if mask is not None}
+        np.savez_compressed(folder / f"{step.index:08d}.npz", voxels=voxels, levels=levels.ravel()[voxels], **masks)  # type: ignore[arg-type]
+
+
+def _unpack(bits: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    return np.unpackbits(bits, count=size[0] * size[1]).astype(bool).reshape(size[1], size[0])
+
+
+@contextlib.contextmanager
+def _locked(path: Path) -> Iterator[bool]:
+    """Hold a lock; yields whether there are locks here."""
+    with open(path, "w") as file:
+        if fcntl is not None:
+            fcntl.flock(file, fcntl.LOCK_EX)
+        yield fcntl is not None
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        path.unlink(missing_ok=True)

@@ -1,0 +1,56 @@
+"""The experiments by their ids."""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+import importlib.util
+from pathlib import Path
+from types import ModuleType
+
+from hmc.errors import InputError
+from hmc.experiments.experiment import Experiment
+
+__all__ = ["EXPERIMENTS", "find_experiment"]
+
+#: Every experiment's id and its module in this package.
+EXPERIMENTS = {
+    "fig-4.7": "fig_4_7",
+    "fig-4.9": "fig_4_9",
+}
+
+
+def find_experiment(name: str) -> Experiment:
+    """An experiment by its id, or from a Python file of the user's, which is run.
+
+    Parameters
+    ----------
+    name : str
+        A key of `EXPERIMENTS`, or the path of a file ``*.py`` with an `EXPERIMENT`.
+
+    Raises
+    ------
+    InputError
+        When there is no such experiment; the nearest id is named.
+    """
+    if name.endswith(".py"):
+        module = _module_of(Path(name))
+    elif name in EXPERIMENTS:
+        module = importlib.import_module(f"hmc.experiments.{EXPERIMENTS[name]}")
+    else:
+        near = difflib.get_close_matches(name, EXPERIMENTS, 1, cutoff=0.5)
+        hint = f"did you mean {near[0]}?" if near else f"they are {', '.join(EXPERIMENTS)}"
+        raise InputError(f"there is no experiment {name!r}; {hint}")
+    experiment = getattr(module, "EXPERIMENT", None)
+    if not isinstance(experiment, Experiment):
+        raise InputError(f"{name}: has no EXPERIMENT of the kind hmc.experiments.Experiment")
+    return experiment
+
+
+def _module_of(path: Path) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(f"_experiment_{path.stem}", path)
+    if not path.is_file() or spec is None or spec.loader is None:
+        raise InputError(f"{path}: there is no such file")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
