@@ -58,22 +58,24 @@ def evidence(image: np.ndarray, mean: np.ndarray, deviation: np.ndarray) -> Evid
     """
     difference = cv2.subtract(cv2.cvtColor(image, cv2.COLOR_BGR2YCrCb), mean, dtype=cv2.CV_32F)
     # Noise is rougher than people: a 3 x 3 average halves it.
-    luma, red, blue = cv2.split(cv2.GaussianBlur(difference, (3, 3), 0))
-    luma_mean, red_mean, blue_mean = cv2.split(mean)
-    luma_deviation, chroma_deviation = cv2.split(deviation)
+    cv2.GaussianBlur(difference, (3, 3), 0, dst=difference)
+    # Planes are cut out one by one: `cv2.split` takes several times longer of a part of an image.
+    luma, red, blue = (cv2.extractChannel(difference, channel) for channel in range(3))
     contrast, spare = np.abs(luma), np.abs(red)
     np.maximum(contrast, spare, out=contrast)
     np.maximum(contrast, np.abs(blue, out=spare), out=contrast)
-    lost = np.divide(luma, luma_mean, out=luma_mean)
-    np.clip(np.negative(lost, out=lost), 0, 1, out=lost)
-    for colour, colour_mean in ((red, red_mean), (blue, blue_mean)):  # chroma shrinks with the light
-        np.subtract(colour_mean, 128, out=spare)
+    lost = np.empty_like(luma)
+    np.negative(np.divide(luma, mean[..., 0], out=lost), out=lost)
+    np.minimum(np.maximum(lost, 0, out=lost), 1, out=lost)
+    for colour, channel in ((red, 1), (blue, 2)):  # chroma shrinks with the light
+        np.subtract(mean[..., channel], 128, out=spare)
         spare *= lost
         colour += spare
         colour *= colour
-    np.multiply(chroma_deviation, chroma_deviation, out=spare)
-    chroma2 = np.divide(np.add(red, blue, out=red), spare, out=spare)
-    return Evidence(np.divide(luma, luma_deviation, out=luma), chroma2, lost, contrast)
+    np.copyto(spare, deviation[..., 1])
+    spare *= spare
+    chroma2 = np.divide(np.add(red, blue, out=red), spare, out=red)
+    return Evidence(np.divide(luma, deviation[..., 0], out=luma), chroma2, lost, contrast)
 
 
 def fill_gaps(
@@ -109,8 +111,10 @@ def fill_gaps(
     ndarray of uint8, shape (height, width)
         Every piece holds `least` pixels of the seeds.
     """
-    inner = cv2.morphologyEx(seeds, cv2.MORPH_CLOSE, _square(GAP_PX, scale)).view(bool)
-    outer = cv2.dilate(seeds, _square(REACH_PX, scale)).view(bool)
+    gap, reach = _square(GAP_PX, scale), _square(REACH_PX, scale)
+    near = cv2.dilate(seeds, gap)
+    inner = cv2.erode(near, gap).view(bool)
+    outer = cv2.dilate(near, reach[len(gap) - 1 :, len(gap) - 1 :]).view(bool)  # two squares in turn reach as far as their sum
     dark = seen.luma < -threshold
     weak = (seen.chroma2 > threshold**2) | (seen.luma > threshold) | (dark & (seen.lost > 1 - gap_shadow))
     reached = (seen.chroma2 > reach_threshold**2) | (seen.luma > reach_threshold) | (dark & (seen.lost > 1 - shadow))
@@ -120,8 +124,11 @@ def fill_gaps(
     mask = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, _disc(CLOSE_PX, scale))
     n, labels = cv2.connectedComponents(mask, connectivity=8)
     counts = np.bincount(labels[seeds.view(bool)], minlength=n)
-    counts[0] = 0
-    return np.take((counts >= least * scale**2).view(np.uint8), np.asarray(labels))
+    kept = (counts >= least * scale**2).view(np.uint8)
+    if kept[1:].all():
+        return mask
+    kept[0] = 0
+    return np.take(kept, np.asarray(labels))
 
 
 def cut_halo(mask: np.ndarray, seen: Evidence, share: float, scale: float) -> np.ndarray:
