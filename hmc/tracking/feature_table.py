@@ -5,20 +5,21 @@ Source: Canton (2009), section 4.2.3.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from hmc.errors import InputError
-from hmc.frontend import FrontendSettings, stream_hulls
+from hmc.frontend import FrontendSettings, HullStep, stream_hulls
 from hmc.recording import Recording
-from hmc.results import read_centroids
+from hmc.results import TrackTable, read_centroids
 from hmc.tracking.blobs import observe
 from hmc.tracking.features import FEATURES, assign_components, feature_matrix
 from hmc.tracking.resumable import person_grid
+from hmc.voxels.grid import VoxelGrid
 
-__all__ = ["FeatureTable", "feature_table", "join_tables"]
+__all__ = ["FeatureTable", "feature_table", "join_tables", "table_of_hulls"]
 
 
 @dataclass(frozen=True)
@@ -88,8 +89,6 @@ def feature_table(
     InputError
         When the recording has no truth, or an argument is not one of the above.
     """
-    if not hulls or not set(hulls) <= {"tolerant", "strict"}:
-        raise InputError(f"`hulls` must name 'tolerant', 'strict' or both; got {hulls!r}")
     if every < 1:
         raise InputError(f"`every` must be a whole number, 1 or more; got {every}")
     path = recording.path / "truth" / "centroids.csv"
@@ -97,10 +96,38 @@ def feature_table(
         raise InputError(f"{path}: there is no such file; blobs can be told to be people only in a recording with truth")
     truth = read_centroids(path)
     grid = person_grid(recording, voxel_size_m)
-    frames, features, persons = [], [], []
+    steps = stream_hulls(recording, grid, frontend, on_problem=on_problem)
+    return table_of_hulls((step for step in steps if (step.index - recording.start) % every == 0), grid, truth, hulls)
+
+
+def table_of_hulls(steps: Iterable[HullStep], grid: VoxelGrid, truth: TrackTable, hulls: Sequence[str] = ("tolerant",)) -> FeatureTable:
+    """As `feature_table`, of hulls that are at hand.
+
+    Parameters
+    ----------
+    steps : iterable of HullStep
+        Frames that are not usable are passed over.
+    grid : VoxelGrid
+        Of the hulls.
+    truth : TrackTable
+        True centroids.
+    hulls : sequence of {"tolerant", "strict"}
+
+    Returns
+    -------
+    FeatureTable
+
+    Raises
+    ------
+    InputError
+        When `hulls` names something else.
+    """
+    if not hulls or not set(hulls) <= {"tolerant", "strict"}:
+        raise InputError(f"`hulls` must name 'tolerant', 'strict' or both; got {hulls!r}")
+    frames, features, persons = [np.zeros(0, int)], [np.zeros((0, len(FEATURES)))], [np.zeros(0, int)]
     positions = unassigned = 0
-    for step in stream_hulls(recording, grid, frontend, on_problem=on_problem):
-        if not step.usable or (step.index - recording.start) % every:
+    for step in steps:
+        if not step.usable:
             continue
         people = truth.positions[truth.frames == step.index]
         for hull in hulls:
@@ -111,10 +138,8 @@ def feature_table(
             persons.append(np.bincount(assigned[assigned >= 0], minlength=len(observation.blobs)))
             positions += len(assigned)
             unassigned += int(np.count_nonzero(assigned < 0))
-    n = sum(map(len, frames))
-    if n == 0:
-        return FeatureTable(np.zeros(0, int), np.zeros((0, len(FEATURES))), np.zeros(0, int), np.zeros(0, int), positions, unassigned)
-    return FeatureTable(np.concatenate(frames), np.concatenate(features), np.concatenate(persons), np.zeros(n, int), positions, unassigned)
+    found = np.concatenate(frames)
+    return FeatureTable(found, np.concatenate(features), np.concatenate(persons), np.zeros(len(found), int), positions, unassigned)
 
 
 def join_tables(tables: Sequence[FeatureTable]) -> FeatureTable:
