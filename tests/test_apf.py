@@ -83,7 +83,7 @@ def test_refinement_beats_the_particles_alone():
     acted = act("walk")
     full = filter_of("default", acted)
     bare = replace(full, preset=replace(full.preset, refine=None, search=None, fit_body=None, start="neutral"))
-    errors = {}
+    errors: dict[str, list[float]] = {}
     for name, filt in (("full", full), ("bare", bare)):
         state, errors[name] = pose_init(true_state(filt.body, acted)), []
         for frame, target in enumerate(acted.targets[:6]):

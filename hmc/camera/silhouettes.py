@@ -69,9 +69,8 @@ def evidence(image: np.ndarray, mean: np.ndarray, deviation: np.ndarray) -> Evid
     np.minimum(np.maximum(lost, 0, out=lost), 1, out=lost)
     for colour, channel in ((red, 1), (blue, 2)):  # chroma shrinks with the light
         np.subtract(mean[..., channel], 128, out=spare)
-        spare *= lost
-        colour += spare
-        colour *= colour
+        np.add(colour, np.multiply(spare, lost, out=spare), out=colour)
+        np.multiply(colour, colour, out=colour)
     np.copyto(spare, deviation[..., 1])
     spare *= spare
     chroma2 = np.divide(np.add(red, blue, out=red), spare, out=red)
