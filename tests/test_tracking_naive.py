@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 from hmc.results import TrackTable
+from hmc.tracking.association import assign_voxels
 from hmc.tracking.blobs import observe
-from hmc.tracking.naive import NaiveSettings, assign_voxels, finish, init, step
+from hmc.tracking.naive import NaiveSettings, finish, init, step
+from hmc.tracking.trackers import tracker_of
 from hmc.tracking.tracks import fill_gaps, from_rows, person_voxels, run, velocities
 from hmc.voxels.grid import VoxelGrid
 
@@ -26,7 +28,11 @@ def box(lowest, highest):
 
 
 def follow(volumes, settings=None):
-    return run(((frame, None if volume is None else observe(GRID, volume)) for frame, volume in enumerate(volumes)), FPS, settings)
+    return run(
+        ((frame, None if volume is None else observe(GRID, volume)) for frame, volume in enumerate(volumes)),
+        FPS,
+        tracker_of(settings or NaiveSettings()),
+    )
 
 
 def nothing():
@@ -238,7 +244,7 @@ def test_velocities_are_polyfit_s_over_the_window_whatever_the_order_and_gaps():
 
 def test_gaps_longer_than_asked_stay():
     state = init(FPS)
-    rows = []
+    rows: list = []
     for frame in range(10):
         state, info = step(state, frame, observe(GRID, person(0, 0)))
         rows += info.rows

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from hmc.cli.common import add_selection_options, open_selected, positive_float, print_problems, progress, recording_source, whole_number
-from hmc.cli.track import JOURNAL
+from hmc.cli.track import JOURNAL, add_tracker_options, selected_tracker
 
 __all__ = ["add_parser", "run"]
 
@@ -30,6 +30,7 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     parser.add_argument("--method", choices=METHODS, default="apf", help="apf: annealed particle filter (default)")
     parser.add_argument("--preset", default="default", metavar="NAME", help="default, or canton2009 for the thesis's printed parameters")
     parser.add_argument("--voxel", type=positive_float, default=0.03, metavar="M", help="side of a voxel, metres (default: 0.03)")
+    add_tracker_options(parser)
     parser.add_argument("--track-voxel", type=positive_float, default=0.05, metavar="M", help="the same for the tracker (default: 0.05)")
     parser.add_argument("--seed", type=whole_number, default=0, metavar="N", help="seed of the random numbers (default: 0)")
     parser.add_argument(
@@ -54,7 +55,6 @@ def run(args: argparse.Namespace) -> int:
     from hmc.pose.person import FollowSettings
     from hmc.pose.sequence import pose_recording
     from hmc.results import read_run, write_joints, write_pose, write_run, write_tracks
-    from hmc.tracking.naive import NaiveSettings
     from hmc.tracking.resumable import person_grid, track_recording
 
     recording = open_selected(args)
@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"--out {args.out}: is a file; give a folder")
     height = _height(args.height, recording)
     person_grid(recording, args.voxel)  # voxels that will not do are refused before any work is done
-    tracker, frontend, following = NaiveSettings(), FrontendSettings(), FollowSettings()
+    tracker, frontend, following = selected_tracker(args), FrontendSettings(), FollowSettings()
     parameters: dict[str, Any] = {
         "voxel_size_m": args.voxel,
         "track_voxel_size_m": args.track_voxel,
@@ -75,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
         "height_m": height or "auto",
         "preset": preset,
         "following": following,
-        "tracker": tracker,
+        "tracker": tracker.settings,
         "frontend": frontend,
     }
     source = recording_source(recording)
@@ -95,6 +95,7 @@ def run(args: argparse.Namespace) -> int:
         args.track_voxel,
         tracker,
         frontend,
+        seed=args.seed,
         journal=track_journal,
         key=key,
         on_problem=problems.append,

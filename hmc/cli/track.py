@@ -6,11 +6,12 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from hmc.cli.common import add_selection_options, open_selected, positive_float, print_problems, progress, recording_source
+from hmc.cli.common import add_selection_options, open_selected, positive_float, print_problems, progress, recording_source, whole_number
 
-__all__ = ["add_parser", "run"]
+__all__ = ["add_parser", "add_tracker_options", "run", "selected_tracker"]
 
-TRACKERS = ("naive",)
+TRACKERS = ("naive", "particle", "sparse")
+PRESETS = ("default", "canton2009", "alike")
 #: The journal of a run that is not finished.
 JOURNAL = ".track.journal"
 
@@ -26,9 +27,32 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     )
     add_selection_options(parser)
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the result")
-    parser.add_argument("--tracker", choices=TRACKERS, default="naive", help="method (default: naive)")
-    parser.add_argument("--voxel", type=positive_float, default=0.05, metavar="M", help="side of a voxel, metres (default: 0.05)")
+    add_tracker_options(parser)
+    parser.add_argument("--voxel", type=positive_float, default=0.04, metavar="M", help="side of a voxel, metres (default: 0.04)")
+    parser.add_argument("--seed", type=whole_number, default=0, metavar="N", help="seed of the random numbers (default: 0)")
     return parser
+
+
+def add_tracker_options(parser: argparse.ArgumentParser) -> None:
+    """Add ``--tracker``, ``--color``, ``--particles`` and ``--track-preset``."""
+    parser.add_argument("--tracker", choices=TRACKERS, default="sparse", help="method: Sparse Sampling (default), particle filter, naive")
+    parser.add_argument(
+        "--color", action=argparse.BooleanOptionalAction, default=None, help="use colours (default, where the tracker can), or do not"
+    )
+    parser.add_argument("--particles", type=whole_number, default=None, metavar="N", help="particles or samples a person")
+    parser.add_argument(
+        "--track-preset",
+        choices=PRESETS,
+        default="default",
+        help="the tracker's parameters; canton2009: the thesis's printed ones; alike: people who are dressed alike",
+    )
+
+
+def selected_tracker(args: argparse.Namespace):
+    """The tracker that the options describe."""
+    from hmc.tracking.trackers import make_tracker
+
+    return make_tracker(args.tracker, color=args.color, particles=args.particles, preset=args.track_preset)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -37,16 +61,15 @@ def run(args: argparse.Namespace) -> int:
     from hmc.files import to_toml
     from hmc.frontend import FrontendSettings
     from hmc.results import read_run, read_tracks, write_run, write_tracks
-    from hmc.tracking.naive import NaiveSettings
-    from hmc.tracking.resumable import track_recording
+    from hmc.tracking.resumable import Timing, track_recording
 
     recording = open_selected(args)
+    tracker, frontend = selected_tracker(args), FrontendSettings()
     tracks_path, run_path, journal = args.out / "tracks.csv", args.out / "run.toml", args.out / JOURNAL
     if args.out.is_file():
         raise InputError(f"--out {args.out}: is a file; give a folder")
     if (args.out / "joints.csv").exists() or (args.out / "pose.npz").exists():
         raise InputError(f"--out {args.out}: holds poses, whose tracks must stay as they are; choose another folder")
-    settings, frontend = NaiveSettings(), FrontendSettings()
     parameters: dict[str, Any] = {
         "voxel_size_m": args.voxel,
         "start": recording.start,
@@ -54,37 +77,61 @@ def run(args: argparse.Namespace) -> int:
         "cameras": list(recording.rig.names),
         "room_m": recording.room,
         "fps": recording.fps,
-        "tracker": settings,
+        "tracker": tracker.settings,
         "frontend": frontend,
     }
     source = recording_source(recording)
-    key = to_toml({"method": args.tracker, **source, "parameters": parameters})
+    key = to_toml({"method": args.tracker, "seed": args.seed, **source, "parameters": parameters})
     if run_path.exists() and tracks_path.exists():
         before = read_run(run_path)
-        if to_toml({name: before.get(name) for name in ("method", *source, "parameters")}) == key:
+        if to_toml({name: before.get(name) for name in ("method", "seed", *source, "parameters")}) == key:
             print(_summary(read_tracks(tracks_path), recording.n_frames))
             print(f"{tracks_path} was finished before, with the same parameters; delete it to compute it again")
             return 0
         print(f"{args.out}: its result has other parameters or another recording; starting anew")
 
     problems: list[str] = [*recording.problems]
+    timings: list[Timing] = []
     table = track_recording(
         recording,
         args.voxel,
-        settings,
+        tracker,
         frontend,
+        seed=args.seed,
         journal=journal,
         key=key,
         on_problem=problems.append,
+        on_timing=timings.append,
         progress=lambda steps, total: progress(steps, total, "track", args.quiet),
     )
     write_tracks(tracks_path, table)
-    write_run(run_path, args.tracker, parameters, None, **source, problems=list(dict.fromkeys(problems)))
+    speed = {name: value for timing in timings for name, value in _speed(timing, recording.fps).items()}
+    write_run(run_path, args.tracker, parameters, args.seed, **source, problems=list(dict.fromkeys(problems)), speed=speed)
     journal.unlink(missing_ok=True)
     print(_summary(table, recording.n_frames))
+    if speed:
+        print(
+            f"real-time factor {speed['real_time_factor']:.2f}; of the filter alone {speed['filter_real_time_factor']:.1f} "
+            f"({speed['input_s']:.1f} s input, {speed['filter_s']:.2f} s filter, {speed['lifecycle_s']:.2f} s tracks' beginning and end)"
+        )
     print(f"wrote {tracks_path}")
     print_problems(problems)
     return 0
+
+
+def _speed(timing, fps: float) -> dict[str, float]:
+    """Seconds and real-time factors (Canton 2009, Eq. 4.24-4.27), of the whole chain and of the filter alone; empty without frames."""
+    from dataclasses import asdict
+
+    from hmc.metrics.timing import real_time_factor
+
+    seconds = timing.input_s + timing.filter_s + timing.lifecycle_s
+    if not timing.frames or not timing.filter_s > 0:
+        return {}
+    return asdict(timing) | {
+        "real_time_factor": real_time_factor(timing.frames, seconds, fps),
+        "filter_real_time_factor": real_time_factor(timing.frames, timing.filter_s, fps),
+    }
 
 
 def _summary(table, n_frames: int) -> str:

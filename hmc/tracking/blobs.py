@@ -81,7 +81,7 @@ class Observation:
     certain : ndarray of bool, shape (n,)
         Voxels in which no camera is contradicted: those of the strict hull.
     views : Views, optional
-        The silhouettes, by which ghosts are told from people.
+        The silhouettes, by which ghosts are told from people, and the images, by which people are told from one another.
     """
 
     voxel_size_m: float
@@ -92,6 +92,12 @@ class Observation:
     blobs: Blobs
     certain: np.ndarray
     views: Views | None = None
+
+    @property
+    def grid(self) -> VoxelGrid:
+        """The grid of which the voxels are."""
+        shape = np.rint(np.ptp(self.room, axis=0) / self.voxel_size_m).astype(int)
+        return VoxelGrid(self.room[0], self.voxel_size_m, tuple(shape))
 
 
 def observe(grid: VoxelGrid, occupied: np.ndarray, certain: np.ndarray | None = None, views: Views | None = None) -> Observation:
@@ -105,7 +111,7 @@ def observe(grid: VoxelGrid, occupied: np.ndarray, certain: np.ndarray | None = 
     certain : ndarray of bool, shape (nx, ny, nz), optional
         The strict hull, by which people are located where it has enough of them. All of `occupied` where left out.
     views : Views, optional
-        The silhouettes and their cameras.
+        The silhouettes, their cameras and, where colours are asked for, the images.
 
     Returns
     -------

@@ -25,16 +25,19 @@ OWN_VIEWS = 2
 
 @dataclass(frozen=True)
 class Views:
-    """The silhouettes of one frame, with the cameras that took them.
+    """The silhouettes and images of one frame, with the cameras that took them.
 
     Attributes
     ----------
     rig : Rig
     masks : sequence of ndarray of bool, shape (height, width), or None; one a camera
+    images : sequence of ndarray of uint8, shape (height, width, 3), or None; one a camera
+        Empty where nobody asks for colours.
     """
 
     rig: Rig
     masks: Sequence[np.ndarray | None]
+    images: Sequence[np.ndarray | None] = ()
 
 
 def real_people(views: Views, known: np.ndarray, sets: Sequence[np.ndarray], voxel_size_m: float) -> np.ndarray:

@@ -11,8 +11,9 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, astuple, dataclass, field, replace
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -23,13 +24,14 @@ from hmc.journal import append_journal, open_journal
 from hmc.recording import Recording
 from hmc.results import TrackTable
 from hmc.tracking.blobs import Observation, observe
+from hmc.tracking.following import Cloud, TrackerState, finish, init
 from hmc.tracking.ghosts import Views
 from hmc.tracking.lifecycle import Candidate, Row, Track
-from hmc.tracking.naive import NaiveSettings, NaiveState, finish, init, step
-from hmc.tracking.tracks import table_of
+from hmc.tracking.trackers import Tracker, make_tracker
+from hmc.tracking.tracks import frame_rng, table_of
 from hmc.voxels.grid import VoxelGrid
 
-__all__ = ["WARM_UP_FRAMES", "observe_step", "person_grid", "track_recording"]
+__all__ = ["WARM_UP_FRAMES", "Timing", "observe_step", "person_grid", "track_recording"]
 
 logger = logging.getLogger("hmc")
 
@@ -42,12 +44,14 @@ MAX_VOXEL_M = 0.15
 def track_recording(
     recording: Recording,
     voxel_size_m: float = 0.05,
-    settings: NaiveSettings | None = None,
+    tracker: Tracker | None = None,
     frontend: FrontendSettings | None = None,
     *,
+    seed: int = 0,
     journal: str | Path | None = None,
     key: str = "",
     on_problem: Callable[[str], None] | None = None,
+    on_timing: Callable[[Timing], None] | None = None,
     progress: Callable[[Iterable[HullStep], int], Iterable[HullStep]] | None = None,
 ) -> TrackTable:
     """Where everybody is in every frame of the selection.
@@ -56,14 +60,19 @@ def track_recording(
     ----------
     recording : Recording
     voxel_size_m : float
-    settings : NaiveSettings, optional
+    tracker : Tracker, optional
+        By default as `hmc.tracking.trackers.make_tracker`.
     frontend : FrontendSettings, optional
+    seed : int
+        Of the tracker's random numbers.
     journal : path, optional
         File in which the run is kept, and from which it goes on.
     key : str
         Says what the run depends on. A journal with another key is begun anew.
     on_problem : callable, optional
         Called with one line for everything that was survived.
+    on_timing : callable, optional
+        Called at the end with the time that was spent.
     progress : callable, optional
         ``progress(steps, total)`` passes the steps on and may show how far they are.
 
@@ -77,6 +86,7 @@ def track_recording(
     InputError
         When the voxels are too coarse, or too many for the memory.
     """
+    tracker = make_tracker() if tracker is None else tracker
     grid = person_grid(recording, voxel_size_m)
     done = _take_up(journal, key, recording)
     state, rows, problems = done.state, list(done.rows), list(done.problems)
@@ -93,14 +103,23 @@ def track_recording(
     end = recording.start + recording.n_frames
     stream = stream_hulls(recording, grid, frontend, first=done.next_frame, warm_up=WARM_UP_FRAMES, on_problem=note)
     hulls: Iterable[HullStep] = stream if done.next_frame < end else ()
+    timing, before = done.timing, perf_counter()
     for hull in progress(hulls, end - done.next_frame) if progress else hulls:
-        state, info = step(state, hull.index, observe_step(recording, grid, hull), settings)
+        observation = observe_step(recording, grid, hull, images=tracker.color)
+        begun = perf_counter()
+        state, info = tracker.step(frame_rng(seed, hull.index), state, hull.index, observation)
+        now = perf_counter()
+        timing = timing.plus(Timing(1, begun - before + info.color_s, info.filter_s, now - begun - info.color_s - info.filter_s))
+        before = now
         rows += info.rows
         n_frames = hull.index + 1 - recording.start
         if journal is not None and (n_frames % CHECKPOINT_FRAMES == 0 or n_frames == recording.n_frames):
-            append_journal(journal, _to_plain(Done(hull.index + 1, state, tuple(rows), tuple(problems)), since=done))
-            done = Done(hull.index + 1, state, tuple(rows), tuple(problems))
-    rows += finish(state, recording.n_frames, settings)
+            now_done = Done(hull.index + 1, state, tuple(rows), tuple(problems), timing)
+            append_journal(journal, _to_plain(now_done, since=done))
+            done, before = now_done, perf_counter()
+    rows += finish(state, recording.n_frames, tracker.following)
+    if on_timing is not None:
+        on_timing(timing)
     return table_of(rows, recording.fps)
 
 
@@ -117,9 +136,39 @@ def person_grid(recording: Recording, voxel_size_m: float) -> VoxelGrid:
     return VoxelGrid.from_room(recording.room, voxel_size_m, len(recording.rig))
 
 
-def observe_step(recording: Recording, grid: VoxelGrid, hull: HullStep) -> Observation | None:
-    """What the tracker sees of a frame: the tolerant hull, the strict one in it, and the silhouettes; None where it tells nothing."""
-    return observe(grid, hull.tolerant, hull.strict, Views(recording.rig, hull.masks)) if hull.usable else None
+def observe_step(recording: Recording, grid: VoxelGrid, hull: HullStep, images: bool = False) -> Observation | None:
+    """What the tracker sees of a frame, or None where it tells nothing.
+
+    That is the tolerant hull, the strict one in it, the silhouettes and, where colours are asked for, the images.
+    """
+    if not hull.usable:
+        return None
+    return observe(grid, hull.tolerant, hull.strict, Views(recording.rig, hull.masks, hull.images if images else ()))
+
+
+@dataclass(frozen=True)
+class Timing:
+    """Where the time went (Canton 2009, Eq. 4.24), seconds over all frames.
+
+    Attributes
+    ----------
+    frames : int
+    input_s : float
+        Reading, segmenting, carving, components and colours.
+    filter_s : float
+        Saying where the people are who are known.
+    lifecycle_s : float
+        Sharing out voxels, creation and deletion of tracks.
+    """
+
+    frames: int = 0
+    input_s: float = 0.0
+    filter_s: float = 0.0
+    lifecycle_s: float = 0.0
+
+    def plus(self, other: Timing) -> Timing:
+        """Both together."""
+        return Timing(*(a + b for a, b in zip(astuple(self), astuple(other), strict=True)))
 
 
 @dataclass(frozen=True)
@@ -127,9 +176,10 @@ class Done:
     """What is done of a run: the frames before `next_frame`."""
 
     next_frame: int
-    state: NaiveState
+    state: TrackerState
     rows: tuple[Row, ...] = ()
     problems: tuple[str, ...] = ()
+    timing: Timing = field(default_factory=Timing)
 
 
 def _take_up(journal: str | Path | None, key: str, recording: Recording) -> Done:
@@ -141,6 +191,7 @@ def _take_up(journal: str | Path | None, key: str, recording: Recording) -> Done
             _state_of(record["state"]),
             done.rows + tuple(_row_of(row) for row in record["rows"]),
             done.problems + tuple(record["problems"]),
+            Timing(**record["timing"]),
         )
     return done
 
@@ -148,13 +199,24 @@ def _take_up(journal: str | Path | None, key: str, recording: Recording) -> Done
 def _to_plain(done: Done, since: Done) -> dict[str, Any]:
     """A record of the journal: the state, and what is new since the last record."""
     new = replace(done, rows=done.rows[len(since.rows) :], problems=done.problems[len(since.problems) :])
-    return asdict(new)
+    plain = asdict(new)
+    for cloud in plain["state"]["clouds"]:  # nearly all of a histogram is zero
+        colors = np.flatnonzero(cloud["histogram"])
+        cloud["histogram"] = {"size": len(cloud["histogram"]), "colors": colors, "shares": cloud["histogram"][colors]}
+    return plain
 
 
-def _state_of(plain: dict[str, Any]) -> NaiveState:
+def _cloud_of(plain: dict[str, Any]) -> Cloud:
+    histogram = np.zeros(plain["histogram"]["size"])
+    histogram[np.array(plain["histogram"]["colors"], int)] = plain["histogram"]["shares"]
+    return Cloud(plain["person"], np.array(plain["points"], float).reshape(-1, 3), np.array(plain["weights"], float), histogram)
+
+
+def _state_of(plain: dict[str, Any]) -> TrackerState:
     tracks = tuple(Track(**_arrays(track)) for track in plain["tracks"])
     candidates = tuple(Candidate(tuple(_row_of(row) for row in one["rows"]), one["missed"]) for one in plain["candidates"])
-    return NaiveState(plain["fps"], tracks, candidates, plain["next_person"])
+    clouds = tuple(_cloud_of(cloud) for cloud in plain["clouds"])
+    return TrackerState(plain["fps"], tracks, candidates, plain["next_person"], clouds)
 
 
 def _row_of(plain: dict[str, Any]) -> Row:

@@ -8,24 +8,29 @@ from itertools import pairwise
 import numpy as np
 
 from hmc.results import TrackTable
+from hmc.tracking.association import FollowingSettings, assign_voxels
 from hmc.tracking.blobs import Observation
+from hmc.tracking.following import finish, init
 from hmc.tracking.lifecycle import Row
-from hmc.tracking.naive import NaiveSettings, assign_voxels, finish, init, step
+from hmc.tracking.trackers import Tracker, make_tracker
 
-__all__ = ["fill_gaps", "from_rows", "person_voxels", "run", "table_of", "velocities"]
+__all__ = ["fill_gaps", "frame_rng", "from_rows", "person_voxels", "run", "table_of", "velocities"]
 
 
 def run(
-    observations: Iterable[tuple[int, Observation | None]], fps: float, settings: NaiveSettings | None = None, gap_s: float = 1.0
+    observations: Iterable[tuple[int, Observation | None]], fps: float, tracker: Tracker | None = None, seed: int = 0, gap_s: float = 1.0
 ) -> TrackTable:
-    """Follow everybody through a recording with the naive tracker.
+    """Follow everybody through a recording.
 
     Parameters
     ----------
     observations : iterable of (int, Observation or None)
         Frame number and what was seen (`hmc.tracking.blobs.observe`); None where the frame tells nothing.
     fps : float
-    settings : NaiveSettings, optional
+    tracker : Tracker, optional
+        By default as `hmc.tracking.trackers.make_tracker`.
+    seed : int
+        Of the random numbers.
     gap_s : float
         Gaps of a track up to this long are filled in.
 
@@ -34,14 +39,20 @@ def run(
     TrackTable
         With heads; persons numbered from 0 in the order in which they were first seen.
     """
+    tracker = make_tracker() if tracker is None else tracker
     state, n_frames = init(fps), 0
     rows: list[Row] = []
     for frame, observation in observations:
-        state, info = step(state, frame, observation, settings)
+        state, info = tracker.step(frame_rng(seed, frame), state, frame, observation)
         rows += info.rows
         n_frames += 1
-    rows += finish(state, n_frames, settings)
+    rows += finish(state, n_frames, tracker.following)
     return table_of(rows, fps, gap_s)
+
+
+def frame_rng(seed: int, frame: int) -> np.random.Generator:
+    """The random numbers of one frame: a run that goes on in the middle draws the same as one from the start."""
+    return np.random.default_rng((seed, frame))
 
 
 def table_of(rows: Iterable[Row], fps: float, gap_s: float = 1.0) -> TrackTable:
@@ -132,7 +143,7 @@ def velocities(table: TrackTable, fps: float, window_s: float = 0.4) -> np.ndarr
     return result
 
 
-def person_voxels(observation: Observation, positions: np.ndarray, settings: NaiveSettings | None = None) -> list[np.ndarray]:
+def person_voxels(observation: Observation, positions: np.ndarray, settings: FollowingSettings | None = None) -> list[np.ndarray]:
     """The occupied voxels of each person in a frame.
 
     Parameters
@@ -140,7 +151,7 @@ def person_voxels(observation: Observation, positions: np.ndarray, settings: Nai
     observation : Observation
     positions : ndarray, shape (k, 3)
         The persons' centroids in this frame, as in the table of tracks.
-    settings : NaiveSettings, optional
+    settings : FollowingSettings, optional
 
     Returns
     -------

@@ -28,7 +28,12 @@ EMPTY, SOLID, BEYOND = 0, 1, 2
 
 
 def color_voxels(
-    grid: VoxelGrid, rig: Rig, images: Sequence[np.ndarray | None], voxels: np.ndarray, seen: np.ndarray | None = None
+    grid: VoxelGrid,
+    rig: Rig,
+    images: Sequence[np.ndarray | None],
+    voxels: np.ndarray,
+    seen: np.ndarray | None = None,
+    masks: Sequence[np.ndarray | None] | None = None,
 ) -> np.ndarray:
     """Average colour of each voxel in the images.
 
@@ -41,6 +46,8 @@ def color_voxels(
     voxels : ndarray of int, shape (n, 3)
     seen : ndarray of bool, shape (n_cameras, n), optional
         Which camera has direct sight of which voxel (`visibility`). All have where left out: the plain average.
+    masks : sequence of ndarray of bool, shape (height, width), or None, optional
+        Silhouettes, one a camera: pixels beside them tell nothing of what is occupied. A camera without one tells nothing.
 
     Returns
     -------
@@ -51,11 +58,15 @@ def color_voxels(
     total = np.zeros((len(voxels), 3), np.float32)
     count = np.zeros(len(voxels), np.float32)
     for c, (camera, image) in enumerate(zip(rig, images, strict=True)):
-        if image is None:
+        mask = None if masks is None else masks[c]
+        if image is None or (masks is not None and mask is None):
             continue
-        column, row, inside = pixel_of_voxel(camera, points)
-        tells = np.flatnonzero(inside if seen is None else inside & seen[c])
-        total[tells] += image[row[tells], column[tells]]
+        asked = np.arange(len(points)) if seen is None else np.flatnonzero(seen[c])
+        column, row, inside = pixel_of_voxel(camera, points[asked])
+        if mask is not None:
+            inside &= mask[row, column]
+        tells, column, row = asked[inside], column[inside], row[inside]
+        total[tells] += image[row, column]
         count[tells] += 1
     with np.errstate(invalid="ignore"):
         return total / np.where(count > 0, count, np.nan)[:, None]

@@ -1,0 +1,256 @@
+"""One frame on, whatever filter says where people are: voxels are shared out, tracks are kept, born and deleted.
+
+Source: Canton (2009), Figure 4.1 (filters in the middle, creation and deletion around them). A filter is a function that moves the
+persons' clouds of samples; without one, each person is at the centroid of their voxels (`hmc.tracking.naive`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from time import perf_counter
+
+import numpy as np
+
+from hmc.errors import InputError
+from hmc.tracking.association import FollowingSettings, assign_voxels, find_again, head_centre, locating_voxels, predict
+from hmc.tracking.blobs import Observation, blob_features
+from hmc.tracking.ghosts import real_people
+from hmc.tracking.lifecycle import Candidate, Row, Track, confirm, delete, newcomers, propose, still_a_person
+
+__all__ = ["Cloud", "Filter", "Filtered", "StepInfo", "TrackerState", "advance", "finish", "init"]
+
+#: Share of the room beyond which what is occupied cannot be people.
+MOST_FILLED = 0.5
+
+
+@dataclass(frozen=True)
+class Cloud:
+    """What a filter remembers of one person.
+
+    Attributes
+    ----------
+    person : int
+    points : ndarray, shape (n, 3)
+        Particles (positions, metres) or samples (voxels); none where the filter has to begin anew.
+    weights : ndarray, shape (n,)
+        Sum to 1.
+    histogram : ndarray, shape (n_colors,)
+        Reference histogram of the person's colours, sums to 1; empty as long as nothing is known.
+    """
+
+    person: int
+    points: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    weights: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    histogram: np.ndarray = field(default_factory=lambda: np.zeros(0))
+
+
+@dataclass(frozen=True)
+class TrackerState:
+    """A tracker between two frames.
+
+    Attributes
+    ----------
+    fps : float
+    tracks : tuple of Track
+        Persons, by number.
+    candidates : tuple of Candidate
+    next_person : int
+    clouds : tuple of Cloud
+        One a track, in the same order, where a filter is used; else none.
+    """
+
+    fps: float
+    tracks: tuple[Track, ...] = ()
+    candidates: tuple[Candidate, ...] = ()
+    next_person: int = 0
+    clouds: tuple[Cloud, ...] = ()
+
+
+@dataclass(frozen=True)
+class StepInfo:
+    """What a step found beside the new state.
+
+    Attributes
+    ----------
+    rows : tuple of Row
+        New lines for the table: persons seen in this frame and earlier frames of persons confirmed in it.
+    owners : ndarray of int, shape (n_voxels,)
+        Person number of each voxel of the observation, or -1.
+    shared : tuple of int
+        Persons whose component holds another person too.
+    color_s, filter_s : float
+        Seconds spent on colouring voxels and on saying where the persons are.
+    """
+
+    rows: tuple[Row, ...]
+    owners: np.ndarray
+    shared: tuple[int, ...] = ()
+    color_s: float = 0.0
+    filter_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class Filtered:
+    """What a filter says.
+
+    Attributes
+    ----------
+    positions : ndarray, shape (k, 3)
+        Where each person is; where they should be, of a person of whom the filter saw nothing. World, metres.
+    seen : ndarray of bool, shape (k,)
+        Whether the filter saw the person.
+    clouds : tuple of Cloud
+    color_s : float
+        Seconds spent on colouring voxels.
+    """
+
+    positions: np.ndarray
+    seen: np.ndarray
+    clouds: tuple[Cloud, ...]
+    color_s: float = 0.0
+
+
+#: ``filter(state, predicted, observation)``: the state's tracks should be at ``predicted``, shape (k, 3).
+Filter = Callable[[TrackerState, np.ndarray, Observation], Filtered]
+
+
+def init(fps: float) -> TrackerState:
+    """Nobody is there yet.
+
+    Parameters
+    ----------
+    fps : float
+        Frames a second.
+
+    Raises
+    ------
+    InputError
+        When `fps` is not positive.
+    """
+    if not np.isfinite(fps) or fps <= 0:
+        raise InputError(f"`fps` must be a positive number of frames a second; got {fps}")
+    return TrackerState(float(fps))
+
+
+def advance(
+    state: TrackerState, frame: int, observation: Observation | None, settings: FollowingSettings, filter: Filter | None = None
+) -> tuple[TrackerState, StepInfo]:
+    """One frame on.
+
+    Parameters
+    ----------
+    state : TrackerState
+    frame : int
+        Absolute number; frames come in order.
+    observation : Observation or None
+        None where the frame tells nothing: every track waits. So it does when most of the room is occupied (a light switch). An
+        observation without voxels means that nobody is there.
+    settings : FollowingSettings
+    filter : callable, optional
+        Says where each person is. Where left out, each is at the centroid of the voxels that they own.
+
+    Returns
+    -------
+    state : TrackerState
+    info : StepInfo
+    """
+    if observation is None or len(observation.points) * observation.voxel_size_m**3 > MOST_FILLED * np.ptp(observation.room, axis=0).prod():
+        waiting = tuple(replace(track, last_frame=track.last_frame + 1, velocity=track.velocity * 0.5) for track in state.tracks)
+        return replace(state, tracks=waiting), StepInfo((), np.full(0 if observation is None else len(observation.points), -1))
+    n, size = len(state.tracks), observation.voxel_size_m
+    begun = perf_counter()
+    predicted = predict(state.tracks, state.fps)
+    filtered = filter(state, predicted, observation) if filter else Filtered(predicted, np.zeros(n, bool), ())
+    filter_s = perf_counter() - begun - filtered.color_s
+    positions = filtered.positions
+    claimed, shared = assign_voxels(observation, positions, settings)
+    owners = find_again(state.tracks, frame, state.fps, observation, claimed, settings)
+    owned = blob_features(observation.points, owners, n, size)
+    best = locating_voxels(observation, owners, n, settings)
+    located = blob_features(observation.points, np.where(best, owners, -1), n, size)
+    if filter is None:
+        filter_s = perf_counter() - begun
+    certain = blob_features(observation.points, np.where(observation.certain, owners, -1), n, size)
+    supported = still_a_person(owned, certain, state.tracks, settings.lifecycle)
+    # Of a person who was found again elsewhere, the filter knows nothing.
+    known = filtered.seen & ~np.isin(np.arange(n), owners[claimed != owners])
+    measured = np.where(known[:, None], positions, located.centroid)
+    gain = np.where(shared & ~known, settings.shared_gain, 1.0)
+    tracks, rows = [], []
+    for k, track in enumerate(state.tracks):
+        if supported[k]:
+            head = head_centre(observation.points[best & (owners == k)])
+            moved = predicted[k] + gain[k] * (measured[k] - predicted[k])
+            tracks.append(_update(track, frame, moved, gain[k], owned.volume_m3[k], head, bool(shared[k]), state.fps, settings))
+            rows.append(Row(frame, track.person, measured[k], head))
+        else:
+            tracks.append(replace(track, position=predicted[k], velocity=track.velocity * 0.8))
+
+    candidates = propose(state.candidates, _newcomers(observation, owners, frame, settings), tuple(tracks), settings.lifecycle)
+    candidates, fresh, earlier = confirm(candidates, state.next_person, state.fps, settings.lifecycle)
+    kept = delete((*tracks, *fresh), frame, state.fps, observation.room, settings.lifecycle)
+    numbers = np.array([*(track.person for track in state.tracks), -1])
+    info = StepInfo((*rows, *earlier), numbers[owners], tuple(int(number) for number in numbers[:-1][shared]), filtered.color_s, filter_s)
+    moved = {cloud.person: cloud if known[k] else Cloud(cloud.person, histogram=cloud.histogram) for k, cloud in enumerate(filtered.clouds)}
+    clouds = tuple(moved.get(track.person, Cloud(track.person)) for track in kept) if filter else ()
+    return TrackerState(state.fps, kept, candidates, state.next_person + len(fresh), clouds), info
+
+
+def finish(state: TrackerState, n_frames: int, settings: FollowingSettings | None = None) -> tuple[Row, ...]:
+    """Rows still to come when the recording is over.
+
+    In a recording too short for any candidate to be confirmed, those seen in every frame are persons.
+
+    Parameters
+    ----------
+    state : TrackerState
+    n_frames : int
+        Frames in the recording.
+    settings : FollowingSettings, optional
+
+    Returns
+    -------
+    tuple of Row
+    """
+    settings = FollowingSettings() if settings is None else settings
+    short = replace(settings.lifecycle, confirm_frames=n_frames, confirm_s=0.0)
+    if n_frames > max(settings.lifecycle.confirm_frames, round(settings.lifecycle.confirm_s * state.fps)):
+        return ()
+    return tuple(confirm(state.candidates, state.next_person, state.fps, short)[2])
+
+
+def _newcomers(observation: Observation, owners: np.ndarray, frame: int, settings: FollowingSettings) -> list[Row]:
+    """Where person-like sets of voxels are that no track owns and that are no ghosts."""
+    sets = newcomers(observation, owners, settings.lifecycle)
+    if sets and observation.views is not None:
+        points = [observation.points[rows] for rows in sets]
+        real = real_people(observation.views, observation.points[owners >= 0], points, observation.voxel_size_m)
+        sets = [rows for rows, one in zip(sets, real, strict=True) if one]
+    person = np.full(len(owners), -1)
+    for j, rows in enumerate(sets):
+        person[rows] = j
+    best = locating_voxels(observation, person, len(sets), settings)
+    located = [observation.points[best & (person == j)] for j in range(len(sets))]
+    return [Row(frame, -1, points.mean(axis=0), head_centre(points)) for points in located]
+
+
+def _update(
+    track: Track,
+    frame: int,
+    position: np.ndarray,
+    gain: float,
+    volume_m3: float,
+    head: np.ndarray,
+    shared: bool,
+    fps: float,
+    settings: FollowingSettings,
+) -> Track:
+    """The track after a measurement; what is measured with little gain changes the velocity little."""
+    blend = gain * (1 - np.exp(-1 / (fps * settings.velocity_time_s)))
+    velocity = track.velocity + blend * ((position - track.position) * fps - track.velocity)
+    velocity = velocity * min(1.0, settings.most_speed_m_s / max(float(np.linalg.norm(velocity)), 1e-9))
+    volume = float(volume_m3)
+    if track.volume_m3 > 0:
+        volume = track.volume_m3 if shared else track.volume_m3 + blend * (min(volume, 2 * track.volume_m3) - track.volume_m3)
+    return replace(track, position=position, head=head, velocity=velocity, volume_m3=volume, last_frame=frame)

@@ -1,0 +1,207 @@
+"""The particle filter: each particle is an upright ellipsoid the size of a person, scored by how much of it is occupied and by its colours.
+
+Source: Canton (2009), section 4.3.2, Eq. 4.8-4.13. What differs from the text: particles move with the person's smoothed velocity
+(``drift``; 0 is the thesis's), and weights are raised to a power (``sharpness``; 1 is the thesis's), because an ellipsoid that is a third
+off is still half full, so that the plain mean of the particles hardly leaves the last place.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hmc.errors import InputError
+from hmc.montecarlo import systematic
+from hmc.tracking.association import FollowingSettings
+from hmc.tracking.blobs import Observation
+from hmc.tracking.following import Cloud, Filtered, StepInfo, TrackerState, advance, finish, init
+from hmc.tracking.region import PERSON_RADIUS_M
+from hmc.tracking.surroundings import adapted, blocking, look_around
+
+__all__ = ["ParticleSettings", "color_likelihood", "finish", "init", "overlap", "step"]
+
+#: An ellipsoid's centre is at least so high, metres.
+LEAST_HEIGHT_M = 0.2
+
+
+@dataclass(frozen=True)
+class ParticleSettings:
+    """Parameters of the particle filter.
+
+    Attributes
+    ----------
+    particles : int
+        Particles a person.
+    color : bool
+        Whether colours count.
+    raw_share : float
+        Canton's lambda (Eq. 4.8); the rest is the colour's.
+    noise_m_s, noise_z_m_s : float
+        Standard deviation of the propagation, horizontally and vertically, for a second's step; a frame's is its share. Canton's is
+        proportional to the largest variation of the centroid.
+    drift : float
+        Share of the person's velocity with which the particles move.
+    sharpness : float
+        Power of the weights.
+    blocking : float
+        Sharpness of the exclusion zones: ``k`` of Eq. 4.13 is this over the square of a person's radius; 0: there are none.
+    keep_histogram : float
+        Canton's alpha of Eq. 4.11.
+    following : FollowingSettings
+    """
+
+    particles: int = 200
+    color: bool = True
+    raw_share: float = 0.8
+    noise_m_s: float = 1.0
+    noise_z_m_s: float = 0.3
+    drift: float = 1.0
+    sharpness: float = 20.0
+    blocking: float = 1.0
+    keep_histogram: float = 0.9
+    following: FollowingSettings = field(default_factory=FollowingSettings)
+
+    def __post_init__(self) -> None:
+        if self.particles < 1:
+            raise InputError(f"`particles` must be 1 or more; got {self.particles}")
+
+
+def step(
+    rng: np.random.Generator, state: TrackerState, frame: int, observation: Observation | None, settings: ParticleSettings | None = None
+) -> tuple[TrackerState, StepInfo]:
+    """One frame on.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    state : TrackerState
+    frame, observation
+        As for `hmc.tracking.following.advance`; for colours the observation's views hold the images.
+    settings : ParticleSettings, optional
+
+    Returns
+    -------
+    state : TrackerState
+    info : StepInfo
+    """
+    settings = ParticleSettings() if settings is None else settings
+
+    def follow(state: TrackerState, predicted: np.ndarray, observation: Observation) -> Filtered:
+        return _filter(rng, state, predicted, observation, settings)
+
+    return advance(state, frame, observation, settings.following, follow)
+
+
+def overlap(voxels: np.ndarray, centres: np.ndarray, radii: np.ndarray, origin: np.ndarray, voxel_size_m: float) -> np.ndarray:
+    """Share of each ellipsoid's voxels that are occupied (Canton, Eq. 4.9).
+
+    Sums along z turn each ellipsoid into columns of two look-ups. A voxel belongs to an ellipsoid when its centre is in it.
+
+    Parameters
+    ----------
+    voxels : ndarray of int, shape (m, 3)
+        The occupied voxels, no two the same; indices that are not negative.
+    centres, radii : ndarray, shape (n, 3)
+        World, metres.
+    origin : ndarray, shape (3,)
+        Lowest corner of voxel (0, 0, 0).
+    voxel_size_m : float
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        0 to 1; 0 for an ellipsoid without a voxel.
+    """
+    middle = (centres - origin) / voxel_size_m - 0.5  # in voxels, from the centre of voxel (0, 0, 0)
+    size = np.asarray(radii, float) / voxel_size_m
+    half = int(np.ceil(size[:, :2].max())) + 1
+    side = np.arange(-half, half + 1)
+    first = np.floor(middle[:, :2]).astype(np.int64)
+    low = np.append(first.min(axis=0) - half, 0)
+    shape = np.append(first.max(axis=0) + half + 1, voxels[:, 2].max(initial=0) + 1) - low
+    moved = voxels - low
+    moved = moved[((moved >= 0) & (moved < shape)).all(axis=1)]
+    below = np.zeros(shape + (0, 0, 1), np.int32)  # occupied voxels of a column below each height
+    below[tuple((moved + (0, 0, 1)).T)] = 1
+    np.cumsum(below, axis=2, out=below)
+
+    cells = first[:, None] + side[:, None]  # (n, side, 2)
+    aside = ((cells - middle[:, None, :2]) / size[:, None, :2]) ** 2
+    inside = 1 - aside[:, :, None, 0] - aside[:, None, :, 1]
+    reach = size[:, 2, None, None] * np.sqrt(np.maximum(inside, 0))
+    height = middle[:, 2, None, None]
+    start, end = np.ceil(height - reach), np.floor(height + reach) + 1
+    full = np.where(inside >= 0, end - start, 0).sum(axis=(1, 2))
+    moved_cells = cells - low[:2]
+    column = (moved_cells[:, :, None, 0] * shape[1] + moved_cells[:, None, :, 1]) * (shape[2] + 1)
+    ends = [below.ravel().take(column + np.clip(at, 0, shape[2]).astype(np.int64)) for at in (start, end)]
+    held = np.where(inside >= 0, ends[1] - ends[0], 0).sum(axis=(1, 2))
+    return held / np.maximum(full, 1)
+
+
+def color_likelihood(points: np.ndarray, colors: np.ndarray, centres: np.ndarray, radii: np.ndarray, reference: np.ndarray) -> np.ndarray:
+    """Bhattacharyya coefficient of the reference histogram and that of the coloured voxels in each ellipsoid (Canton, Eq. 4.10).
+
+    Parameters
+    ----------
+    points : ndarray, shape (m, 3)
+        Centres of the coloured voxels, world, metres.
+    colors : ndarray of int, shape (m,)
+        Their bins.
+    centres, radii : ndarray, shape (n, 3)
+        The ellipsoids.
+    reference : ndarray, shape (n_colors,)
+        Sums to 1.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        0 where an ellipsoid holds no coloured voxel.
+    """
+    if len(points) == 0:
+        return np.zeros(len(centres))
+    order = np.argsort(colors, kind="stable")
+    bins, starts = np.unique(colors[order], return_index=True)
+    middle = centres.mean(axis=0)
+    at, to, scale = points[order] - middle, centres - middle, 1 / np.asarray(radii, float) ** 2
+    distance = (scale @ (at**2).T) - 2 * (to * scale) @ at.T + (to**2 * scale).sum(axis=1, keepdims=True)
+    counts = np.add.reduceat(distance <= 1, starts, axis=1, dtype=np.int64)
+    return (np.sqrt(counts) @ np.sqrt(reference[bins])) / np.sqrt(np.maximum(counts.sum(axis=1), 1))
+
+
+def _filter(
+    rng: np.random.Generator, state: TrackerState, predicted: np.ndarray, observation: Observation, settings: ParticleSettings
+) -> Filtered:
+    """Move everybody's particles by one frame."""
+    last = np.array([track.position for track in state.tracks]).reshape(-1, 3)
+    centres = last + settings.drift * (predicted - last)
+    sd = np.array([settings.noise_m_s, settings.noise_m_s, settings.noise_z_m_s]) / state.fps
+    reach = 2 * PERSON_RADIUS_M + 2 * sd[0]
+    around = look_around(observation, centres, reach, settings.following.least_certain_m3, settings.color)
+    positions, moved = centres.copy(), []
+    for k, cloud in enumerate(state.clouds):
+        begun = len(cloud.points) > 0
+        particles = cloud.points[systematic(rng, cloud.weights, settings.particles)] + centres[k] - last[k] if begun else centres[k]
+        particles = particles + rng.normal(size=(settings.particles, 3)) * sd
+        particles[:, 2] = np.maximum(particles[:, 2], LEAST_HEIGHT_M)
+        radii = np.column_stack([np.full((len(particles), 2), PERSON_RADIUS_M), particles[:, 2]])
+        rows = around.rows[k]
+        weights = overlap(observation.indices[rows], particles, radii, observation.room[0], observation.voxel_size_m)
+        if settings.color and cloud.histogram.size:
+            colored = rows[around.colors[rows] >= 0]
+            like = color_likelihood(observation.points[colored], around.colors[colored], particles, radii, cloud.histogram)
+            weights = settings.raw_share * weights + (1 - settings.raw_share) * like
+        weights = weights * blocking(particles, np.delete(centres, k, axis=0), settings.blocking / PERSON_RADIUS_M**2)
+        best = weights.max()
+        if best <= 0:
+            moved.append((np.zeros((0, 3)), np.zeros(0)))
+            continue
+        weights = (weights / best) ** settings.sharpness
+        moved.append((particles, weights / weights.sum()))
+        positions[k] = moved[k][1] @ particles
+    references = [cloud.histogram for cloud in state.clouds]
+    if settings.color:
+        references = adapted(references, observation, around, positions, settings.keep_histogram)
+    clouds = tuple(Cloud(cloud.person, *pair, reference) for cloud, pair, reference in zip(state.clouds, moved, references, strict=True))
+    return Filtered(positions, np.array([len(cloud.points) > 0 for cloud in clouds], bool), clouds, around.color_s)

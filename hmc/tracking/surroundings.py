@@ -1,0 +1,126 @@
+"""What the particle filter and Sparse Sampling ask of the room around each person.
+
+Source: Canton (2009), section 4.3.2: exclusion zones (Eq. 4.12 and 4.13) and the reference histogram's voxels (Eq. 4.11).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from time import perf_counter
+
+import numpy as np
+
+from hmc.tracking.appearance import adapt, color_surface, histogram
+from hmc.tracking.blobs import Observation
+from hmc.tracking.region import person_radii, region_distance
+
+__all__ = ["Surroundings", "adapted", "blocking", "look_around"]
+
+#: Colour of a voxel inside the hull, and of a surface voxel that no camera sees.
+INNER, UNSEEN = -2, -1
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """The voxels near each person.
+
+    Attributes
+    ----------
+    rows : tuple of ndarray of int
+        The observation's voxels near each person: those of the strict hull where it has enough of them, else all.
+    colors : ndarray of int, shape (n,)
+        Of every voxel of the observation: bin of its colour (`hmc.tracking.appearance.color_bins`), `UNSEEN` or `INNER`. All are
+        `INNER` where nobody asks for colours.
+    color_s : float
+        Seconds spent on the colours.
+    """
+
+    rows: tuple[np.ndarray, ...]
+    colors: np.ndarray
+    color_s: float = 0.0
+
+
+def look_around(observation: Observation, centres: np.ndarray, reach_m: float, least_certain_m3: float, color: bool) -> Surroundings:
+    """Gather the voxels near each person and, where asked for, colour the surface there and nowhere else.
+
+    Parameters
+    ----------
+    observation : Observation
+    centres : ndarray, shape (k, 3)
+        Where people should be, world, metres.
+    reach_m : float
+        Horizontal distance up to which voxels are near.
+    least_certain_m3 : float
+        Enough of the strict hull.
+    color : bool
+
+    Returns
+    -------
+    Surroundings
+    """
+    rows = []
+    for centre in centres:
+        aside = observation.points[:, :2] - centre[:2]
+        near = np.flatnonzero(np.einsum("nd,nd->n", aside, aside) <= reach_m**2)
+        certain = near[observation.certain[near]]
+        rows.append(certain if len(certain) * observation.voxel_size_m**3 >= least_certain_m3 else near)
+    begun = perf_counter()
+    colors = np.full(len(observation.points), INNER)
+    if color and rows:
+        skin, bins = color_surface(observation, np.unique(np.concatenate(rows)))
+        colors[skin] = bins
+    return Surroundings(tuple(rows), colors, perf_counter() - begun)
+
+
+def blocking(points: np.ndarray, others: np.ndarray, sharpness: float) -> np.ndarray:
+    """How little the other persons' exclusion zones hinder each point (Canton, Eq. 4.12 and 4.13), in the xy plane.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3)
+    others : ndarray, shape (k, 3)
+        The other persons' positions.
+    sharpness : float
+        ``k``, for metres; 0 or less: there are no zones.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Product over the others, 0 to 1.
+    """
+    free = np.ones(len(points))
+    if sharpness > 0:
+        for other in others:
+            aside = points[:, :2] - other[:2]
+            free *= -np.expm1(-sharpness * np.einsum("nd,nd->n", aside, aside))
+    return free
+
+
+def adapted(
+    references: list[np.ndarray], observation: Observation, surroundings: Surroundings, positions: np.ndarray, keep: float
+) -> list[np.ndarray]:
+    """The persons' reference histograms after a frame (Eq. 4.11).
+
+    A coloured voxel counts for the person in whose ellipsoid it lies; one in several ellipsoids counts for nobody, so that people who
+    stand together do not take on one another's colours.
+
+    Parameters
+    ----------
+    references : list of ndarray, shape (n_colors,) or (0,)
+        One a person; empty as long as nothing is known.
+    observation : Observation
+    surroundings : Surroundings
+    positions : ndarray, shape (k, 3)
+        The new estimates.
+    keep : float
+        Share of the old histogram.
+
+    Returns
+    -------
+    list of ndarray
+    """
+    colored = np.flatnonzero(surroundings.colors >= 0)
+    inside = region_distance(observation.points[colored], positions, person_radii(positions, 1.0, 1.0)) <= 1
+    inside &= inside.sum(axis=1, keepdims=True) == 1
+    bins = surroundings.colors[colored]
+    return [adapt(reference, histogram(bins[mine]), keep) for reference, mine in zip(references, inside.T, strict=True)]
