@@ -9,10 +9,14 @@ from hypothesis import strategies as st
 from sklearn.metrics import precision_recall_fscore_support
 from sklearn.tree import DecisionTreeClassifier
 
+from hmc.camera.model import project
 from hmc.errors import InputError
+from hmc.experiments import person_data
+from hmc.experiments.person_data import render_brought_in, training_recipes
 from hmc.files import to_toml
-from hmc.recording import open_recording
+from hmc.recording import background_frames, iterate_frames, open_recording
 from hmc.results import TrackTable, write_tracks
+from hmc.synthetic.recipe import FurnitureRecipe, load_recipe, shipped_recipes
 from hmc.tracking import train_person_tree
 from hmc.tracking.blobs import blob_features, observe
 from hmc.tracking.classifiers import CLASSIFIERS, detection_scores, fit_classifier, fit_tree, frame_groups, plain_tree
@@ -250,3 +254,25 @@ def test_training_from_the_command_line(tmp_path, recording_folder, monkeypatch,
     assert train_person_tree.main([str(recording_folder), "--out", str(out)]) == 0
     assert detection_scores(is_person, predict_person(read_tree(out), features)).f_measure > 0.95
     assert "take_1" in out.read_text().splitlines()[0]
+
+
+def test_what_the_shipped_tree_was_trained_on(tmp_path):
+    recipes = training_recipes()
+    assert len({recipe.name for recipe, _ in recipes}) == len(recipes) >= 14
+    tested = {name for name in shipped_recipes() if not name.startswith("train_")}
+    assert not {recipe.name for recipe, _ in recipes} & tested
+    box = FurnitureRecipe("box", (0.5, 0.5), size_m=(0.6, 0.6, 0.9), colour=(0.1, 0.1, 0.1))
+    small = replace(load_recipe("tiny"), furniture=(box,), seconds=0.1, cell_m=0.03, background_frames=3)
+    folder = render_brought_in(replace(small, rig=replace(small.rig, size_px=(80, 60))), tmp_path / "brought")
+    assert not list(tmp_path.glob(".*"))
+    recording = open_recording(folder)
+    empty = next(background_frames(recording, 0)).astype(float)
+    action = next(iterate_frames(recording)).images[0].astype(float)
+    uv, _ = project(recording.rig[0], np.array([0.5, 0.5, 0.85]))
+    u, v = np.round(uv).astype(int).ravel()
+    assert empty[v, u].mean() - action[v, u].mean() > 30
+
+
+def test_persons_from_data_needs_a_place(tmp_path):
+    (tmp_path / "file").write_text("")
+    assert person_data.main([str(tmp_path / "file"), "--workers", "1"]) == 2

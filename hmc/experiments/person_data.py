@@ -87,6 +87,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, metavar="N", help="processes (default: one a core)")
     args = parser.parse_args(argv)
     try:
+        if args.folder.is_file():
+            raise InputError(f"{args.folder}: is a file; give a folder")
+        if args.workers < 1:
+            raise InputError(f"--workers {args.workers}: must be 1 or more")
         for recipe, brought_in in training_recipes():
             out = args.folder / recipe.name
             if (out / "recording.toml").is_file():

@@ -40,6 +40,8 @@ HIDDEN = (16, 16)
 #: Levels of pruning that cross-validation chooses from, at most, and its folds.
 N_ALPHAS = 40
 N_FOLDS = 5
+#: Least components of the training in a leaf of the tree.
+LEAST_LEAF = 5
 
 
 @dataclass(frozen=True)
@@ -129,7 +131,7 @@ def fit_tree(features: np.ndarray, is_person: np.ndarray, groups: np.ndarray, rn
     n_groups = len(np.unique(groups))
     if n_groups < 2:
         raise InputError("cross-validation needs two groups of frames at least; give a longer recording, or several")
-    grown = DecisionTreeClassifier(criterion="entropy", random_state=_seed(rng))
+    grown = DecisionTreeClassifier(criterion="entropy", min_samples_leaf=LEAST_LEAF, random_state=_seed(rng))
     alphas = grown.cost_complexity_pruning_path(features, is_person).ccp_alphas.clip(min=0)
     alphas = np.unique(np.quantile(alphas, np.linspace(0, 1, N_ALPHAS), method="nearest"))
     folds = list(GroupKFold(min(N_FOLDS, n_groups)).split(features, is_person, groups))
