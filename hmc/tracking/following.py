@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from time import perf_counter
+from time import thread_time
 
 import numpy as np
 
@@ -80,7 +80,7 @@ class StepInfo:
     shared : tuple of int
         Persons whose component holds another person too.
     color_s, filter_s : float
-        Seconds spent on colouring voxels and on saying where the persons are.
+        Processor seconds spent on colouring voxels and on saying where the persons are.
     """
 
     rows: tuple[Row, ...]
@@ -102,7 +102,7 @@ class Filtered:
         Whether the filter saw the person.
     clouds : tuple of Cloud
     color_s : float
-        Seconds spent on colouring voxels.
+        Processor seconds spent on colouring voxels.
     """
 
     positions: np.ndarray
@@ -159,10 +159,10 @@ def advance(
         waiting = tuple(replace(track, last_frame=track.last_frame + 1, velocity=track.velocity * 0.5) for track in state.tracks)
         return replace(state, tracks=waiting), StepInfo((), np.full(0 if observation is None else len(observation.points), -1))
     n, size = len(state.tracks), observation.voxel_size_m
-    begun = perf_counter()
+    begun = thread_time()
     predicted = predict(state.tracks, state.fps)
     filtered = filter(state, predicted, observation) if filter else Filtered(predicted, np.zeros(n, bool), ())
-    filter_s = perf_counter() - begun - filtered.color_s
+    filter_s = thread_time() - begun - filtered.color_s
     positions = filtered.positions
     claimed, shared = assign_voxels(observation, positions, settings)
     owners = find_again(state.tracks, frame, state.fps, observation, claimed, settings)
@@ -170,7 +170,7 @@ def advance(
     best = locating_voxels(observation, owners, n, settings)
     located = blob_features(observation.points, np.where(best, owners, -1), n, size)
     if filter is None:
-        filter_s = perf_counter() - begun
+        filter_s = thread_time() - begun
     certain = blob_features(observation.points, np.where(observation.certain, owners, -1), n, size)
     supported = still_a_person(owned, certain, state.tracks, settings.lifecycle)
     # Of a person who was found again elsewhere, the filter knows nothing.

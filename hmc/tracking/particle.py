@@ -192,7 +192,8 @@ def _filter(
             colored = rows[around.colors[rows] >= 0]
             like = color_likelihood(observation.points[colored], around.colors[colored], particles, radii, cloud.histogram)
             weights = settings.raw_share * weights + (1 - settings.raw_share) * like
-        weights = weights * blocking(particles, np.delete(centres, k, axis=0), settings.blocking / PERSON_RADIUS_M**2)
+        zones = blocking(*particles.T[:2], np.full(len(particles), k), centres, settings.blocking / PERSON_RADIUS_M**2)
+        weights = weights * zones
         best = weights.max()
         if best <= 0:
             moved.append((np.zeros((0, 3)), np.zeros(0)))

@@ -55,5 +55,4 @@ def region_distance(points: np.ndarray, centres: np.ndarray, radii: np.ndarray) 
         Square of the distance in units of the ellipsoid's radius.
     """
     points, centres, radii = (np.asarray(a, float) for a in (points, centres, radii))
-    scaled = (points[:, None, :] - centres[None]) / radii[None]
-    return np.einsum("nkd,nkd->nk", scaled, scaled)
+    return sum((((points[:, d, None] - centres[:, d]) / radii[:, d]) ** 2 for d in range(3)), np.zeros((len(points), len(centres))))

@@ -24,10 +24,14 @@ __all__ = ["SparseSettings", "finish", "init", "neighbourhood_counts", "pseudo_l
 
 #: Bits that each of the three counts of a neighbourhood has.
 COUNT_BITS = 10
+#: What a coloured voxel counts beside its occupancy: of another's colours, and of the person's.
+CODES = np.array([1 << COUNT_BITS, (1 << COUNT_BITS) + (1 << 2 * COUNT_BITS)], np.int32)
 #: Times that samples which fell on the same voxels may look for others.
 ROUNDS = 6
 #: The 26 neighbours of a voxel.
-ADJACENT = np.array([step for step in np.ndindex(3, 3, 3) if step != (1, 1, 1)]) - 1
+ADJACENT = np.random.default_rng(0).permutation([step for step in np.ndindex(3, 3, 3) if step != (1, 1, 1)]) - 1
+#: The orders in which they are tried: the same round from each of them on.
+TURNS = (np.arange(26)[:, None] + np.arange(26)) % 26
 
 
 @dataclass(frozen=True)
@@ -111,16 +115,22 @@ def step(
     return advance(state, frame, observation, settings.following, follow)
 
 
-def neighbourhood_counts(voxels: np.ndarray, codes: np.ndarray, samples: np.ndarray, radius: int) -> tuple[np.ndarray, np.ndarray]:
-    """Sum of the voxels' codes in the cube around each sample, and the code of the sample's own voxel.
+def neighbourhood_counts(
+    voxels: np.ndarray, codes: np.ndarray, voxel_person: np.ndarray, samples: np.ndarray, person: np.ndarray, radius: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Sum of the codes of a person's voxels in the cube around each of that person's samples, and the code of the sample's own voxel.
 
     Parameters
     ----------
     voxels : ndarray of int, shape (m, 3)
-        No two the same.
+        A person has no two the same.
     codes : ndarray of int, shape (m,)
+    voxel_person : ndarray of int, shape (m,)
+        Whose each voxel is.
     samples : ndarray of int, shape (n, 3)
         Voxels, occupied or not; at least one.
+    person : ndarray of int, shape (n,)
+        Whose each sample is, ascending.
     radius : int
         The cube has ``2 radius + 1`` voxels a side.
 
@@ -129,78 +139,69 @@ def neighbourhood_counts(voxels: np.ndarray, codes: np.ndarray, samples: np.ndar
     sums, own : ndarray of int32, shape (n,)
         0 where nothing is occupied.
     """
-    low = samples.min(axis=0) - radius
-    shape = samples.max(axis=0) - low + (radius + 1)
-    strides = np.array([shape[1] * shape[2], shape[2], 1])
-    moved = voxels - low
-    inside = np.flatnonzero(((moved >= 0) & (moved < shape)).all(axis=1))
-    volume = np.zeros(int(shape.prod()), np.int32)
-    volume[moved[inside] @ strides] = codes[inside]
+    low, shape = _boxes(samples, person, radius)
+    x, y, z = voxels.T - low[:, np.minimum(voxel_person, low.shape[1] - 1)]
+    inside = (x >= 0) & (x < shape[1]) & (y >= 0) & (y < shape[2]) & (z >= 0) & (z < shape[3]) & (voxel_person < shape[0])
+    volume = np.zeros(int(np.prod(shape)), np.int32)
+    volume[_flat(voxel_person, x, y, z, shape)[inside]] = codes[inside]
     runs = volume[: len(volume) - 2 * radius].copy()  # sums along z from each voxel on
     for ahead in range(1, 2 * radius + 1):
         runs += volume[ahead : len(volume) - 2 * radius + ahead]
     side = np.arange(-radius, radius + 1)
-    columns = (side[:, None] * strides[0] + side * strides[1]).ravel() - radius
-    places = (samples - low) @ strides
-    return runs.take(places[:, None] + columns).sum(axis=1, dtype=np.int32), volume.take(places)
+    columns = ((side[:, None] * shape[2] + side) * shape[3]).ravel() - radius
+    places = _flat(person, *(samples.T - low[:, person]), shape)
+    return runs.take(columns[:, None] + places).sum(axis=0, dtype=np.int32), volume.take(places)
 
 
-def pseudo_likelihood(
-    samples: np.ndarray, voxels: np.ndarray, colors: np.ndarray, similar: np.ndarray | None, settings: SparseSettings
-) -> np.ndarray:
-    """How likely each sample is part of the person's surface (Canton, Eq. 4.19-4.21).
+def pseudo_likelihood(counts: np.ndarray, own: np.ndarray, settings: SparseSettings, colored: bool = True) -> np.ndarray:
+    """How likely each sample is part of its person's surface (Canton, Eq. 4.19-4.21).
 
     Parameters
     ----------
-    samples : ndarray of int, shape (n, 3)
-    voxels : ndarray of int, shape (m, 3)
-        The occupied voxels.
-    colors : ndarray of int, shape (m,)
-        Bins of their colours; negative where there is none.
-    similar : ndarray of bool, shape (n_colors,), optional
-        The person's colours; where left out, colours do not count.
+    counts : ndarray of int, shape (n,)
+        In the neighbourhood: occupied voxels, plus the coloured ones times ``2**10``, plus those of the person's colours times ``2**20``.
+    own : ndarray of int, shape (n,)
+        Whether the sample's own voxel is occupied.
     settings : SparseSettings
         Of which the raw share, the radius and whether samples must be solid count.
+    colored : bool or ndarray of bool, shape (n,)
+        Whether colours count.
 
     Returns
     -------
     ndarray, shape (n,)
         0 to 1.
     """
-    codes = np.ones(len(voxels), np.int32)
-    if similar is not None:
-        colored = np.flatnonzero(colors >= 0)
-        codes[colored] += (1 << COUNT_BITS) + (similar[colors[colored]].astype(np.int32) << 2 * COUNT_BITS)
-    counts, own = neighbourhood_counts(voxels, codes, samples, settings.radius)
     field = (1 << COUNT_BITS) - 1
-    raw = 1 - np.abs(2 * (counts & field) / (2 * settings.radius + 1) ** 3 - 1)
-    likelihood = raw
-    if similar is not None:
+    likelihood = 1 - np.abs((counts & field) * (2 / (2 * settings.radius + 1) ** 3) - 1)
+    if np.any(colored):
         like = (counts >> 2 * COUNT_BITS) / np.maximum(counts >> COUNT_BITS & field, 1)
-        likelihood = settings.raw_share * raw + (1 - settings.raw_share) * like
+        likelihood = np.where(colored, settings.raw_share * likelihood + (1 - settings.raw_share) * like, likelihood)
     return likelihood * (own > 0) if settings.solid else likelihood
 
 
-def spread_out(rng: np.random.Generator, samples: np.ndarray) -> np.ndarray:
-    """Let no two samples share a voxel: of those that do, one stays, the others look for a free one beside it or are dismissed.
+def spread_out(rng: np.random.Generator, samples: np.ndarray, person: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Let no two samples of a person share a voxel: of those that do, one stays, the others look for a free one beside it or are dismissed.
 
     Parameters
     ----------
     rng : numpy.random.Generator
     samples : ndarray of int, shape (n, 3)
+        At least one.
+    person : ndarray of int, shape (n,)
+        Whose each is, ascending.
 
     Returns
     -------
-    ndarray of int, shape (m, 3)
-        At most n, all different.
+    samples : ndarray of int, shape (m, 3)
+        At most n.
+    person : ndarray of int, shape (m,)
     """
-    low = samples.min(axis=0) - 1
-    shape = samples.max(axis=0) - low + 2
-    strides = np.array([shape[1] * shape[2], shape[2], 1])
-    around = ADJACENT @ strides
-    wanted = (samples - low) @ strides
-    home, waiting = wanted, np.arange(len(samples))
-    holder = np.full(int(shape.prod()), -1)  # the sample in each voxel
+    low, shape = _boxes(samples, person, 1)
+    home = _flat(person, *(samples.T - low[:, person]), shape)
+    around = (ADJACENT[:, 0] * shape[2] + ADJACENT[:, 1]) * shape[3] + ADJACENT[:, 2]
+    wanted, waiting = home, np.arange(len(samples), dtype=np.int32)
+    holder = np.full(int(np.prod(shape)), -1, np.int32)  # the sample in each voxel
     place = np.full(len(samples), -1)
     for _ in range(ROUNDS):
         empty = holder[wanted] < 0
@@ -208,71 +209,114 @@ def spread_out(rng: np.random.Generator, samples: np.ndarray) -> np.ndarray:
         held = holder[wanted] == waiting
         place[waiting[held]] = wanted[held]
         waiting = waiting[~held]
-        beside = home[waiting, None] + around
-        chance = rng.random(beside.shape, np.float32)
-        chance[holder[beside] >= 0] = 0
-        best = chance.argmax(axis=1)
-        hopeful = chance[np.arange(len(waiting)), best] > 0
-        waiting, wanted = waiting[hopeful], beside[hopeful, best[hopeful]]
         if waiting.size == 0:
             break
-    place = place[place >= 0]
-    return np.stack(np.unravel_index(place, tuple(shape)), axis=-1) + low
+        # The first free neighbour in an order that begins anywhere.
+        beside = home[waiting, None] + around[TURNS[rng.integers(len(ADJACENT), size=waiting.size)]]
+        free = holder[beside] < 0
+        best = free.argmax(axis=1)
+        hopeful = free[np.arange(waiting.size), best]
+        waiting, wanted = waiting[hopeful], beside[hopeful, best[hopeful]]
+    kept = np.flatnonzero(place >= 0)
+    rest, z = np.divmod(place[kept], shape[3])
+    rest, y = np.divmod(rest, shape[2])
+    return (np.stack([rest % shape[1], y, z]) + low[:, person[kept]]).T, person[kept]
+
+
+def _boxes(samples: np.ndarray, person: np.ndarray, margin: int) -> tuple[np.ndarray, tuple[int, int, int, int]]:
+    """Lowest corners (3, k) of equal boxes around each person's samples, and the shape (k, nx, ny, nz) of all."""
+    starts = np.searchsorted(person, np.arange(int(person[-1]) + 1))
+    low = np.minimum.reduceat(samples, np.minimum(starts, len(samples) - 1), axis=0)
+    high = np.maximum.reduceat(samples, np.minimum(starts, len(samples) - 1), axis=0)
+    nx, ny, nz = ((high - low).max(axis=0) + (2 * margin + 1)).tolist()
+    return (low - margin).T, (len(starts), nx, ny, nz)
+
+
+def _flat(person: np.ndarray, x: np.ndarray, y: np.ndarray, z: np.ndarray, shape: tuple[int, int, int, int]) -> np.ndarray:
+    """Where voxels of the persons' boxes are in the flat array of all boxes."""
+    return ((person * shape[1] + x) * shape[2] + y) * shape[3] + z
 
 
 def _filter(
     rng: np.random.Generator, state: TrackerState, predicted: np.ndarray, observation: Observation, settings: SparseSettings
 ) -> Filtered:
     """Move everybody's samples by one frame."""
-    size = observation.voxel_size_m
+    n, size, origin = len(state.tracks), observation.voxel_size_m, observation.room[0]
     last = np.array([track.position for track in state.tracks]).reshape(-1, 3)
     centres = last + settings.drift * (predicted - last)
     reach = settings.reach_m + settings.radius * size
     around = look_around(observation, centres, reach, settings.following.least_certain_m3, settings.color)
-    positions, moved = centres.copy(), []
-    for k, cloud in enumerate(state.clouds):
-        samples = _propagate(rng, cloud, np.rint((centres[k] - last[k]) / size), observation, around.rows[k], settings)
-        weights = _weigh(samples, k, cloud.histogram, centres, observation, around, settings)
+    samples, person = _propagate(rng, state.clouds, np.rint((centres - last) / size), observation, around, settings)
+    weights = np.zeros(0)
+    if len(samples):
+        weights = _likelihood(samples, person, state.clouds, observation, around, settings)
+        x, y = (origin[:2] + size * (samples[:, :2] + 0.5)).T
+        weights *= (x - centres[person, 0]) ** 2 + (y - centres[person, 1]) ** 2 <= settings.reach_m**2
+        weights *= blocking(x, y, person, centres, settings.blocking / PERSON_RADIUS_M**2)
         good = weights > 0
-        moved.append((samples[good], weights[good] / max(weights.sum(), 1e-300)))
-        if good.any():
-            positions[k] = observation.room[0] + size * (moved[k][1] @ moved[k][0] + 0.5)
+        samples, person, weights = samples[good], person[good], weights[good]
+    total = np.bincount(person, weights, n)
+    seen = total > 0
+    weights = weights / total[person]
+    mean = np.stack([np.bincount(person, weights * column, n) for column in samples.T], axis=1)
+    positions = np.where(seen[:, None], origin + size * (mean + 0.5), centres)
     references = [cloud.histogram for cloud in state.clouds]
     if settings.color:
         references = adapted(references, observation, around, positions, settings.keep_histogram)
-    clouds = tuple(Cloud(cloud.person, *pair, reference) for cloud, pair, reference in zip(state.clouds, moved, references, strict=True))
-    return Filtered(positions, np.array([len(cloud.points) > 0 for cloud in clouds], bool), clouds, around.color_s)
+    parts = np.split(np.arange(len(samples)), np.cumsum(np.bincount(person, minlength=n))[:-1]) if n else []
+    clouds = tuple(
+        Cloud(cloud.person, samples[part], weights[part], reference)
+        for cloud, part, reference in zip(state.clouds, parts, references, strict=True)
+    )
+    return Filtered(positions, seen, clouds, around.color_s)
 
 
 def _propagate(
-    rng: np.random.Generator, cloud: Cloud, drift: np.ndarray, observation: Observation, rows: np.ndarray, settings: SparseSettings
-) -> np.ndarray:
-    """Samples in this frame, (n, 3) int: the last ones resampled and moved, or voxels of the hull where there are none."""
-    if len(cloud.points) == 0:
-        return observation.indices[rng.permutation(rows)[: settings.samples]]
-    n_scouts = round(settings.scouts * settings.samples)
-    kept = systematic(rng, cloud.weights, settings.samples - n_scouts)
+    rng: np.random.Generator,
+    clouds: tuple[Cloud, ...],
+    drift: np.ndarray,
+    observation: Observation,
+    around: Surroundings,
+    settings: SparseSettings,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Samples in this frame, (n, 3) int, and whose they are: the last ones resampled and moved, and voxels of the hull drawn anew."""
     most = max(1, round(settings.noise_m / observation.voxel_size_m))
-    noise = rng.integers(-most, most, (len(kept), 3), endpoint=True)
-    scouts = observation.indices[rng.permutation(rows)[:n_scouts]]
-    return spread_out(rng, np.concatenate([cloud.points[kept].astype(np.int64) + drift.astype(np.int64) + noise, scouts]))
+    parts = []
+    for k, (cloud, rows) in enumerate(zip(clouds, around.rows, strict=True)):
+        n_scouts = round(settings.scouts * settings.samples) if len(cloud.points) else settings.samples
+        if n_scouts < settings.samples:
+            kept = cloud.points[systematic(rng, cloud.weights, settings.samples - n_scouts)].astype(np.int64)
+            parts.append((k, kept + drift[k].astype(np.int64) + rng.integers(-most, most, kept.shape, endpoint=True)))
+        parts.append((k, observation.indices[_draw(rng, rows, n_scouts)]))
+    samples = np.concatenate([part for _, part in parts]) if parts else np.zeros((0, 3), np.int64)
+    person = np.repeat([k for k, _ in parts], [len(part) for _, part in parts]).astype(np.int64)
+    return spread_out(rng, samples, person) if len(samples) else (samples, person)
 
 
-def _weigh(
+def _draw(rng: np.random.Generator, rows: np.ndarray, n: int) -> np.ndarray:
+    """At most `n` of the rows, hardly any twice, one from each of n equal stretches: neighbours lie close in the list."""
+    n = min(n, len(rows))
+    return rows[((np.arange(n) + rng.random(n)) * (len(rows) / max(n, 1))).astype(np.int64)]
+
+
+def _likelihood(
     samples: np.ndarray,
-    k: int,
-    reference: np.ndarray,
-    centres: np.ndarray,
+    person: np.ndarray,
+    clouds: tuple[Cloud, ...],
     observation: Observation,
     around: Surroundings,
     settings: SparseSettings,
 ) -> np.ndarray:
-    """Weights of one person's samples, shape (n,): pseudo-likelihood, distance rule, exclusion zones."""
-    if len(samples) == 0:
-        return np.zeros(0)
-    rows = around.rows[k]
-    similar = similar_colors(reference, settings.similar_share) if settings.color and reference.size else None
-    weights = pseudo_likelihood(samples, observation.indices[rows], around.colors[rows], similar, settings)
-    places = observation.room[0] + observation.voxel_size_m * (samples + 0.5)
-    weights *= np.hypot(*(places - centres[k])[:, :2].T) <= settings.reach_m
-    return weights * blocking(places, np.delete(centres, k, axis=0), settings.blocking / PERSON_RADIUS_M**2)
+    """Pseudo-likelihood of everybody's samples, shape (n,)."""
+    rows = np.concatenate(around.rows)
+    codes = np.ones(len(rows), np.int32)
+    known = np.array([settings.color and cloud.histogram.size > 0 for cloud in clouds])
+    ends = np.cumsum([len(mine) for mine in around.rows])
+    for cloud, mine, end in zip(clouds, around.rows, ends, strict=True):
+        if settings.color and cloud.histogram.size:
+            colors = around.colors[mine]
+            similar = similar_colors(cloud.histogram, settings.similar_share)
+            codes[end - len(mine) : end] += np.where(colors >= 0, CODES[similar[colors].astype(np.int8)], 0)
+    whose = np.repeat(np.arange(len(clouds)), [len(mine) for mine in around.rows])
+    counts, own = neighbourhood_counts(observation.indices[rows], codes, whose, samples, person, settings.radius)
+    return pseudo_likelihood(counts, own, settings, known[person])

@@ -6,7 +6,7 @@ Source: Canton (2009), section 4.3.2: exclusion zones (Eq. 4.12 and 4.13) and th
 from __future__ import annotations
 
 from dataclasses import dataclass
-from time import perf_counter
+from time import thread_time
 
 import numpy as np
 
@@ -32,7 +32,7 @@ class Surroundings:
         Of every voxel of the observation: bin of its colour (`hmc.tracking.appearance.color_bins`), `UNSEEN` or `INNER`. All are
         `INNER` where nobody asks for colours.
     color_s : float
-        Seconds spent on the colours.
+        Processor seconds spent on the colours.
     """
 
     rows: tuple[np.ndarray, ...]
@@ -59,27 +59,32 @@ def look_around(observation: Observation, centres: np.ndarray, reach_m: float, l
     Surroundings
     """
     rows = []
+    x, y = observation.points[:, 0].copy(), observation.points[:, 1].copy()
     for centre in centres:
-        aside = observation.points[:, :2] - centre[:2]
-        near = np.flatnonzero(np.einsum("nd,nd->n", aside, aside) <= reach_m**2)
+        near = np.flatnonzero((x - centre[0]) ** 2 + (y - centre[1]) ** 2 <= reach_m**2)
         certain = near[observation.certain[near]]
         rows.append(certain if len(certain) * observation.voxel_size_m**3 >= least_certain_m3 else near)
-    begun = perf_counter()
+    begun = thread_time()
     colors = np.full(len(observation.points), INNER)
     if color and rows:
-        skin, bins = color_surface(observation, np.unique(np.concatenate(rows)))
+        asked = np.zeros(len(observation.points), bool)
+        asked[np.concatenate(rows)] = True
+        skin, bins = color_surface(observation, np.flatnonzero(asked))
         colors[skin] = bins
-    return Surroundings(tuple(rows), colors, perf_counter() - begun)
+    return Surroundings(tuple(rows), colors, thread_time() - begun)
 
 
-def blocking(points: np.ndarray, others: np.ndarray, sharpness: float) -> np.ndarray:
+def blocking(x: np.ndarray, y: np.ndarray, person: np.ndarray, centres: np.ndarray, sharpness: float) -> np.ndarray:
     """How little the other persons' exclusion zones hinder each point (Canton, Eq. 4.12 and 4.13), in the xy plane.
 
     Parameters
     ----------
-    points : ndarray, shape (n, 3)
-    others : ndarray, shape (k, 3)
-        The other persons' positions.
+    x, y : ndarray, shape (n,)
+        Points, world, metres.
+    person : ndarray of int, shape (n,)
+        Whose each point is: a row of `centres`.
+    centres : ndarray, shape (k, 3)
+        Everybody's position.
     sharpness : float
         ``k``, for metres; 0 or less: there are no zones.
 
@@ -88,11 +93,11 @@ def blocking(points: np.ndarray, others: np.ndarray, sharpness: float) -> np.nda
     ndarray, shape (n,)
         Product over the others, 0 to 1.
     """
-    free = np.ones(len(points))
-    if sharpness > 0:
-        for other in others:
-            aside = points[:, :2] - other[:2]
-            free *= -np.expm1(-sharpness * np.einsum("nd,nd->n", aside, aside))
+    free = np.ones(len(x))
+    if sharpness > 0 and len(centres) > 1:
+        for k, centre in enumerate(centres):
+            zone = -np.expm1(-sharpness * ((x - centre[0]) ** 2 + (y - centre[1]) ** 2))
+            free *= np.where(person == k, 1.0, zone)
     return free
 
 
