@@ -1,4 +1,4 @@
-"""Motions on planted feet: standing, boxing, gestures, throwing and catching, sitting down, picking up."""
+"""Motions on planted feet: standing, boxing, gestures, throwing and catching, sitting down, picking up, a hug."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 from hmc.synthetic.motions import Feet, Motion, Upper, arms_by_angles, arms_by_hands, assemble, keyframes, pelvis_height, roll_foot
 from hmc.synthetic.skeleton import Skeleton
 
-__all__ = ["box", "gesture", "pick_up", "sit", "stand", "throw_catch"]
+__all__ = ["box", "gesture", "hug", "pick_up", "sit", "stand", "throw_catch"]
 
 
 def stand(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator) -> Motion:
@@ -203,6 +203,24 @@ def pick_up(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator) -> 
     hands = np.stack([np.stack([x, y, z], axis=-1), np.stack([x, -y, z], axis=-1)], axis=1)
     root = np.column_stack([-back, np.zeros(n), skeleton.hip_height - drop])
     return assemble(skeleton, root, upper, feet, arms_by_hands(skeleton, hands, frame="world", elbow_out=0.6))
+
+
+def hug(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator) -> Motion:
+    """Hold somebody who stands .4 m ahead: arms round them, chest leant forwards."""
+    n = len(times)
+    feet = _planted(skeleton, n, [(0.05, 0.11, 6), (-0.05, -0.11, -6)])
+    sway = 0.02 * np.stack([_sway(times, rng, 1.0, 1.5) for _ in range(2)], axis=-1)
+    high = rng.choice([-1.0, 1.0])  # one arm over the other's shoulder, one below
+    hands = np.array([[0.72, -0.32, 0.05 + 0.12 * high], [0.72, 0.32, 0.05 - 0.12 * high]])
+    upper = _upper(
+        n,
+        pelvis=_columns(n, pitch=0.06),
+        abdomen=_columns(n, pitch=0.06),
+        chest=_columns(n, pitch=0.05 + sway[:, 0]),
+        head=_columns(n, pitch=-0.1, yaw=0.5 * high),
+    )
+    arms = arms_by_hands(skeleton, np.tile(hands, (n, 1, 1)), elbow_out=1.2)
+    return _on_feet(skeleton, times, feet, upper, arms, sway, np.full(n, 0.004))
 
 
 def _planted(skeleton: Skeleton, n: int, prints) -> Feet:

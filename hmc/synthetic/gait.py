@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Callable
+
 import numpy as np
 
 from hmc.synthetic.motions import Feet, Motion, Upper, arms_by_angles, assemble, keyframes, pelvis_height, roll_foot
 from hmc.synthetic.skeleton import Skeleton
 
-__all__ = ["jog", "walk"]
+__all__ = ["jog", "walk", "walk_along"]
+
+#: Place (..., 2), metres, and heading (...), radians, after a distance (...) along the way; it goes on before its start and after its end.
+Way = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
 def walk(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator, speed_m_s: float = 1.25, turn_radius_m: float = 0.0) -> Motion:
@@ -31,13 +37,44 @@ def walk(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator, speed_
         From the origin, facing X.
     """
     stride = skeleton.height_m * (0.50 + 0.215 * speed_m_s) * rng.normal(1, 0.02)
-    return _gait(skeleton, times, rng, speed_m_s, turn_radius_m, stride, stance=0.62, bounce=0.0)
+    way = functools.partial(_path, radius=turn_radius_m)
+    return _gait(skeleton, times, rng, speed_m_s * times, speed_m_s, way, stride, stance=0.62, bounce=0.0)
 
 
 def jog(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator, speed_m_s: float = 2.2, turn_radius_m: float = 0.0) -> Motion:
     """Jog, with a phase of flight; arguments as for `walk`."""
     stride = skeleton.height_m * (0.50 + 0.30 * speed_m_s) * rng.normal(1, 0.02)
-    return _gait(skeleton, times, rng, speed_m_s, turn_radius_m, stride, stance=0.38, bounce=0.03)
+    way = functools.partial(_path, radius=turn_radius_m)
+    return _gait(skeleton, times, rng, speed_m_s * times, speed_m_s, way, stride, stance=0.38, bounce=0.03)
+
+
+def walk_along(
+    skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator, distance: np.ndarray, way: Way, speed_m_s: float, stride_m: float = 0.0
+) -> Motion:
+    """Walk on any way at any pace.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    times : ndarray, shape (n,)
+        Seconds.
+    rng : Generator
+    distance : ndarray, shape (n,)
+        Gone at each time, metres; never falling.
+    way : callable
+        ``way(distance) -> (place, heading)``, (n, 2) and (n,).
+    speed_m_s : float
+        To which swing and stride fit.
+    stride_m : float
+        Length of two steps; 0 takes the walk's own.
+
+    Returns
+    -------
+    Motion
+        In the coordinates of the way.
+    """
+    stride = stride_m or skeleton.height_m * (0.50 + 0.215 * speed_m_s) * rng.normal(1, 0.02)
+    return _gait(skeleton, times, rng, distance, speed_m_s, way, stride, stance=0.62, bounce=0.0)
 
 
 def _path(distance: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray]:
@@ -52,20 +89,22 @@ def _gait(
     skeleton: Skeleton,
     times: np.ndarray,
     rng: np.random.Generator,
+    distance: np.ndarray,
     speed: float,
-    radius: float,
+    way: Way,
     stride: float,
     stance: float,
     bounce: float,
 ) -> Motion:
     running = bounce > 0
-    cycles = times * speed / stride + rng.uniform(0, 1)  # of the left foot; the right is half a cycle later
-    origin = cycles[0] * stride
+    phase = rng.uniform(0, 1)
+    cycles = distance / stride + phase  # of the left foot; the right is half a cycle later
+    origin = phase * stride
     width = skeleton.height_m * (0.025 if running else 0.045)
-    feet = _feet(skeleton, cycles, stride, stance, width, radius, origin, running)
+    feet = _feet(skeleton, cycles, stride, stance, width, way, origin, running)
     sway = np.sin(2 * np.pi * cycles)
     twist = np.cos(2 * np.pi * cycles)
-    middle, heading = _path(cycles * stride - origin, radius)
+    middle, heading = way(cycles * stride - origin)
     left = np.stack([-np.sin(heading), np.cos(heading)], axis=-1)
     middle = middle + 0.016 * sway[:, None] * left
     zero = np.zeros_like(times)
@@ -104,7 +143,7 @@ _RUN_PITCH = ((0.0, 6), (0.05, 0), (0.16, 0), (0.28, -20), (0.38, -60), (0.52, -
 
 
 def _feet(
-    skeleton: Skeleton, cycles: np.ndarray, stride: float, stance: float, width: float, radius: float, origin: float, running: bool
+    skeleton: Skeleton, cycles: np.ndarray, stride: float, stance: float, width: float, way: Way, origin: float, running: bool
 ) -> Feet:
     """Feet that stay where they are put while they bear weight, and swing on to the next footprint."""
     curve = np.array(_RUN_PITCH if running else _WALK_PITCH, float)
@@ -118,7 +157,7 @@ def _feet(
 
         def print_of(k: np.ndarray, s: int = s, offset: float = offset) -> tuple[np.ndarray, np.ndarray]:
             # The body passes over the foot a little before the middle of stance.
-            centre, heading = _path((k + offset + 0.40 * stance) * stride - origin, radius)
+            centre, heading = way((k + offset + 0.40 * stance) * stride - origin)
             side = (1 - 2 * s) * width
             return centre + side * np.stack([-np.sin(heading), np.cos(heading)], axis=-1), heading + (1 - 2 * s) * np.radians(5)
 

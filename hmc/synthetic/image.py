@@ -202,10 +202,10 @@ def picture(scene: Scene, camera: Camera, backdrop: Backdrop, lit: LitCrowd) -> 
         coverage = np.bincount(place, minlength=len(touched)) * share
         added = np.stack([np.bincount(place, colour[:, c], len(touched)) for c in range(3)], axis=1) * share
         radiance[touched] = radiance[touched] * (1 - coverage)[:, None] + added * backdrop.vignette[touched, None]
-        counts = np.stack(
-            [np.bincount(place[crowd.persons[triangles[:, 0]] == k], minlength=len(touched)) for k in range(len(scene.actors))]
-        )
-        labels[touched] = np.where(coverage >= 0.5, counts.argmax(axis=0) + 1, 0)
+        # Furniture that moves is -1, so its row comes first and gives 0.
+        whose = crowd.persons[triangles[:, 0]]
+        counts = np.stack([np.bincount(place[whose == k], minlength=len(touched)) for k in range(-1, len(scene.actors))])
+        labels[touched] = np.where(coverage >= 0.5, counts.argmax(axis=0), 0)
     return radiance, labels.reshape(height, width)
 
 

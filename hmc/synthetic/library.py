@@ -8,7 +8,8 @@ from hmc.synthetic.actions import box, gesture, pick_up, sit, stand, throw_catch
 from hmc.synthetic.bvh import bvh_motion, read_bvh
 from hmc.synthetic.gait import jog, walk
 from hmc.synthetic.motions import Motion, place
-from hmc.synthetic.recipe import ActorRecipe
+from hmc.synthetic.recipe import ActorRecipe, FurnitureRecipe
+from hmc.synthetic.script import script_motion
 from hmc.synthetic.skeleton import Skeleton
 
 __all__ = ["make_motion"]
@@ -16,7 +17,9 @@ __all__ = ["make_motion"]
 _ACTIONS = {"stand": stand, "box": box, "gesture": gesture, "throw_catch": throw_catch, "sit": sit, "pick_up": pick_up}
 
 
-def make_motion(actor: ActorRecipe, skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator) -> Motion:
+def make_motion(
+    actor: ActorRecipe, skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator, furniture: tuple[FurnitureRecipe, ...] = ()
+) -> Motion:
     """The motion that a recipe asks for, in the world.
 
     Parameters
@@ -26,6 +29,8 @@ def make_motion(actor: ActorRecipe, skeleton: Skeleton, times: np.ndarray, rng: 
     times : ndarray, shape (n,)
         Seconds.
     rng : Generator
+    furniture : tuple of FurnitureRecipe
+        On which the actor of a script may sit.
 
     Returns
     -------
@@ -34,8 +39,10 @@ def make_motion(actor: ActorRecipe, skeleton: Skeleton, times: np.ndarray, rng: 
     Raises
     ------
     InputError
-        When a motion file is missing or cannot be read.
+        When a motion file is missing or cannot be read, or a script does not fit its times.
     """
+    if actor.motion == "script":
+        return script_motion(actor, skeleton, times, rng, furniture)
     if actor.motion == "bvh":
         motion = bvh_motion(read_bvh(actor.bvh), skeleton, times, actor.bvh_start_s)
     elif actor.motion in _ACTIONS:

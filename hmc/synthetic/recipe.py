@@ -24,6 +24,7 @@ __all__ = [
     "Recipe",
     "RigRecipe",
     "RoomRecipe",
+    "StepRecipe",
     "load_recipe",
     "shipped_recipes",
 ]
@@ -34,7 +35,11 @@ _CHECKOUT = Path(__file__).resolve().parents[2] / "data" / "synthetic"
 #: Shipped recipes: in a checkout, else where an installation puts its data (pyproject.toml).
 RECIPE_FOLDER = _CHECKOUT if _CHECKOUT.is_dir() else Path(sysconfig.get_path("data")) / "share" / "hmc" / "recipes"
 
-MOTIONS = ("walk", "jog", "stand", "box", "gesture", "throw_catch", "sit", "pick_up", "bvh")
+MOTIONS = ("walk", "jog", "stand", "box", "gesture", "throw_catch", "sit", "pick_up", "bvh", "script")
+#: What a step of a script may be.
+STEPS = ("walk", "turn", "stand", "gesture", "box", "throw_catch", "pick_up", "hug", "sit")
+#: So many people can be told apart in silhouettes, by 85 or 51 x (person + 1).
+MOST_ACTORS = 5
 
 
 @dataclass(frozen=True)
@@ -51,7 +56,11 @@ class RigRecipe:
 
 @dataclass(frozen=True)
 class RoomRecipe:
-    """Walls and floor; colours are sRGB in [0, 1]. One texture or colour serves all four walls, or there are four."""
+    """Walls and floor; colours are sRGB in [0, 1]. One texture or colour serves all four walls, or there are four.
+
+    A door is a wall (0 x low, 1 x high, 2 y low, 3 y high) and the place of its middle along it, metres: a dark opening through which the
+    actors of scripts come and go.
+    """
 
     size_m: tuple[float, float, float] = (6.4, 5.6, 3.2)
     walls: tuple[str, ...] = ("plaster",)
@@ -59,6 +68,7 @@ class RoomRecipe:
     floor: str = "tiles"
     floor_colour: Colour = (0.60, 0.58, 0.56)
     posters: int = 5
+    doors: tuple[tuple[int, float], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -81,7 +91,10 @@ class ImageRecipe:
 
 @dataclass(frozen=True)
 class FurnitureRecipe:
-    """One piece of furniture; see `hmc.synthetic.room.furnish`."""
+    """One piece of furniture; see `hmc.synthetic.room.furnish`.
+
+    Each of its `moves` is (from second, to second, x, y): it slides to a new place, metres.
+    """
 
     kind: str
     at_m: tuple[float, float]
@@ -89,6 +102,38 @@ class FurnitureRecipe:
     size_m: tuple[float, float, float] | None = None
     colour: Colour = (0.55, 0.42, 0.30)
     texture: str = "wood"
+    moves: tuple[tuple[float, float, float, float], ...] = ()
+
+
+@dataclass(frozen=True)
+class StepRecipe:
+    """One step of a script.
+
+    Parameters
+    ----------
+    do : str
+        One of `STEPS`.
+    to_m : tuple of (x, y)
+        Of a walk: where to, past which places. Who sits down on a chair may be led to it.
+    speed_m_s : float
+        Of walking; 0 takes 1.2.
+    to_deg : float
+        Of a turn: where to face.
+    seconds : float
+        How long it takes; walks and turns take what they need.
+    until_s : float
+        In place of `seconds`: the time in the clip at which it ends.
+    chair : int
+        To sit on: the number of the piece of furniture, counted from 1; 0 sits down on the spot.
+    """
+
+    do: str
+    to_m: tuple[tuple[float, float], ...] = ()
+    speed_m_s: float = 0.0
+    to_deg: float = 0.0
+    seconds: float = 0.0
+    until_s: float = 0.0
+    chair: int = 0
 
 
 @dataclass(frozen=True)
@@ -124,6 +169,8 @@ class ActorRecipe:
         Motion file for ``motion = "bvh"``, relative to the recipe.
     bvh_start_s : float
         Where in the file the clip begins.
+    script : tuple of StepRecipe
+        For ``motion = "script"``: what the person does, one thing after another.
     """
 
     height_m: float = 1.75
@@ -147,6 +194,7 @@ class ActorRecipe:
     turn_radius_m: float = 0.0
     bvh: str = ""
     bvh_start_s: float = 0.0
+    script: tuple[StepRecipe, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -264,6 +312,8 @@ def _fill(kind: type, table: Any, where: str) -> Any:
             raise InputError(f"{where}: '{field.name}' is missing")
     values = {}
     for key, value in table.items():
+        if key == "script" and isinstance(value, list):
+            value = tuple(_fill(StepRecipe, item, f"{where}: step {k + 1} of the script") for k, item in enumerate(value))
         value = _tuples(value)
         if not _fits(value, hints[key]):
             raise InputError(f"{where}: '{key}' has a value of the wrong kind: {value!r}")
@@ -318,8 +368,10 @@ def _check(recipe: Recipe, where: str) -> None:
             raise InputError(f"{where}: [room] takes one wall texture and colour or four of each; got {count}")
     for item in recipe.furniture:
         among(item.kind, FURNITURE, "furniture")
-    if len(recipe.actors) > 3:
-        raise InputError(f"{where}: at most 3 actors, so that silhouettes can be told apart by 85 x (person + 1); got {len(recipe.actors)}")
+    for wall, _ in recipe.room.doors:
+        within(wall, 0, 3, "the wall of a door")
+    if len(recipe.actors) > MOST_ACTORS:
+        raise InputError(f"{where}: at most {MOST_ACTORS} actors, so that silhouettes can be told apart; got {len(recipe.actors)}")
     for actor in recipe.actors:
         among(actor.motion, MOTIONS, "motion")
         among(actor.pattern, PATTERNS, "pattern")
@@ -330,3 +382,13 @@ def _check(recipe: Recipe, where: str) -> None:
         girth_of(actor.build)
         if (actor.motion == "bvh") != bool(actor.bvh):
             raise InputError(f"{where}: motion = 'bvh' and the key 'bvh' (a file) go together")
+        if (actor.motion == "script") != bool(actor.script):
+            raise InputError(f"{where}: motion = 'script' and the key 'script' (a list of steps) go together")
+        for one in actor.script:
+            among(one.do, STEPS, "step of a script")
+            within(one.chair, 0, len(recipe.furniture), "chair, the number of a piece of furniture,")
+            within(one.seconds, 0, 3600, "seconds of a step")
+            if one.do == "walk" and not one.to_m:
+                raise InputError(f"{where}: a step that walks needs 'to_m', a list of places [[x, y], ...]")
+            if one.do not in ("walk", "turn") and not one.seconds and not one.until_s:
+                raise InputError(f"{where}: the step '{one.do}' needs 'seconds' or 'until_s'")

@@ -86,7 +86,7 @@ def render_recording(
 
 
 def _write_tables(scene: Scene, folder: Path) -> None:
-    """Calibration, settings, and the truth about joints and volumes."""
+    """Calibration, settings, and the truth about the joints and volumes of who is in the room."""
     recipe = scene.recipe
     (folder / "truth").mkdir(parents=True)
     write_calibration(folder / "calibration.toml", scene.rig)
@@ -96,19 +96,20 @@ def _write_tables(scene: Scene, folder: Path) -> None:
     }  # fmt: skip
     write_toml(folder / "recording.toml", settings)
     n, persons = recipe.n_frames, len(scene.actors)
-    frames, who = np.repeat(np.arange(n), persons), np.tile(np.arange(persons), n)
+    present = np.array([scene.in_room(k) for k in range(persons)], bool).reshape(persons, n).T
+    frames, who = np.nonzero(present)
     joints = np.zeros((n, persons, len(LANDMARKS), 3))
     centroids, heads = np.zeros((n, persons, 3)), np.zeros((n, persons, 3))
     for k, (actor, motion) in enumerate(zip(scene.actors, scene.motions, strict=True)):
         joints[:, k] = landmark_positions(actor.skeleton, motion.root, motion.orientations)
     for frame in range(n):
         crowd = crowd_at(scene, frame)
-        for k, actor in enumerate(scene.actors):
+        for k in np.flatnonzero(present[frame]).tolist():
             own = crowd.vertices[crowd.persons == k]
-            centroids[frame, k] = volume_centroid(own, actor.triangles)[1]
-            heads[frame, k] = own[actor.parts == list(PARTS).index("head")].mean(axis=0)
-    write_joints(folder / "truth" / "joints.csv", PoseTable(frames, who, joints.reshape(-1, len(LANDMARKS), 3)))
-    write_tracks(folder / "truth" / "centroids.csv", TrackTable(frames, who, centroids.reshape(-1, 3), heads.reshape(-1, 3)))
+            centroids[frame, k] = volume_centroid(own, scene.actors[k].triangles)[1]
+            heads[frame, k] = own[scene.actors[k].parts == list(PARTS).index("head")].mean(axis=0)
+    write_joints(folder / "truth" / "joints.csv", PoseTable(frames, who, joints[present]))
+    write_tracks(folder / "truth" / "centroids.csv", TrackTable(frames, who, centroids[present], heads[present]))
 
 
 def _write_pictures(scene: Scene, folder: Path, workers: int, on_progress: Callable[[int, int], None] | None) -> None:
@@ -139,7 +140,7 @@ def _write_pictures(scene: Scene, folder: Path, workers: int, on_progress: Calla
 
 def _write_silhouette(path: Path, labels: np.ndarray, persons: int) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
-    cv2.imwrite(str(path), labels * np.uint8(255 if persons == 1 else 85))
+    cv2.imwrite(str(path), labels * np.uint8(255 if persons == 1 else 85 if persons <= 3 else 51))
 
 
 @contextmanager
@@ -180,14 +181,14 @@ class _Studio:
     def render(self, frame: int) -> Pictures:
         """The images of all cameras, and silhouettes where they are due; negative frames show the empty room."""
         scene, pictures = self.scene, []
-        lit = light_crowd(scene, crowd_at(scene, frame), self.furniture) if frame >= 0 else None
+        lit = light_crowd(scene, crowd_at(scene, frame), self.furniture) if frame >= 0 or scene.props else None
         for k, (camera, backdrop) in enumerate(zip(scene.rig, self.load(), strict=True)):
             rng = _rng(scene, 1 + (frame if frame >= 0 else 10**7 - frame), k)
             labels = None
             radiance = backdrop.radiance
             if lit is not None:
                 radiance, labels = picture(scene, camera, backdrop, lit)
-                if frame % scene.recipe.silhouette_every:
+                if frame < 0 or frame % scene.recipe.silhouette_every:
                     labels = None
             pictures.append((develop(radiance, camera.size, scene, rng), labels))
         return pictures

@@ -9,7 +9,7 @@ import numpy as np
 from hmc.errors import InputError
 from hmc.synthetic.textures import colour_of, poster_colour
 
-__all__ = ["FURNITURE", "Box", "Hits", "Room", "box_mesh", "cast_rays", "furnish"]
+__all__ = ["DOOR_M", "FURNITURE", "Box", "Hits", "Room", "box_mesh", "cast_rays", "furnish", "paint_boxes"]
 
 Colour = tuple[float, float, float]
 Point = tuple[float, float, float]
@@ -56,6 +56,8 @@ class Room:
     floor : (texture, colour)
     boxes : tuple of Box
     posters : tuple of (wall, along, height, width, tall), metres
+    doors : tuple of (wall, along), metres
+        Open, with the dark behind.
     seed : int
         Of the textures.
     """
@@ -66,6 +68,7 @@ class Room:
     boxes: tuple[Box, ...] = ()
     posters: tuple[tuple[int, float, float, float, float], ...] = ()
     seed: int = 0
+    doors: tuple[tuple[int, float], ...] = ()
     ceiling: tuple[str, Colour] = field(default=("plain", (0.85, 0.85, 0.84)))
 
 
@@ -102,6 +105,11 @@ def _stool(width: float, depth: float, height: float) -> list[tuple[Point, Point
     seat = ((0, 0, height - 0.03), (width / 2, depth / 2, 0.03))
     return [seat, ((0, 0, (height - 0.06) / 2), (0.04, 0.04, (height - 0.06) / 2)), ((0, 0, 0.01), (width / 2.4, depth / 2.4, 0.01))]
 
+
+#: Width and height of a door, metres.
+DOOR_M = (0.95, 2.05)
+#: Linear reflectance of a door's frame and of what is seen through it.
+_FRAME, _DARK = 0.45, 0.015
 
 #: Furniture by name: its boxes, and the default width (along its y for a chair), depth and height in metres. A chair faces its own x.
 FURNITURE = {
@@ -183,6 +191,11 @@ def cast_rays(room: Room, origin: np.ndarray, rays: np.ndarray) -> Hits:
         u, v = (point[:, 1 - wall // 2] - along) / width + 0.5, (point[:, 2] - height) / tall + 0.5
         seen = (axis == wall // 2) & (positive == bool(wall % 2)) & (u >= 0) & (u < 1) & (v >= 0) & (v < 1)
         albedo[seen] = poster_colour(u[seen], v[seen], room.seed + 101 * k)
+    for wall, along in room.doors:
+        aside, up = np.abs(point[:, 1 - wall // 2] - along), point[:, 2]
+        seen = (axis == wall // 2) & (positive == bool(wall % 2)) & (aside < DOOR_M[0] / 2 + 0.06) & (up < DOOR_M[1] + 0.06)
+        albedo[seen] = _FRAME
+        albedo[seen & (aside < DOOR_M[0] / 2) & (up < DOOR_M[1])] = _DARK
     for k, box in enumerate(room.boxes):
         _meet_box(box, origin, rays, distance, normal, albedo, room.seed + 500 + k)
     return Hits(distance, normal, albedo)
@@ -236,3 +249,22 @@ def box_mesh(boxes: tuple[Box, ...], edge_m: float = 0.06) -> tuple[np.ndarray, 
     if not vertices:
         return np.zeros((0, 3)), np.zeros((0, 3), int)
     return np.concatenate(vertices), np.concatenate(triangles)
+
+
+def paint_boxes(boxes: tuple[Box, ...], edge_m: float, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """The mesh of `box_mesh` with normals and colours, for furniture that moves.
+
+    Returns
+    -------
+    vertices, normals, albedo : ndarray, shape (n, 3)
+        Linear reflectance, BGR.
+    triangles : ndarray of int, shape (m, 3)
+    """
+    vertices, triangles = box_mesh(boxes, edge_m)
+    corners = vertices[triangles]
+    normals = np.zeros_like(vertices)
+    # Every vertex belongs to one face, so any of its triangles tells its normal.
+    normals[triangles] = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, None]
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    albedo = colour_of(boxes[0].texture, boxes[0].colour, vertices[:, 0] + vertices[:, 1], vertices[:, 2], seed)
+    return vertices, normals, albedo, triangles

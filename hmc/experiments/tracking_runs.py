@@ -1,0 +1,162 @@
+"""Runs of the person trackers that tables 4.3 and 4.4 and figures 4.11, 4.13 and 4.14 of Canton (2009) share: one cell is one run.
+
+The thesis's recordings (CLEAR 2007: 40 sequences of 5 minutes, up to 5 people in rooms of 5 x 4 m, 4 cameras in the corners and one on the
+ceiling, 25 frames a second) are not public; a rendered meeting in such a room stands for them, or the user's recordings. Positions are
+compared with true centroids, in the xy plane.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hmc.evaluation import evaluate_tracks
+from hmc.experiments.experiment import Cell, Parameters, Plan, Results, Source
+from hmc.experiments.inputs import Inputs, rendered
+from hmc.frontend import HullStep
+from hmc.recording import iterate_frames
+from hmc.results import TrackTable, read_centroids
+from hmc.tracking.following import finish, init
+from hmc.tracking.resumable import Timing, observe_step, person_grid
+from hmc.tracking.trackers import make_tracker
+from hmc.tracking.tracks import frame_rng, table_of
+
+__all__ = [
+    "FAMILY", "METHODS", "VERSION", "Method", "Score", "cell", "follow", "method_name", "parameters_of", "scores_of", "sources",
+    "voxel_sizes",
+]  # fmt: skip
+
+FAMILY = "tracking"
+VERSION = 1
+
+Method = tuple[str, bool]
+#: Tracker and whether it uses colour, in the thesis's order, and what the thesis calls it.
+METHODS: dict[Method, str] = {
+    ("naive", False): "naive",
+    ("sparse", False): "SS raw",
+    ("sparse", True): "SS color",
+    ("particle", False): "PF raw",
+    ("particle", True): "PF color",
+}
+_QUICK, _FULL = ("meeting_short",), ("meeting", "hug", "alike")
+
+
+@dataclass(frozen=True)
+class Score:
+    """What several runs of one configuration came to.
+
+    Attributes
+    ----------
+    motp_mm, mota : float
+        Over all runs together (Eq. 4.22 and 4.23); MOTA as a fraction.
+    false_positives, misses, mismatches : float
+        Rates: of the true positions in all frames.
+    rtf : float
+        Real-time factor of the filter alone (Eq. 4.27, 4.34).
+    filter_s : float
+        Processor seconds of the filter a frame and person.
+    """
+
+    motp_mm: float
+    mota: float
+    false_positives: float
+    misses: float
+    mismatches: float
+    rtf: float
+    filter_s: float
+
+
+def sources(plan: Plan) -> tuple[Source, ...]:
+    """The user's recordings, or the rendered ones."""
+    return plan.recordings or tuple(rendered(name) for name in (_QUICK if plan.quick else _FULL))
+
+
+def voxel_sizes(plan: Plan) -> tuple[float, ...]:
+    """The thesis's voxel sizes, metres; the finest is for full runs."""
+    return (0.15, 0.10, 0.05) if plan.quick else (0.15, 0.10, 0.05, 0.02)
+
+
+def parameters_of(label: str, voxel_m: float, method: Method, particles: int | None, preset: str, repeat: int) -> dict:
+    """The parameters of one run."""
+    tracker, color = method
+    return {
+        "recording": label,
+        "voxel_m": voxel_m,
+        "tracker": tracker,
+        "color": color,
+        "particles": particles,
+        "preset": preset,
+        "repeat": repeat,
+    }
+
+
+def method_name(parameters: Parameters) -> str:
+    """What the thesis calls the method of a run."""
+    return METHODS[parameters["tracker"], parameters["color"]]
+
+
+def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Results:
+    """Follow everybody through a recording and score it."""
+    label = parameters["recording"]
+    truth = read_centroids(inputs.truth(label))
+    tracks, timing, fps = follow(parameters, inputs, int(rng.integers(2**31)))
+    score = evaluate_tracks(tracks, truth)
+    return {
+        "objects": score.objects,
+        "misses": score.misses,
+        "false_positives": score.false_positives,
+        "mismatches": score.mismatches,
+        "matches": len(score.distances),
+        "distance_m": float(np.sum(score.distances)),
+        "frames": timing.frames,
+        "fps": fps,
+        "rows": len(tracks.frames),
+        "filter_s": timing.filter_s,
+        "color_s": timing.input_s,
+    }
+
+
+def follow(parameters: Parameters, inputs: Inputs, seed: int) -> tuple[TrackTable, Timing, float]:
+    """Tracks of a run, the processor time spent, and the recording's frames a second."""
+    color = parameters["color"]
+    recording = inputs.recording(parameters["recording"])
+    tracker = make_tracker(
+        parameters["tracker"],
+        color=color if parameters["tracker"] != "naive" else None,
+        particles=parameters["particles"],
+        preset=parameters["preset"],
+    )
+    grid = person_grid(recording, parameters["voxel_m"])
+    hulls = inputs.hulls(parameters["recording"], parameters["voxel_m"])
+    state, rows, timing = init(recording.fps), [], Timing()
+    for hull in _with_images(hulls, iterate_frames(recording)) if color else hulls:
+        observation = observe_step(recording, grid, hull, images=color)
+        state, info = tracker.step(frame_rng(seed, hull.index), state, hull.index, observation)
+        timing = timing.plus(Timing(1, info.color_s, info.filter_s, 0.0))
+        rows += info.rows
+    rows += finish(state, recording.n_frames, tracker.following)
+    return table_of(rows, recording.fps), timing, recording.fps
+
+
+def _with_images(hulls: Iterator[HullStep], frames) -> Iterator[HullStep]:
+    for hull, frame in zip(hulls, frames, strict=True):
+        yield replace(hull, images=frame.images)
+
+
+def scores_of(cells: Sequence[Cell]) -> Score:
+    """Runs of one configuration, over recordings and repeats, taken together."""
+    total = {key: sum(one.results[key] for one in cells) for key in cells[0].results}
+    objects = max(total["objects"], 1)
+    wrong = total["misses"] + total["false_positives"] + total["mismatches"]
+    recorded_s = sum(one.results["frames"] / one.results["fps"] for one in cells)
+    return Score(
+        motp_mm=1000 * total["distance_m"] / total["matches"] if total["matches"] else float("nan"),
+        mota=1 - wrong / objects,
+        false_positives=total["false_positives"] / objects,
+        misses=total["misses"] / objects,
+        mismatches=total["mismatches"] / objects,
+        rtf=recorded_s / max(total["filter_s"], 1e-9),
+        filter_s=total["filter_s"] / max(total["rows"], 1),
+    )
