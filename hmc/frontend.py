@@ -5,8 +5,7 @@
 
 Where the silhouettes come from, camera by camera (``FrontendSettings.source = "auto"``): ready-made ones where the recording has them;
 else the images against a background learnt from frames of the empty scene; else against a temporal median of the recording from which
-people were cut out with the help of all cameras (`hmc.camera.empty_scene`). That holds where people move; a place they hardly ever leave
-is foreground whenever they are there, and a foot that stands still for most of the time may be missed.
+people were cut out with the help of all cameras, and where they hardly ever leave a place, by their colours (`hmc.never_empty`).
 
 Nothing grows with the length of the recording.
 """
@@ -18,17 +17,14 @@ import os
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from functools import partial
 from typing import TypeVar
 
 import numpy as np
 
-from hmc.camera.empty_scene import empty_scenes, replace_people
-from hmc.camera.model import Rig
 from hmc.camera.segmentation import BackgroundModel, SegmentationSettings, segment_views, train_background
 from hmc.errors import InputError
-from hmc.recording import Frame, Recording, background_frames, iterate_frames, open_recording
-from hmc.voxels.agreement import agreed_views
+from hmc.never_empty import UnseenPlaces, learn_from_people, with_unseen_places
+from hmc.recording import Frame, Recording, background_frames, iterate_frames
 from hmc.voxels.carving import CarvingTables, carve_levels, make_tables
 from hmc.voxels.completion import complete_masks, doubtful_hull, make_completion_tables
 from hmc.voxels.grid import VoxelGrid
@@ -41,11 +37,6 @@ T = TypeVar("T")
 Report = Callable[[str], None]
 
 SOURCES = ("auto", "silhouettes", "background", "median")
-#: Bytes that the images of which the median is taken may fill.
-MEDIAN_BYTES = 400e6
-#: Longer side of the images on which people are told from the scene, pixels, and the voxels in which cameras agree on them, metres.
-SMALL_PX = 320
-COARSE_M = 0.05
 
 
 @dataclass(frozen=True)
@@ -199,7 +190,7 @@ def stream_masks(
     report = on_problem or logger.warning
     first = recording.start if first is None else first
     start = max(recording.start, first - warm_up)
-    models = learn_backgrounds(recording, settings, report)
+    models, places = _learn(recording, settings, report)
     names = recording.rig.names
     tables = make_completion_tables(recording.room, recording.rig) if settings.complete and any(models) else None
     changed: dict[int, int] = {}  # camera whose whole image changed -> the frame in which that began
@@ -213,6 +204,8 @@ def stream_masks(
                 elif c in changed:
                     report(_say_changed(names[c], changed.pop(c), frame.index - 1))
             if frame.index >= first:
+                if places is not None:
+                    masks = with_unseen_places(places, frame.images, masks, pool)
                 doubtful = tuple(None if model is None else model.doubtful for model in models)
                 completed = masks if tables is None else complete_masks(tables, masks, doubtful)
                 if all(after is before for after, before in zip(completed, masks, strict=True)):
@@ -241,12 +234,17 @@ def learn_backgrounds(recording: Recording, settings: FrontendSettings | None = 
     InputError
         When the source of silhouettes that was asked for is not there.
     """
-    settings = settings or FrontendSettings()
+    return _learn(recording, settings or FrontendSettings(), on_problem or logger.warning)[0]
+
+
+def _learn(recording: Recording, settings: FrontendSettings, report: Report) -> tuple[tuple, UnseenPlaces | None]:
+    """What is known of the empty scene, and what of the places where it was never seen; the latter only for cameras that need it."""
     names, source = recording.rig.names, settings.source
     given = set(range(len(names))) if recording.has_silhouettes and source in ("auto", "silhouettes") else set()
     if source == "silhouettes" and not given:
         raise InputError(f"{recording.path}: there is no folder silhouettes/; put masks there or choose another source")
     models: dict[int, BackgroundModel] = {}
+    places = None
     for c in set(range(len(names))) - given if source != "median" else ():
         if recording.n_background_frames[c]:
             models[c] = train_background(background_frames(recording, c, settings.background_frames), settings.segmentation)
@@ -256,12 +254,14 @@ def learn_backgrounds(recording: Recording, settings: FrontendSettings | None = 
     if left:
         if not recording.has_images:
             raise InputError(f"{recording.path}: there are no images to find people in; add videos/ or images/")
-        (on_problem or logger.warning)(
+        report(
             f"{', '.join(names[c] for c in left)}: no frames of the empty scene; the background is the median of the recording, "
             "so people who stay where they are may be missed"
         )
-        models |= _learn_from_people(recording, left, settings)
-    return tuple(models.get(c) for c in range(len(names)))
+        with ThreadPoolExecutor(settings.threads or os.cpu_count() or 1) as pool:
+            learnt, places = learn_from_people(recording, left, settings.segmentation, settings.median_frames, settings.median_span, pool)
+        models |= learnt
+    return tuple(models.get(c) for c in range(len(names))), places
 
 
 def _hulls(tables: CarvingTables, step: MaskStep, settings: FrontendSettings) -> tuple[np.ndarray, ...]:
@@ -286,45 +286,6 @@ def _segment(frame: Frame, models: tuple, settings: FrontendSettings, pool: Thre
         masks[c] = mask
     new = dict(zip(ours, after, strict=True))
     return tuple(masks), tuple(new.get(c) for c in range(len(models)))
-
-
-def _samples(recording: Recording, cameras: list[int], settings: FrontendSettings) -> list[list[np.ndarray | None]]:
-    """Some frames' images of some cameras, spread over the recording around the selection."""
-    whole = open_recording(recording.path, recording.rig.names)
-    frame_bytes = sum(3 * width * height for width, height in (recording.rig[c].size for c in cameras))
-    n_samples = int(np.clip(MEDIAN_BYTES // frame_bytes, 9, settings.median_frames))
-    first = max(0, recording.start + recording.n_frames // 2 - settings.median_span // 2)
-    last = min(first + settings.median_span, whole.n_frames)
-    wanted = set(np.unique(np.linspace(first, last - 1, n_samples).round().astype(int)).tolist())
-    frames = iterate_frames(whole, first, last, on_problem=lambda line: None)  # the run itself reports them
-    samples = [[frame.images[c] for c in cameras] for frame in frames if frame.index in wanted]
-    for c, images in zip(cameras, zip(*samples, strict=True), strict=True):
-        if all(image is None for image in images):
-            raise InputError(f"{recording.path}: camera '{recording.rig[c].name}' has no readable image; leave it out: --cameras")
-    return samples
-
-
-def _learn_from_people(recording: Recording, cameras: list[int], settings: FrontendSettings) -> dict[int, BackgroundModel]:
-    """Models of the empty scene from frames with people in them."""
-    samples = _samples(recording, cameras, settings)
-    rig = Rig(tuple(recording.rig[c].scaled(min(1.0, SMALL_PX / max(recording.rig[c].size))) for c in cameras))
-    tables = make_tables(VoxelGrid.from_room(recording.room, COARSE_M, len(rig)), rig)
-    with ThreadPoolExecutor(settings.threads or os.cpu_count() or 1) as pool:
-        scenes = empty_scenes(samples, [camera.size for camera in rig], partial(agreed_views, tables), pool)
-    models = {}
-    for i, c in enumerate(cameras):
-        scene, unseen = scenes[i]
-        # Each image is let go once it is learnt from: large ones and the growing models would not fit side by side.
-        images = (replace_people(image, scene) for image in _take(samples, i) if image is not None)
-        models[c] = train_background(images, settings.segmentation, unseen)
-    return models
-
-
-def _take(samples: list[list[np.ndarray | None]], camera: int) -> Iterator[np.ndarray | None]:
-    """A camera's images, taken out of the samples one by one."""
-    for frame in samples:
-        image, frame[camera] = frame[camera], None
-        yield image
 
 
 def _read_ahead(items: Iterable[T], reader: ThreadPoolExecutor) -> Iterator[T]:

@@ -19,7 +19,7 @@ BASE = {"errors", "landmarks", "files", "settings", "journal"}
 CAMERA = BASE | {"camera"}
 RECORDING = CAMERA | {"footage", "recording", "results"}
 VOXELS = CAMERA | {"voxels"}
-FRONTEND = RECORDING | {"voxels", "frontend"}
+FRONTEND = RECORDING | {"voxels", "frontend", "never_empty"}
 TRACKING = FRONTEND | {"montecarlo", "tracking"}
 POSE = TRACKING | {"pose"}
 EVALUATION = BASE | {"metrics", "results", "evaluation"}
@@ -38,6 +38,7 @@ MAY_IMPORT = {
     "results": BASE,
     "recording": RECORDING,
     "voxels": VOXELS,
+    "never_empty": RECORDING | {"voxels"},
     "frontend": FRONTEND,
     "tracking": TRACKING,
     "pose": POSE,

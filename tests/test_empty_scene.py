@@ -38,7 +38,8 @@ def test_people_leave_less_in_the_scene_than_in_a_plain_median(shared_data, name
     """Walking, and boxing in place, where legs hardly move: what is wrong in the scene without being told so."""
     recording = open_recording(shared_data / "rendered" / name, cameras=["cam_00", "cam_02", "cam_03", "cam_05"])
     samples, scenes = scenes_of(recording, 8)
-    for c, (scene, unseen) in enumerate(scenes):
+    for c, one in enumerate(scenes):
+        scene, unseen = one.image, one.unseen
         truth = np.median(list(background_frames(recording, c)), axis=0)
         images = [frame[c] for frame in samples]
 
@@ -60,7 +61,8 @@ def test_a_walker_is_cut_out_in_every_view_even_where_images_are_missing(tmp_pat
     tables = make_tables(VoxelGrid.from_room(recording.room, 0.08), recording.rig)
     views = partial(agreed_views, tables)
     scenes = empty_scenes([frame.images for frame in frames], [camera.size for camera in recording.rig], views)
-    for c, (scene, unseen) in enumerate(scenes):
+    for c, one in enumerate(scenes):
+        scene, unseen = one.image, one.unseen
         truth = next(iter(background_frames(recording, c))).astype(float)
         assert (np.abs(scene - truth).max(axis=2) > 25)[~unseen].mean() < 0.01
 
@@ -72,5 +74,5 @@ def test_an_empty_room_and_a_single_image_stay_what_they_are():
         return [[np.zeros_like(mask) for mask in masks]] * 2
 
     for n in (1, 3):
-        ((found, unseen),) = empty_scenes([[scene]] * n, [(80, 60)], nobody)
-        assert np.array_equal(found, scene) and not unseen.any()
+        (found,) = empty_scenes([[scene]] * n, [(80, 60)], nobody)
+        assert np.array_equal(found.image, scene) and not found.unseen.any() and found.colors is None

@@ -5,8 +5,7 @@ scene is, in turns:
 
 - the scene as it is known so far: what differs from it may be a person, and so may what is where nothing is known;
 - the other cameras: only what lies in a visual hull of all views can be a person, not a mirror image, a shadow or somebody far away;
-- colour: a graph cut (Rother et al. (2004), "GrabCut") between the colours of this camera's people and those of its surroundings, one
-  model for all samples.
+- colour: a graph cut between the colours of this camera's people and those of its surroundings (`hmc.camera.people_cut`).
 
 The scene is the median of what is left. A place that is hardly ever left free is not filled in but told: `unseen`.
 """
@@ -15,13 +14,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
 from hmc.camera.background import masked_median, stable_background
+from hmc.camera.people_cut import PeopleColors, View, cut_people, disc, learn_colors
 
-__all__ = ["Views", "empty_scenes", "replace_people"]
+__all__ = ["EmptyScene", "Views", "empty_scenes", "replace_people"]
 
 Masks = Sequence[np.ndarray | None]
 #: From the masks of all cameras to what the cameras agree on in each view: surely people, and possibly people.
@@ -33,18 +34,33 @@ DISTANCE = 25
 ROUNDS = 2
 #: A place left free in fewer samples than this share is unseen.
 LEAST_FREE = 0.1
-#: Widths in pixels of an image whose longer side is 320: how deep in a person is surely inside, gaps that may be a person's, and the
-#: margin around people.
-CORE_PX = 5
-LIMB_PX = 9
+#: A place that is the same in more samples than this share never changes.
+STILL = 0.8
+#: Margin around people, pixels of an image whose longer side is 320.
 MARGIN_PX = 5
-#: Fewer pixels than this do not tell what colours people or the scene have.
-FEWEST_PX = 50
+
+
+@dataclass(frozen=True)
+class EmptyScene:
+    """One camera's scene without the people in it.
+
+    Attributes
+    ----------
+    image : ndarray of uint8, shape (height, width, 3)
+    unseen : ndarray of bool, shape (height, width)
+        Where people hid it in nearly all samples; the image tells nothing there.
+    colors : PeopleColors or None
+        By which people are cut out of this camera's images.
+    """
+
+    image: np.ndarray
+    unseen: np.ndarray
+    colors: PeopleColors | None
 
 
 def empty_scenes(
     samples: Sequence[Masks], sizes: Sequence[tuple[int, int]], views: Views, pool: Executor | None = None
-) -> list[tuple[np.ndarray, np.ndarray]]:
+) -> list[EmptyScene]:
     """The scene of each camera without the people in it.
 
     Parameters
@@ -60,9 +76,7 @@ def empty_scenes(
 
     Returns
     -------
-    list of (scene, unseen), one a camera
-        Scene: ndarray of uint8, shape (height, width, 3). Unseen: ndarray of bool, shape (height, width), where people hid it in
-        nearly all samples.
+    list of EmptyScene, one a camera
     """
     run = map if pool is None else pool.map
     n_cameras = len(sizes)
@@ -72,10 +86,12 @@ def empty_scenes(
     ]
     known = list(run(lambda c: stable_background(_of(small, c)), range(n_cameras)))
     hidden: list[list[np.ndarray]] = []
-    for _ in range(ROUNDS):
-        hidden = _find_people(small, known, views, run)
+    colors: list[PeopleColors | None] = []
+    for n_round in range(ROUNDS):
+        hidden, colors = _find_people(small, known, views, run, n_round)
         known = list(run(_scene, (_of(small, c) for c in range(n_cameras)), hidden))
-    return list(run(_scene, (_of(samples, c) for c in range(n_cameras)), hidden))
+    scenes = run(_scene, (_of(samples, c) for c in range(n_cameras)), hidden)
+    return [EmptyScene(scene, unseen, color) for (scene, unseen), color in zip(scenes, colors, strict=True)]
 
 
 def replace_people(image: np.ndarray, scene: np.ndarray) -> np.ndarray:
@@ -89,83 +105,48 @@ def _of(frames: Sequence[Masks], camera: int) -> list[np.ndarray]:
     return [entry for frame in frames if (entry := frame[camera]) is not None]
 
 
-def _find_people(small: Sequence[Masks], known: Sequence[tuple[np.ndarray, np.ndarray]], views: Views, run) -> list[list[np.ndarray]]:
-    """Where people are in each camera's samples, as the scene known so far, the other cameras and the colours tell."""
+def _find_people(small, known, views: Views, run, n_round: int) -> tuple[list[list[np.ndarray]], list[PeopleColors | None]]:
+    """Where people are in each camera's samples, as the scene known so far, the other cameras and the colours tell; their colours."""
     masks = [[None if image is None else _differs(image, *known[c]) for c, image in enumerate(frame)] for frame in small]
     agreed = list(run(views, masks))
-    surely, possibly = ([frame[i] for frame in agreed] for i in (0, 1))
-    cameras = range(len(known))
-    columns = [[_of(frames, c) for c in cameras] for frames in (small, masks, surely, possibly)]
-    return list(run(_cut_out, *columns, [unseen for _, unseen in known]))
+    cases: list[list[View]] = [[] for _ in known]
+    for images, differs, (surely, possibly) in zip(small, masks, agreed, strict=True):
+        for c, (image, differ) in enumerate(zip(images, differs, strict=True)):
+            if image is not None and differ is not None:
+                unseen = known[c][1]
+                # At first, what changes all the time is people; later, where the scene is not known, colours decide.
+                differ = differ if n_round == 0 else differ & ~unseen
+                cases[c].append(View(image, differ, surely[c], possibly[c], unseen))
+    colors = list(run(learn_colors, cases))
+    return list(run(_cut_all, cases, colors)), colors
+
+
+def _cut_all(views: Sequence[View], colors: PeopleColors | None) -> list[np.ndarray]:
+    return [np.zeros(view.unseen.shape, bool) if colors is None else cut_people(view, colors) for view in views]
 
 
 def _differs(image: np.ndarray, scene: np.ndarray, unseen: np.ndarray) -> np.ndarray:
     """Where the image is not the scene, or the scene is not known; gaps closed."""
     far = cv2.absdiff(cv2.blur(image, (3, 3)), cv2.blur(scene, (3, 3))).max(axis=2) > DISTANCE
-    return cv2.morphologyEx((far | unseen).view(np.uint8), cv2.MORPH_CLOSE, _disc(image, 3)).view(bool)
+    return cv2.morphologyEx((far | unseen).view(np.uint8), cv2.MORPH_CLOSE, disc(image, 3)).view(bool)
 
 
 def _scene(images: Sequence[np.ndarray], people: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Median of what people leave free, and where that is hardly ever anything."""
-    size = images[0].shape[1::-1]
-    hidden = [cv2.resize(mask.view(np.uint8), size, interpolation=cv2.INTER_NEAREST).view(bool) for mask in people]
-    free = len(images) - np.sum(hidden, axis=0)
-    return masked_median(images, hidden), free < max(1, LEAST_FREE * len(images))
+    """Median of what people leave free, and where that is hardly ever anything.
 
-
-def _cut_out(
-    images: Sequence[np.ndarray],
-    differs: Sequence[np.ndarray],
-    surely: Sequence[np.ndarray],
-    possibly: Sequence[np.ndarray],
-    unseen: np.ndarray,
-) -> list[np.ndarray]:
-    """Where people are in one camera's samples, with a margin.
-
-    Colours of people are learnt where the image differs from a scene that is known, colours of the scene away from that: what stands
-    still between the two may be either, so it teaches nothing, and the graph cut decides.
+    A place that never changes is either scene or somebody who never moved: where most samples show people there, the few in which
+    they were missed do not make it scene.
     """
-    boxes = [cv2.boundingRect(cv2.dilate(mask.view(np.uint8), _disc(mask, 4 * MARGIN_PX))) for mask in possibly]
-    widest = max(width for _, _, width, _ in boxes)
-    tiles: tuple[list, list, list] = ([], [], [])
-    for image, differ, sure, possible, (left, top, width, height) in zip(images, differs, surely, possibly, boxes, strict=True):
-        for tile, array in zip(tiles, (image, *_hints(differ, sure, possible, unseen)), strict=True):
-            part = array[top : top + height, left : left + width]
-            tile.append(np.pad(part, [(0, 0), (0, widest - width)] + [(0, 0)] * (array.ndim - 2)))
-    # One below the other, so that all samples share their colours.
-    found, first = _graph_cut(*(np.vstack(tile) for tile in tiles)), 0
-    people = [np.zeros(mask.shape, np.uint8) for mask in possibly]
-    for mask, (left, top, width, height) in zip(people, boxes, strict=True):
-        mask[top : top + height, left : left + width] = found[first : first + height, :width]
-        first += height
-    return [cv2.dilate(mask, _disc(mask, MARGIN_PX)).view(bool) for mask in people]
-
-
-def _hints(differ: np.ndarray, sure: np.ndarray, possible: np.ndarray, unseen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """What a graph cut starts from, and which pixels teach it their colours."""
-    near = cv2.morphologyEx((differ & possible).view(np.uint8), cv2.MORPH_CLOSE, _disc(differ, LIMB_PX)).view(bool)
-    around = cv2.dilate(near.view(np.uint8), _disc(differ, LIMB_PX)).view(bool)
-    near &= possible
-    labels = np.full(possible.shape, cv2.GC_BGD, np.uint8)
-    labels[possible] = cv2.GC_PR_BGD
-    labels[near] = cv2.GC_PR_FGD
-    labels[cv2.erode((sure & near & differ & ~unseen).view(np.uint8), _disc(differ, CORE_PX)).view(bool)] = cv2.GC_FGD
-    return labels, np.where(near, ~unseen, ~around)
-
-
-def _graph_cut(picture: np.ndarray, labels: np.ndarray, telling: np.ndarray) -> np.ndarray:
-    """Where the picture is people, as its colours and the labels tell; nowhere, where too little is known of either colours."""
-    foreground = np.isin(labels, (cv2.GC_FGD, cv2.GC_PR_FGD))
-    if min(np.count_nonzero(telling & foreground), np.count_nonzero(telling & ~foreground)) < FEWEST_PX:
-        return np.zeros(labels.shape, np.uint8)
-    cv2.setRNGSeed(0)  # the colours are clustered with OpenCV's own generator
-    models = np.zeros((1, 65)), np.zeros((1, 65))
-    cv2.grabCut(picture[telling][None], labels[telling][None], None, *models, 0, cv2.GC_INIT_WITH_MASK)  # type: ignore[call-overload]
-    cv2.grabCut(picture, labels, None, *models, 1, cv2.GC_EVAL_FREEZE_MODEL)  # type: ignore[call-overload]
-    return np.isin(labels, (cv2.GC_FGD, cv2.GC_PR_FGD)).view(np.uint8)
-
-
-def _disc(image: np.ndarray, width: float) -> np.ndarray:
-    """A disc, its width given for an image whose longer side is 320 pixels."""
-    side = max(3, 2 * round((width * max(image.shape[:2]) / 320 - 1) / 2) + 1)
-    return cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
+    size = images[0].shape[1::-1]
+    margins = [cv2.dilate(mask.view(np.uint8), disc(mask, MARGIN_PX)).view(bool) for mask in people]
+    taken, near = (
+        np.stack([cv2.resize(mask.view(np.uint8), size, interpolation=cv2.INTER_NEAREST).view(bool) for mask in masks])
+        for masks in (people, margins)
+    )
+    least = max(1, LEAST_FREE * len(images))
+    # Where the margins leave too little, what is next to people is better than nothing.
+    np.copyto(near, taken, where=len(images) - near.sum(axis=0) < least)
+    scene = masked_median(images, list(near))
+    alike = np.stack([cv2.absdiff(image, scene).max(axis=2) <= DISTANCE for image in images])
+    still = (alike.sum(axis=0) > STILL * len(images)) & (2 * (alike & taken).sum(axis=0) > alike.sum(axis=0))
+    return scene, still | (len(images) - taken.sum(axis=0) < least)

@@ -122,7 +122,7 @@ class BackgroundModel:
         Where the last image is not quite the empty scene: the silhouette, shadows, and near people whatever differs a little. What
         other cameras see decides there (`hmc.voxels.completion`). None before the first image.
     unseen : ndarray of bool, shape (height, width), or None
-        Where the empty scene was never seen (`hmc.camera.background.stable_background`): foreground wherever it touches some.
+        Where the empty scene was never seen (`hmc.camera.empty_scene`): nothing is learnt there, and what is found there tells nothing.
     """
 
     mixture: cv2.BackgroundSubtractorMOG2
@@ -225,14 +225,13 @@ def segment(
     if cv2.countNonZero(found) > settings.max_foreground * found.size:
         return None, _adapt_to_switch(model, image, settings)
     mask, doubtful = _complete(found, cv2.threshold(answer, SHADOW - 1, 1, cv2.THRESH_BINARY)[1], image, model, settings)
-    if model.unseen is not None:
-        mask = _join_unseen(mask, model.unseen, settings)
     mask = mask.view(bool)
     doubtful = doubtful.view(bool) | mask
     after = replace(model, people=mask, frame=model.frame + 1, settling=max(0, model.settling - 1), doubtful=doubtful)
     if after.settling or after.frame % settings.learn_every == 0:
         rate = SETTLING_RATE if after.settling else settings.learning_rate
-        _learn(after, image, _hidden(mask, answer, settings), rate, settings)
+        people = mask if model.unseen is None else mask | model.unseen
+        _learn(after, image, _hidden(people, answer, settings), rate, settings)
     return mask, after
 
 
@@ -289,14 +288,6 @@ def _complete(
     mask[rows, columns] = cut_halo(part, seen, settings.halo_share, scale)
     doubtful[rows, columns] |= (seen.chroma2 > DOUBT**2) | (np.abs(seen.luma) > DOUBT)
     return mask, cv2.morphologyEx(doubtful, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
-
-
-def _join_unseen(mask: np.ndarray, unseen: np.ndarray, settings: SegmentationSettings) -> np.ndarray:
-    """Add those places where the scene was never seen that touch the mask: somebody who is there now was there when it was learnt."""
-    n, labels = cv2.connectedComponents(cv2.bitwise_or(mask, unseen.view(np.uint8)), connectivity=8)
-    counts = np.bincount(labels[mask.view(bool)], minlength=n)
-    counts[0] = 0
-    return np.take((counts >= settings.least_blob_px).view(np.uint8), np.asarray(labels))
 
 
 def _hidden(mask: np.ndarray, answer: np.ndarray, settings: SegmentationSettings) -> np.ndarray:
