@@ -1,7 +1,7 @@
 """Recordings from which the person tree that comes with the package was trained: ``python -m hmc.experiments.person_data FOLDER``.
 
-Every recipe ``train_*`` is rendered twice: as it is, and once more with other cameras, other statures and all of its furniture brought in
-after the empty room was filmed. In those whose furniture was brought in, tables and chairs are foreground, and no people. Afterwards:
+Every recipe ``train_*`` is rendered as it is, and some once more with other cameras, other statures and all of their furniture brought in
+after the empty room was filmed. Where furniture was brought in, tables and chairs are foreground, and no people. Afterwards:
 ``python -m hmc.tracking.train_person_tree FOLDER/* --out hmc/tracking/person_tree.csv``.
 """
 
@@ -26,6 +26,8 @@ logger = logging.getLogger("hmc")
 
 #: Recipes whose furniture is brought in as it is.
 BROUGHT_IN = ("train_brought_in", "train_moved_tables")
+#: Recipes that are rendered once more.
+TWICE = ("train_arms", "train_brought_in", "train_close", "train_crowd")
 #: The rig of the second scene, by that of the first.
 OTHER_RIG = {"corners4_overhead": "ring7", "ring7": "corners4_overhead", "corners4": "ring7_overhead", "ring7_overhead": "corners4"}
 #: Statures of the second scene, as a share of the first's.
@@ -35,7 +37,9 @@ OTHER_STATURE = (1.08, 0.92, 0.97)
 def training_recipes() -> list[tuple[Recipe, bool]]:
     """What to render, and whether the furniture was brought in after the empty room was filmed."""
     recipes = [load_recipe(name) for name in shipped_recipes() if name.startswith("train_")]
-    return [(recipe, recipe.name in BROUGHT_IN) for recipe in recipes] + [(other_scene(recipe), True) for recipe in recipes]
+    return [(recipe, recipe.name in BROUGHT_IN) for recipe in recipes] + [
+        (other_scene(recipe), True) for recipe in recipes if recipe.name in TWICE
+    ]
 
 
 def other_scene(recipe: Recipe) -> Recipe:

@@ -42,8 +42,9 @@ class LifecycleSettings:
     Attributes
     ----------
     person : str
-        What decides whether a set of voxels looks like a person: "tree", the decision tree that comes with the package; "rules", the
-        limits from `least_top_m` to `least_side_m`; or the path of a tree of the user's own (`hmc.tracking.train_person_tree`).
+        What decides whether a set of voxels looks like a person: "rules", the limits from `least_top_m` to `least_side_m` alone; "tree",
+        the decision tree that comes with the package, within these limits; or the path of a tree of the user's own
+        (`hmc.tracking.train_person_tree`), within them too.
     least_top_m, most_top_m : float
         Height of the highest point of a person who appears: bent down or on the knees, and with a hand up.
     least_height_m : float
@@ -100,7 +101,7 @@ class LifecycleSettings:
     patience_s: float = 1.0
     edge_patience_s: float = 0.3
     edge_m: float = 0.3
-    unlike_s: float = 5.0
+    unlike_s: float = 2.0
     least_efficiency: float = 0.05
     efficiency_s: float = 0.5
     least_distance_m: float = 0.45
@@ -185,13 +186,12 @@ class Track:
 def looks_like_person(blobs: Blobs, settings: LifecycleSettings) -> np.ndarray:
     """Which sets of voxels may be a person who appears; shape (n,) bool. For people who stand, bend, kneel or sit.
 
-    By the tree where the settings have one, else by their limits.
+    All must be within the settings' limits, and the tree, where there is one, decides what of that is people: groups of fragments and
+    noise are unlike anything that it has seen.
     """
-    if settings.tree is not None:
-        return (blobs.counts > 0) & predict_person(settings.tree, feature_matrix(blobs))
     longer = blobs.sides_m[:, 0]
     top, bottom = blobs.top_m, blobs.lowest[:, 2]
-    return (
+    possible = (
         (top >= settings.least_top_m)
         & (top <= settings.most_top_m)
         & (blobs.height_m >= settings.least_height_m)
@@ -201,6 +201,7 @@ def looks_like_person(blobs: Blobs, settings: LifecycleSettings) -> np.ndarray:
         & (longer >= settings.least_side_m)
         & (longer <= settings.most_side_m)
     )
+    return possible if settings.tree is None else possible & predict_person(settings.tree, feature_matrix(blobs))
 
 
 def still_a_person(owned: Blobs, certain: Blobs, tracks: tuple[Track, ...], settings: LifecycleSettings) -> np.ndarray:

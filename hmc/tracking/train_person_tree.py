@@ -86,15 +86,16 @@ def main(argv: Sequence[str] | None = None) -> int:
         tree = train_person_tree(table, np.random.default_rng(args.seed))
         scores = detection_scores(table.is_person, predict_person(tree, table.features))
         notes = (
-            f"{np.count_nonzero(table.is_person)} components with people and {np.count_nonzero(~table.is_person)} without, voxels of "
-            f"{args.voxel:g} m, of {', '.join(recording.name for recording in recordings)}",
+            f"trained on {', '.join(recording.name for recording in recordings)}",
+            f"{np.count_nonzero(table.is_person)} components with people and {np.count_nonzero(~table.is_person)} without; "
+            f"voxels of {args.voxel:g} m",
             f"on these, precision {scores.precision:.3f}, recall {scores.recall:.3f}, F {scores.f_measure:.3f}",
         )
         write_tree(args.out, tree, notes)
     except InputError as error:
         logger.error("error: %s", error)
         return 2
-    logger.info("%s\n%s\n%d nodes in %s", *notes, len(tree), args.out)
+    logger.info("%s\n%s\n%s\n%d nodes in %s", *notes, len(tree), args.out)
     return 0
 
 
