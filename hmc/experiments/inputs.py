@@ -17,10 +17,11 @@ import numpy as np
 
 from hmc.errors import InputError
 from hmc.experiments.experiment import Source
+from hmc.experiments.person_data import render_brought_in, training_recipes
 from hmc.experiments.store import digest
 from hmc.frontend import FrontendSettings, HullStep, stream_hulls
 from hmc.recording import Recording, open_recording
-from hmc.synthetic.recipe import load_recipe
+from hmc.synthetic.recipe import Recipe, load_recipe
 from hmc.synthetic.render import render_recording
 from hmc.voxels.grid import VoxelGrid
 
@@ -38,14 +39,15 @@ _FRONTEND = FrontendSettings(threads=1)
 
 
 def rendered(recipe: str) -> Source:
-    """A shipped recipe as a source; the label changes when the recipe does.
+    """A shipped recipe, or one of those that the person tree is trained on, as a source; the label changes when the recipe does.
 
     Raises
     ------
     InputError
         When there is no such recipe.
     """
-    return Source(f"{recipe}@{digest(repr(load_recipe(recipe)), 8)}")
+    content, brought_in = _recipe_of(recipe)
+    return Source(f"{recipe}@{digest(repr(content) + ' brought in' * brought_in, 8)}")
 
 
 def source_of(folder: Path) -> Source:
@@ -126,10 +128,12 @@ class Inputs:
         """
         if label in self.recordings:
             return self.recordings[label]
-        recipe = label.rpartition("@")[0]
-        if rendered(recipe).label != label:
+        name = label.rpartition("@")[0]
+        if rendered(name).label != label:
             raise InputError(f"the recording {label} is neither among --recordings nor a shipped recipe as it is now")
-        return once(self.folder / label / "recording", lambda part: render_recording(recipe, part))
+        recipe, brought_in = _recipe_of(name)
+        render = render_brought_in if brought_in else render_recording
+        return once(self.folder / label / "recording", lambda part: render(recipe, part))
 
     def recording(self, label: str) -> Recording:
         """A recording, opened."""
@@ -172,6 +176,14 @@ class Inputs:
                 masks = tuple(_unpack(data[f"mask_{c}"], size) if f"mask_{c}" in data else None for c, size in enumerate(sizes))
             nothing = (None,) * len(sizes)
             yield HullStep(int(path.stem), nothing, masks, nothing, levels == 3, levels >= 2, levels >= 1)
+
+
+def _recipe_of(name: str) -> tuple[Recipe, bool]:
+    """A recipe, and whether its furniture comes in after the empty room was filmed."""
+    for recipe, brought_in in training_recipes():
+        if recipe.name == name:
+            return recipe, brought_in
+    return load_recipe(name), False
 
 
 def _write_hulls(folder: Path, recording: Recording, grid: VoxelGrid) -> None:

@@ -15,8 +15,16 @@ __all__ = ["EXPERIMENTS", "find_experiment"]
 
 #: Every experiment's id and its module in this package.
 EXPERIMENTS = {
+    "fig-4.2": "fig_4_2",
+    "table-4.2": "table_4_2",
+    "fig-4.4": "fig_4_4",
     "fig-4.7": "fig_4_7",
     "fig-4.9": "fig_4_9",
+    "table-4.3": "table_4_3",
+    "table-4.4": "table_4_4",
+    "fig-4.12": "fig_4_12",
+    "fig-4.13": "fig_4_13",
+    "fig-4.14": "fig_4_14",
 }
 
 

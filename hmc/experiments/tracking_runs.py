@@ -19,6 +19,7 @@ from hmc.frontend import HullStep
 from hmc.recording import iterate_frames
 from hmc.results import TrackTable, read_centroids
 from hmc.tracking.following import finish, init
+from hmc.tracking.lifecycle import Row
 from hmc.tracking.resumable import Timing, observe_step, person_grid
 from hmc.tracking.trackers import make_tracker
 from hmc.tracking.tracks import frame_rng, table_of
@@ -130,7 +131,8 @@ def follow(parameters: Parameters, inputs: Inputs, seed: int) -> tuple[TrackTabl
     )
     grid = person_grid(recording, parameters["voxel_m"])
     hulls = inputs.hulls(parameters["recording"], parameters["voxel_m"])
-    state, rows, timing = init(recording.fps), [], Timing()
+    state, timing = init(recording.fps), Timing()
+    rows: list[Row] = []
     for hull in _with_images(hulls, iterate_frames(recording)) if color else hulls:
         observation = observe_step(recording, grid, hull, images=color)
         state, info = tracker.step(frame_rng(seed, hull.index), state, hull.index, observation)

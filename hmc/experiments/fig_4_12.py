@@ -1,0 +1,90 @@
+"""Figure 4.12: two people who meet and go past each other, followed by Sparse Sampling with and without colour.
+
+Source: Canton (2009), section 4.4.2. Without colour the thesis's tracks change identity where people cross; with colour they do not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from hmc.evaluation import evaluate_tracks
+from hmc.experiments import tracking_runs as runs
+from hmc.experiments.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
+from hmc.experiments.inputs import Inputs, rendered
+from hmc.plotting import draw_tracks
+from hmc.results import TrackTable, read_centroids
+
+__all__ = ["EXPERIMENT"]
+
+PRESETS = ("default", "canton2009")
+SAMPLES = 400
+VOXEL_M = 0.05
+
+
+def grid(plan: Plan) -> list[dict]:
+    """Both presets with and without colour, several times."""
+    sources = plan.recordings or (rendered("meeting_pass"),)
+    return [
+        runs.parameters_of(source.label, VOXEL_M, ("sparse", color), SAMPLES, preset, repeat)
+        for source in sources
+        for preset in PRESETS
+        for color in (False, True)
+        for repeat in range(3 if plan.quick else 10)
+    ]
+
+
+def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Results:
+    """Tracks and their mismatches; the first repeat keeps the tracks for the picture."""
+    truth = read_centroids(inputs.truth(parameters["recording"]))
+    tracks, _, _ = runs.follow(parameters, inputs, int(rng.integers(2**31)))
+    score = evaluate_tracks(tracks, truth)
+    kept = {"tracks": _plain(tracks), "truth": _plain(truth)} if parameters["repeat"] == 0 else {}
+    wrong = score.misses + score.false_positives + score.mismatches
+    return {"mismatches": score.mismatches, "wrong": wrong, "objects": score.objects, "persons": len(np.unique(tracks.persons)), **kept}
+
+
+def _plain(table: TrackTable) -> dict:
+    return {"frames": table.frames, "persons": table.persons, "positions": table.positions.round(4)}
+
+
+def _table(plain: dict) -> TrackTable:
+    return TrackTable(np.array(plain["frames"], int), np.array(plain["persons"], int), np.array(plain["positions"], float).reshape(-1, 3))
+
+
+def report(cells: Sequence[Cell], plan: Plan) -> Report:
+    """Tracks from above, and how often identities change."""
+    first = cells[0].parameters["recording"]
+    figure, axes = plt.subplots(len(PRESETS), 2, figsize=(8, 3.6 * len(PRESETS)), sharex=True, sharey=True)
+    rows, means = [], {}
+    for row, preset in zip(axes, PRESETS, strict=True):
+        for ax, color in zip(row, (False, True), strict=True):
+            own = [one for one in cells if (one.parameters["preset"], one.parameters["color"]) == (preset, color)]
+            means[preset, color] = float(np.mean([one.results["mismatches"] for one in own]))
+            objects = sum(one.results["objects"] for one in own)
+            rows.append(
+                {
+                    "preset": preset, "color": "yes" if color else "no", "runs": len(own), "mismatches_a_run": means[preset, color],
+                    "runs_without_mismatch": sum(one.results["mismatches"] == 0 for one in own),
+                    "identities_a_run": float(np.mean([one.results["persons"] for one in own])),
+                    "MOTA_percent": 100 * (1 - sum(one.results["wrong"] for one in own) / objects) if objects else None,
+                }
+            )  # fmt: skip
+            shown = next(one.results for one in own if one.parameters["recording"] == first and one.parameters["repeat"] == 0)
+            draw_tracks(_table(shown["tracks"]), truth=_table(shown["truth"]), ax=ax)
+            ax.set_title(f"{preset}, {'color' if color else 'raw'}")
+    claims = tuple(
+        Claim(
+            f"{preset}: no identity changes with colour, some without",
+            means[preset, True] == 0 < means[preset, False],
+            f"{means[preset, False]:.1f} mismatches a run without, {means[preset, True]:.1f} with colour",
+        )
+        for preset in PRESETS
+    )
+    caption = f"Two people pass each other: Sparse Sampling with {SAMPLES} samples, voxels of {100 * VOXEL_M:g} cm. The paper: Figure 4.12."
+    return Report((Table("fig-4.12", caption, rows),), {"fig-4.12": figure}, claims)
+
+
+EXPERIMENT = Experiment("fig-4.12", "a crossing, with and without colour", "Canton, Figure 4.12", grid, cell, report)

@@ -1,0 +1,172 @@
+"""Table 4.3 and Figure 4.11: MOTP and MOTA of the three trackers by voxel size, number of samples or particles, and colour.
+
+Source: Canton (2009), section 4.4.2. Two presets are run: ``canton2009``, the parameters as the thesis prints them, and ``default``, ours.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.figure import Figure
+
+from hmc.experiments import tracking_runs as runs
+from hmc.experiments.experiment import Cell, Claim, Experiment, Plan, Report, Table
+from hmc.experiments.style import COLOURS
+
+__all__ = ["EXPERIMENT", "PAPER", "SAMPLES", "configurations", "grid"]
+
+PRESETS = ("default", "canton2009")
+SAMPLES = {"sparse": (50, 100, 200, 400, 600, 800, 1000), "particle": (10, 25, 50, 100, 150, 200, 250)}
+SAMPLES_QUICK = {"sparse": (50, 200, 1000), "particle": (10, 50, 250)}
+#: By method and number, MOTP (mm) and MOTA (%) at voxels of 15, 10, 5 and 2 cm.
+PAPER_VOXELS = (0.15, 0.10, 0.05, 0.02)
+PAPER: dict[tuple[str, int | None], tuple[float, ...]] = {
+    ("naive", None): (190, 40.15, 189, 47.87, 185, 52.18, 179, 53.51),
+    ("SS raw", 50): (187, 57.78, 182, 69.81, 174, 70.91, 165, 73.75),
+    ("SS raw", 100): (181, 57.09, 177, 70.82, 171, 69.18, 161, 73.01),
+    ("SS raw", 200): (175, 59.55, 175, 71.54, 168, 68.54, 157, 74.86),
+    ("SS raw", 400): (173, 59.08, 172, 71.71, 166, 67.69, 154, 75.87),
+    ("SS raw", 600): (172, 59.16, 170, 71.87, 165, 68.14, 150, 75.65),
+    ("SS raw", 800): (172, 59.35, 169, 72.44, 165, 69.24, 146, 75.87),
+    ("SS raw", 1000): (172, 59.99, 170, 73.19, 162, 69.31, 147, 75.28),
+    ("SS color", 50): (184, 59.78, 183, 73.44, 172, 70.01, 165, 74.62),
+    ("SS color", 100): (178, 59.09, 176, 72.47, 169, 71.88, 159, 74.99),
+    ("SS color", 200): (174, 58.53, 170, 72.62, 162, 72.38, 154, 77.47),
+    ("SS color", 400): (172, 59.52, 169, 72.77, 162, 72.44, 149, 78.98),
+    ("SS color", 600): (170, 58.43, 167, 73.86, 160, 72.47, 145, 79.43),
+    ("SS color", 800): (170, 59.98, 168, 74.23, 159, 72.07, 144, 81.50),
+    ("SS color", 1000): (171, 60.17, 168, 72.84, 159, 72.3, 144, 80.45),
+    ("PF raw", 10): (179, 43.62, 173, 54.64, 166, 56.21, 160, 60.66),
+    ("PF raw", 25): (167, 51.05, 164, 63.82, 156, 66.56, 152, 69.20),
+    ("PF raw", 50): (165, 57.33, 159, 67.52, 152, 68.13, 148, 71.02),
+    ("PF raw", 100): (162, 57.54, 159, 68.96, 151, 71.18, 147, 72.10),
+    ("PF raw", 150): (162, 58.40, 158, 68.71, 151, 70.95, 147, 70.76),
+    ("PF raw", 200): (162, 58.40, 158, 67.24, 150, 70.48, 146, 71.62),
+    ("PF raw", 250): (163, 57.99, 160, 67.94, 151, 69.28, 148, 70.97),
+    ("PF color", 10): (177, 45.86, 171, 57.25, 164, 58.91, 160, 63.54),
+    ("PF color", 25): (167, 54.70, 162, 66.86, 161, 68.75, 152, 71.56),
+    ("PF color", 50): (164, 59.71, 158, 69.52, 150, 70.42, 147, 73.46),
+    ("PF color", 100): (164, 58.68, 157, 71.11, 148, 73.35, 147, 74.56),
+    ("PF color", 150): (163, 61.78, 157, 70.44, 149, 72.04, 146, 72.09),
+    ("PF color", 200): (161, 59.75, 156, 68.61, 149, 71.71, 146, 73.44),
+    ("PF color", 250): (161, 60.10, 155, 69.38, 150, 73.13, 145, 72.61),
+}
+
+Configuration = tuple[str, float, str, int | None]
+
+
+def grid(plan: Plan) -> list[dict]:
+    """All methods at all voxel sizes and numbers, for every recording; the stochastic ones twice in full runs."""
+    numbers = SAMPLES_QUICK if plan.quick else SAMPLES
+    return [
+        runs.parameters_of(source.label, voxel, method, n, preset, repeat)
+        for source in runs.sources(plan)
+        for preset in PRESETS
+        for voxel in runs.voxel_sizes(plan)
+        for method in runs.METHODS
+        for n in numbers.get(method[0], (None,))
+        for repeat in range(1 if plan.quick or method[0] == "naive" else 2)
+    ]
+
+
+def configurations(cells: Sequence[Cell]) -> dict[Configuration, runs.Score]:
+    """Scores by preset, voxel size, method and number, over recordings and repeats."""
+    groups: dict[Configuration, list[Cell]] = {}
+    for one in cells:
+        p = one.parameters
+        groups.setdefault((p["preset"], p["voxel_m"], runs.method_name(p), p["particles"]), []).append(one)
+    return {key: runs.scores_of(group) for key, group in groups.items()}
+
+
+def report(cells: Sequence[Cell], plan: Plan) -> Report:
+    """The table with the paper's figures, one Figure 4.11 a preset, and the paper's remarks."""
+    scores = configurations(cells)
+    rows = []
+    for (preset, voxel, method, n), score in scores.items():
+        motp, mota = _paper(method, n, voxel)
+        rows.append(
+            {
+                "preset": preset, "voxel_cm": 100 * voxel, "method": method, "N": n,
+                "MOTP_mm": score.motp_mm, "MOTP_paper_mm": motp, "MOTA_percent": 100 * score.mota, "MOTA_paper_percent": mota,
+                "FP_percent": 100 * score.false_positives, "miss_percent": 100 * score.misses, "mismatch_percent": 100 * score.mismatches,
+            }
+        )  # fmt: skip
+    figures = {f"fig-4.11-{preset}": _draw(preset, scores) for preset in PRESETS}
+    names = ", ".join(source.name for source in runs.sources(plan))
+    caption = f"MOTP and MOTA on {names}; the paper's (Canton, Table 4.3) on CLEAR 2007, against the heads."
+    return Report((Table("table-4.3", caption, rows),), figures, tuple(claim for preset in PRESETS for claim in _claims(preset, scores)))
+
+
+def _paper(method: str, n: int | None, voxel: float) -> tuple[float | None, float | None]:
+    values = PAPER.get((method, n))
+    if values is None or voxel not in PAPER_VOXELS:
+        return None, None
+    place = 2 * PAPER_VOXELS.index(voxel)
+    return float(values[place]), float(values[place + 1])
+
+
+def _draw(preset: str, scores: dict[Configuration, runs.Score]) -> Figure:
+    voxels = sorted({voxel for name, voxel, _, _ in scores if name == preset}, reverse=True)
+    figure, axes = plt.subplots(2, len(voxels), figsize=(2.6 * len(voxels), 4.6), sharex=True, sharey="row", squeeze=False)
+    for column, voxel in zip(axes.T, voxels, strict=True):
+        column[0].set_title(f"{100 * voxel:g} cm")
+        for (tracker, color), method in runs.METHODS.items():
+            points = sorted((n or 0, score) for (p, v, m, n), score in scores.items() if (p, v, m) == (preset, voxel, method))
+            style = {"color": COLOURS[tracker], "linestyle": "-" if color or tracker == "naive" else "--", "label": method}
+            for ax, values in zip(column, ([s.motp_mm for _, s in points], [100 * s.mota for _, s in points]), strict=True):
+                if tracker == "naive":
+                    ax.axhline(values[0], **style)
+                else:
+                    ax.plot([n for n, _ in points], values, marker="o", **style)
+                ax.set_xscale("log")
+        column[1].set_xlabel("samples, particles")
+    axes[0, 0].set_ylabel("MOTP (mm)")
+    axes[1, 0].set_ylabel("MOTA (%)")
+    axes[0, -1].legend()
+    return figure
+
+
+def _claims(preset: str, scores: dict[Configuration, runs.Score]) -> list[Claim]:
+    """The remarks of section 4.4.2, on this preset's runs."""
+    own = {key[1:]: score for key, score in scores.items() if key[0] == preset}
+    voxels = sorted({voxel for voxel, _, _ in own}, reverse=True)
+    best = {
+        name: max((s for (_, m, _), s in own.items() if m == name), key=lambda s: (s.mota, -s.motp_mm)) for name in runs.METHODS.values()
+    }
+    order = sorted(best, key=lambda name: (-best[name].mota, best[name].motp_mm))
+    families = [next(word for word in ("SS", "PF", "naive") if name.startswith(word)) for name in order]
+
+    def mean(key: str, **where) -> float:
+        return float(np.mean([getattr(s, key) for (v, m, n), s in own.items() if where.get("v", v) == v and where.get("m", m) == m]))
+
+    per_voxel = {key: [mean(key, v=voxel) for voxel in voxels] for key in ("motp_mm", "mota")}
+    colour = {key: [mean(key, m=f"{name} color") - mean(key, m=f"{name} raw") for name in ("SS", "PF")] for key in ("motp_mm", "mota")}
+    numbers = {name: sorted({n for _, m, n in own if m == name and n}) for name in ("SS raw", "SS color", "PF raw", "PF color")}
+    few, many = (float(np.mean([own[v, name, some[place]].motp_mm for name, some in numbers.items() for v in voxels])) for place in (0, -1))
+    return [
+        Claim(
+            f"{preset}: best cases in the order SS color, SS raw, PF, naive",
+            order[:2] == ["SS color", "SS raw"] and families == ["SS", "SS", "PF", "PF", "naive"],
+            ", ".join(f"{name} {best[name].motp_mm:.0f} mm {100 * best[name].mota:.1f} %" for name in order),
+        ),
+        Claim(
+            f"{preset}: finer voxels are better, in MOTP and MOTA",
+            per_voxel["motp_mm"][-1] < per_voxel["motp_mm"][0] and per_voxel["mota"][-1] > per_voxel["mota"][0],
+            ", ".join(f"{100 * v:g} cm {p:.0f} mm {100 * a:.1f} %" for v, p, a in zip(voxels, *per_voxel.values(), strict=True)),
+        ),
+        Claim(
+            f"{preset}: colour is better, in MOTP and MOTA, of SS and PF",
+            max(colour["motp_mm"]) < 0 and min(colour["mota"]) > 0,
+            f"SS {colour['motp_mm'][0]:+.1f} mm {100 * colour['mota'][0]:+.2f} %, "
+            f"PF {colour['motp_mm'][1]:+.1f} mm {100 * colour['mota'][1]:+.2f} %",
+        ),
+        Claim(f"{preset}: more samples or particles lower MOTP", many < few, f"{few:.0f} mm with the fewest, {many:.0f} mm with the most"),
+    ]  # fmt: skip
+
+
+EXPERIMENT = Experiment(
+    "table-4.3", "MOTP and MOTA of naive, Sparse Sampling and particle filter, with figure 4.11", "Canton, Table 4.3 and Figure 4.11",
+    grid, runs.cell, report, runs.FAMILY, runs.VERSION,
+)  # fmt: skip
