@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from drawn import silhouette
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import ndimage
 
@@ -30,6 +30,7 @@ def test_radii_are_those_of_the_thesis():
     assert person_radii(np.array([[1.0, 2.0, 0.1]]), 1.0, 1.0)[0] == pytest.approx([0.3, 0.3, 0.6])
 
 
+@settings(deadline=None)
 @given(st.integers(0, 2**32 - 1), st.floats(0.01, 0.2))
 def test_features_against_scipy(seed, size):
     rng = np.random.default_rng(seed)
@@ -101,6 +102,7 @@ def wrapped(angle):
     return abs((angle + np.pi) % (2 * np.pi) - np.pi)
 
 
+@settings(deadline=None)
 @given(st.floats(-np.pi, np.pi))
 def test_the_shoulders_axis_is_at_right_angles_to_the_facing(angle):
     axis, sure = shoulder_axis(body(angle))
@@ -108,6 +110,7 @@ def test_the_shoulders_axis_is_at_right_angles_to_the_facing(angle):
     assert 0 <= axis < np.pi and 0.5 < sure < 1
 
 
+@settings(deadline=None)
 @given(st.floats(-np.pi, np.pi))
 def test_arms_tell_where_somebody_who_stands_faces(angle):
     angles, weights = facing_hypotheses(body(angle, reach=0.4), np.zeros(3))
@@ -116,6 +119,7 @@ def test_arms_tell_where_somebody_who_stands_faces(angle):
     assert np.linalg.norm(arm_reach(body(angle, reach=0.4))) > 0.1
 
 
+@settings(deadline=None)
 @given(st.floats(-np.pi, np.pi))
 def test_who_walks_faces_where_they_go(angle):
     angles, weights = facing_hypotheses(body(angle), 1.2 * np.array([np.cos(angle + 0.2), np.sin(angle + 0.2), 0]))

@@ -90,7 +90,7 @@ def color_surface(observation: Observation, rows: np.ndarray) -> tuple[np.ndarra
     observation : Observation
         Its views hold the images.
     rows : ndarray of int, shape (m,)
-        The observation's voxels that count; the others are taken as empty.
+        The voxels that are asked for. Of the others, those of the strict hull may hide them.
 
     Returns
     -------
@@ -104,9 +104,12 @@ def color_surface(observation: Observation, rows: np.ndarray) -> tuple[np.ndarra
     if views is None or not len(views.images) or not len(rows):
         return np.zeros(0, int), np.zeros(0, int)
     occupied = np.zeros(grid.shape, bool)
+    occupied[tuple(observation.indices[observation.certain].T)] = True
     occupied[tuple(voxels.T)] = True
-    skin = surface(occupied)
     place = np.full(grid.shape, -1, np.int32)
     place[tuple(voxels.T)] = rows
+    skin = surface(occupied)
+    skin_rows = place[tuple(skin.T)]
+    skin, skin_rows = skin[skin_rows >= 0], skin_rows[skin_rows >= 0].astype(int)
     seen = visibility(occupied, grid, views.rig, skin, mode="quick")
-    return place[tuple(skin.T)].astype(int), color_bins(color_voxels(grid, views.rig, views.images, skin, seen, views.masks))
+    return skin_rows, color_bins(color_voxels(grid, views.rig, views.images, skin, seen, views.masks))

@@ -36,7 +36,9 @@ class FollowingSettings:
     most_reach_m : float
         A person who was lost is not looked for further away than this.
     shared_gain : float
-        Share of the measured correction that is believed while persons share one component.
+        Share of the measured correction that is believed while persons share one component, where no filter tells them apart.
+    filter_gain : float
+        The same of what a filter says.
     least_certain_m3 : float
         A person with so much of the strict hull is located by it; else by the tolerant one.
     lifecycle : LifecycleSettings
@@ -50,6 +52,7 @@ class FollowingSettings:
     most_speed_m_s: float = 4.0
     most_reach_m: float = 1.2
     shared_gain: float = 0.5
+    filter_gain: float = 1.0
     least_certain_m3: float = 0.03
     lifecycle: LifecycleSettings = field(default_factory=LifecycleSettings)
 

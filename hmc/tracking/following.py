@@ -7,7 +7,7 @@ persons' clouds of samples; without one, each person is at the centroid of their
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from time import thread_time
 
 import numpy as np
@@ -15,34 +15,17 @@ import numpy as np
 from hmc.errors import InputError
 from hmc.tracking.association import FollowingSettings, assign_voxels, find_again, head_centre, locating_voxels, predict
 from hmc.tracking.blobs import Observation, blob_features
+from hmc.tracking.cloud import Cloud, Departed
 from hmc.tracking.ghosts import real_people
+from hmc.tracking.identity import exchange_mistaken, learn_looks, recognise
 from hmc.tracking.lifecycle import Candidate, Row, Track, confirm, delete, newcomers, propose, still_a_person
 
-__all__ = ["Cloud", "Filter", "Filtered", "StepInfo", "TrackerState", "advance", "finish", "init"]
+__all__ = ["Filter", "Filtered", "StepInfo", "TrackerState", "advance", "finish", "init", "original_number"]
 
 #: Share of the room beyond which what is occupied cannot be people.
 MOST_FILLED = 0.5
-
-
-@dataclass(frozen=True)
-class Cloud:
-    """What a filter remembers of one person.
-
-    Attributes
-    ----------
-    person : int
-    points : ndarray, shape (n, 3)
-        Particles (positions, metres) or samples (voxels); none where the filter has to begin anew.
-    weights : ndarray, shape (n,)
-        Sum to 1.
-    histogram : ndarray, shape (n_colors,)
-        Reference histogram of the person's colours, sums to 1; empty as long as nothing is known.
-    """
-
-    person: int
-    points: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
-    weights: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    histogram: np.ndarray = field(default_factory=lambda: np.zeros(0))
+#: Someone who came is compared with those who left after this time, when their colours are known.
+RECOGNISE_AFTER_S = 1.0
 
 
 @dataclass(frozen=True)
@@ -58,6 +41,10 @@ class TrackerState:
     next_person : int
     clouds : tuple of Cloud
         One a track, in the same order, where a filter is used; else none.
+    departed : tuple of Departed
+        Those who left and whose colours are known.
+    same : tuple of (int, int)
+        Numbers of persons who came back, and the numbers that they had before.
     """
 
     fps: float
@@ -65,6 +52,8 @@ class TrackerState:
     candidates: tuple[Candidate, ...] = ()
     next_person: int = 0
     clouds: tuple[Cloud, ...] = ()
+    departed: tuple[Departed, ...] = ()
+    same: tuple[tuple[int, int], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -101,6 +90,10 @@ class Filtered:
     seen : ndarray of bool, shape (k,)
         Whether the filter saw the person.
     clouds : tuple of Cloud
+    looks : tuple of ndarray
+        Histogram of what each person looks like in this frame, empty where nothing is seen; empty where colours do not count.
+    keep_histogram : float
+        Share of the reference histogram that stays (Eq. 4.11).
     color_s : float
         Processor seconds spent on colouring voxels.
     """
@@ -108,6 +101,8 @@ class Filtered:
     positions: np.ndarray
     seen: np.ndarray
     clouds: tuple[Cloud, ...]
+    looks: tuple[np.ndarray, ...] = ()
+    keep_histogram: float = 1.0
     color_s: float = 0.0
 
 
@@ -176,25 +171,59 @@ def advance(
     # Of a person who was found again elsewhere, the filter knows nothing.
     known = filtered.seen & ~np.isin(np.arange(n), owners[claimed != owners])
     measured = np.where(known[:, None], positions, located.centroid)
-    gain = np.where(shared & ~known, settings.shared_gain, 1.0)
+    gain = np.where(shared, np.where(known, settings.filter_gain, settings.shared_gain), 1.0)
     tracks, rows = [], []
     for k, track in enumerate(state.tracks):
         if supported[k]:
             head = head_centre(observation.points[best & (owners == k)])
             moved = predicted[k] + gain[k] * (measured[k] - predicted[k])
             tracks.append(_update(track, frame, moved, gain[k], owned.volume_m3[k], head, bool(shared[k]), state.fps, settings))
-            rows.append(Row(frame, track.person, measured[k], head))
+            rows.append(Row(frame, track.person, measured[k] if gain[k] == 1 or not known[k] else moved, head))
         else:
             tracks.append(replace(track, position=predicted[k], velocity=track.velocity * 0.8))
 
-    candidates = propose(state.candidates, _newcomers(observation, owners, frame, settings), tuple(tracks), settings.lifecycle)
+    followed = tuple(tracks)
+    clouds = tuple(cloud if known[k] else Cloud(cloud.person, histogram=cloud.histogram) for k, cloud in enumerate(filtered.clouds))
+    if filtered.looks:
+        followed, clouds, looks = exchange_mistaken(followed, clouds, filtered.looks)
+        clouds = learn_looks(followed, clouds, looks, filtered.keep_histogram)
+    candidates = propose(state.candidates, _newcomers(observation, owners, frame, settings), followed, settings.lifecycle)
     candidates, fresh, earlier = confirm(candidates, state.next_person, state.fps, settings.lifecycle)
-    kept = delete((*tracks, *fresh), frame, state.fps, observation.room, settings.lifecycle)
+    kept = delete((*followed, *fresh), frame, state.fps, observation.room, settings.lifecycle)
     numbers = np.array([*(track.person for track in state.tracks), -1])
     info = StepInfo((*rows, *earlier), numbers[owners], tuple(int(number) for number in numbers[:-1][shared]), filtered.color_s, filter_s)
-    moved = {cloud.person: cloud if known[k] else Cloud(cloud.person, histogram=cloud.histogram) for k, cloud in enumerate(filtered.clouds)}
-    clouds = tuple(moved.get(track.person, Cloud(track.person)) for track in kept) if filter else ()
-    return TrackerState(state.fps, kept, candidates, state.next_person + len(fresh), clouds), info
+    after = TrackerState(state.fps, kept, candidates, state.next_person + len(fresh), (), state.departed, state.same)
+    return (_with_clouds(after, followed, clouds, frame) if filter else after), info
+
+
+def _with_clouds(state: TrackerState, followed: tuple[Track, ...], clouds: tuple[Cloud, ...], frame: int) -> TrackerState:
+    """The state with its tracks' clouds; those whose track ended have departed, and some who began lately had been there before."""
+    memory = {cloud.person: cloud for cloud in clouds}
+    present = {track.person for track in state.tracks}
+    departed, same = state.departed, state.same
+    for track in followed:
+        look = memory[track.person].histogram
+        if track.person not in present and look.size:
+            departed += (Departed(original_number(same, track.person), look, track.last_frame),)
+        elif look.size and frame - track.first_frame == round(RECOGNISE_AFTER_S * state.fps):
+            before = recognise(look, track.first_frame, departed)
+            if before is not None:
+                same += ((track.person, before),)
+                departed = tuple(one for one in departed if one.person != before)
+    clouds = tuple(memory.get(track.person, Cloud(track.person)) for track in state.tracks)
+    return replace(state, clouds=clouds, departed=departed, same=same)
+
+
+def original_number(same: tuple[tuple[int, int], ...], person: int) -> int:
+    """The number that a person who may have come back had at first.
+
+    Parameters
+    ----------
+    same : tuple of (int, int)
+        Of the last state.
+    person : int
+    """
+    return dict(same).get(person, person)
 
 
 def finish(state: TrackerState, n_frames: int, settings: FollowingSettings | None = None) -> tuple[Row, ...]:

@@ -15,9 +15,10 @@ from hmc.errors import InputError
 from hmc.montecarlo import systematic
 from hmc.tracking.association import FollowingSettings
 from hmc.tracking.blobs import Observation
-from hmc.tracking.following import Cloud, Filtered, StepInfo, TrackerState, advance, finish, init
+from hmc.tracking.cloud import Cloud
+from hmc.tracking.following import Filtered, StepInfo, TrackerState, advance, finish, init
 from hmc.tracking.region import PERSON_RADIUS_M
-from hmc.tracking.surroundings import adapted, blocking, look_around
+from hmc.tracking.surroundings import blocking, look_around, looks_of
 
 __all__ = ["ParticleSettings", "color_likelihood", "finish", "init", "overlap", "step"]
 
@@ -192,7 +193,7 @@ def _filter(
             colored = rows[around.colors[rows] >= 0]
             like = color_likelihood(observation.points[colored], around.colors[colored], particles, radii, cloud.histogram)
             weights = settings.raw_share * weights + (1 - settings.raw_share) * like
-        zones = blocking(*particles.T[:2], np.full(len(particles), k), centres, settings.blocking / PERSON_RADIUS_M**2)
+        zones = blocking(particles, np.full(len(particles), k), centres, settings.blocking / PERSON_RADIUS_M**2)
         weights = weights * zones
         best = weights.max()
         if best <= 0:
@@ -201,8 +202,8 @@ def _filter(
         weights = (weights / best) ** settings.sharpness
         moved.append((particles, weights / weights.sum()))
         positions[k] = moved[k][1] @ particles
-    references = [cloud.histogram for cloud in state.clouds]
-    if settings.color:
-        references = adapted(references, observation, around, positions, settings.keep_histogram)
-    clouds = tuple(Cloud(cloud.person, *pair, reference) for cloud, pair, reference in zip(state.clouds, moved, references, strict=True))
-    return Filtered(positions, np.array([len(cloud.points) > 0 for cloud in clouds], bool), clouds, around.color_s)
+    looks = looks_of(observation, around, positions) if settings.color else ()
+    clouds = tuple(Cloud(cloud.person, *pair, cloud.histogram) for cloud, pair in zip(state.clouds, moved, strict=True))
+    return Filtered(
+        positions, np.array([len(cloud.points) > 0 for cloud in clouds], bool), clouds, looks, settings.keep_histogram, around.color_s
+    )

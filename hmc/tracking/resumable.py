@@ -24,7 +24,8 @@ from hmc.journal import append_journal, open_journal
 from hmc.recording import Recording
 from hmc.results import TrackTable
 from hmc.tracking.blobs import Observation, observe
-from hmc.tracking.following import Cloud, TrackerState, finish, init
+from hmc.tracking.cloud import Cloud, Departed
+from hmc.tracking.following import TrackerState, finish, init
 from hmc.tracking.ghosts import Views
 from hmc.tracking.lifecycle import Candidate, Row, Track
 from hmc.tracking.trackers import Tracker, make_tracker
@@ -121,7 +122,7 @@ def track_recording(
     rows += finish(state, recording.n_frames, tracker.following)
     if on_timing is not None:
         on_timing(timing)
-    return table_of(rows, recording.fps)
+    return table_of(rows, recording.fps, same=state.same)
 
 
 def person_grid(recording: Recording, voxel_size_m: float) -> VoxelGrid:
@@ -203,23 +204,26 @@ def _to_plain(done: Done, since: Done) -> dict[str, Any]:
     """A record of the journal: the state, and what is new since the last record."""
     new = replace(done, rows=done.rows[len(since.rows) :], problems=done.problems[len(since.problems) :])
     plain = asdict(new)
-    for cloud in plain["state"]["clouds"]:  # nearly all of a histogram is zero
+    for cloud in (*plain["state"]["clouds"], *plain["state"]["departed"]):  # nearly all of a histogram is zero
         colors = np.flatnonzero(cloud["histogram"])
         cloud["histogram"] = {"size": len(cloud["histogram"]), "colors": colors, "shares": cloud["histogram"][colors]}
     return plain
 
 
-def _cloud_of(plain: dict[str, Any]) -> Cloud:
-    histogram = np.zeros(plain["histogram"]["size"])
-    histogram[np.array(plain["histogram"]["colors"], int)] = plain["histogram"]["shares"]
-    return Cloud(plain["person"], np.array(plain["points"], float).reshape(-1, 3), np.array(plain["weights"], float), histogram)
+def _histogram_of(plain: dict[str, Any]) -> np.ndarray:
+    histogram = np.zeros(plain["size"])
+    histogram[np.array(plain["colors"], int)] = plain["shares"]
+    return histogram
 
 
 def _state_of(plain: dict[str, Any]) -> TrackerState:
     tracks = tuple(Track(**_arrays(track)) for track in plain["tracks"])
     candidates = tuple(Candidate(tuple(_row_of(row) for row in one["rows"]), one["missed"]) for one in plain["candidates"])
-    clouds = tuple(_cloud_of(cloud) for cloud in plain["clouds"])
-    return TrackerState(plain["fps"], tracks, candidates, plain["next_person"], clouds)
+    clouds = tuple(Cloud(**_arrays(one) | {"histogram": _histogram_of(one["histogram"])}) for one in plain["clouds"])
+    clouds = tuple(replace(cloud, points=cloud.points.reshape(-1, 3)) for cloud in clouds)
+    departed = tuple(Departed(one["person"], _histogram_of(one["histogram"]), one["last_frame"]) for one in plain["departed"])
+    same = tuple((now, before) for now, before in plain["same"])
+    return TrackerState(plain["fps"], tracks, candidates, plain["next_person"], clouds, departed, same)
 
 
 def _row_of(plain: dict[str, Any]) -> Row:

@@ -7,6 +7,7 @@ text: samples move with the person's smoothed velocity (``drift``; 0 is the thes
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -16,9 +17,10 @@ from hmc.montecarlo import systematic
 from hmc.tracking.appearance import similar_colors
 from hmc.tracking.association import FollowingSettings
 from hmc.tracking.blobs import Observation
-from hmc.tracking.following import Cloud, Filtered, StepInfo, TrackerState, advance, finish, init
+from hmc.tracking.cloud import Cloud
+from hmc.tracking.following import Filtered, StepInfo, TrackerState, advance, finish, init
 from hmc.tracking.region import PERSON_RADIUS_M
-from hmc.tracking.surroundings import Surroundings, adapted, blocking, look_around
+from hmc.tracking.surroundings import Surroundings, blocking, look_around, looks_of
 
 __all__ = ["SparseSettings", "finish", "init", "neighbourhood_counts", "pseudo_likelihood", "spread_out", "step"]
 
@@ -143,17 +145,17 @@ def neighbourhood_counts(
     x, y, z = voxels.T - low[:, np.minimum(voxel_person, low.shape[1] - 1)]
     inside = (x >= 0) & (x < shape[1]) & (y >= 0) & (y < shape[2]) & (z >= 0) & (z < shape[3]) & (voxel_person < shape[0])
     volume = np.zeros(int(np.prod(shape)), np.int32)
-    volume[_flat(voxel_person, x, y, z, shape)[inside]] = codes[inside]
+    volume[_flat(voxel_person, (x, y, z), shape)[inside]] = codes[inside]
     runs = volume[: len(volume) - 2 * radius].copy()  # sums along z from each voxel on
     for ahead in range(1, 2 * radius + 1):
         runs += volume[ahead : len(volume) - 2 * radius + ahead]
     side = np.arange(-radius, radius + 1)
     columns = ((side[:, None] * shape[2] + side) * shape[3]).ravel() - radius
-    places = _flat(person, *(samples.T - low[:, person]), shape)
+    places = _flat(person, samples.T - low[:, person], shape)
     return runs.take(columns[:, None] + places).sum(axis=0, dtype=np.int32), volume.take(places)
 
 
-def pseudo_likelihood(counts: np.ndarray, own: np.ndarray, settings: SparseSettings, colored: bool = True) -> np.ndarray:
+def pseudo_likelihood(counts: np.ndarray, own: np.ndarray, settings: SparseSettings, colored: bool | np.ndarray = True) -> np.ndarray:
     """How likely each sample is part of its person's surface (Canton, Eq. 4.19-4.21).
 
     Parameters
@@ -198,7 +200,7 @@ def spread_out(rng: np.random.Generator, samples: np.ndarray, person: np.ndarray
     person : ndarray of int, shape (m,)
     """
     low, shape = _boxes(samples, person, 1)
-    home = _flat(person, *(samples.T - low[:, person]), shape)
+    home = _flat(person, samples.T - low[:, person], shape)
     around = (ADJACENT[:, 0] * shape[2] + ADJACENT[:, 1]) * shape[3] + ADJACENT[:, 2]
     wanted, waiting = home, np.arange(len(samples), dtype=np.int32)
     holder = np.full(int(np.prod(shape)), -1, np.int32)  # the sample in each voxel
@@ -232,8 +234,9 @@ def _boxes(samples: np.ndarray, person: np.ndarray, margin: int) -> tuple[np.nda
     return (low - margin).T, (len(starts), nx, ny, nz)
 
 
-def _flat(person: np.ndarray, x: np.ndarray, y: np.ndarray, z: np.ndarray, shape: tuple[int, int, int, int]) -> np.ndarray:
-    """Where voxels of the persons' boxes are in the flat array of all boxes."""
+def _flat(person: np.ndarray, cells: Sequence[np.ndarray] | np.ndarray, shape: tuple[int, int, int, int]) -> np.ndarray:
+    """Where cells (x, y, z) of the persons' boxes are in the flat array of all boxes."""
+    x, y, z = cells
     return ((person * shape[1] + x) * shape[2] + y) * shape[3] + z
 
 
@@ -252,7 +255,7 @@ def _filter(
         weights = _likelihood(samples, person, state.clouds, observation, around, settings)
         x, y = (origin[:2] + size * (samples[:, :2] + 0.5)).T
         weights *= (x - centres[person, 0]) ** 2 + (y - centres[person, 1]) ** 2 <= settings.reach_m**2
-        weights *= blocking(x, y, person, centres, settings.blocking / PERSON_RADIUS_M**2)
+        weights *= blocking(np.stack([x, y], axis=1), person, centres, settings.blocking / PERSON_RADIUS_M**2)
         good = weights > 0
         samples, person, weights = samples[good], person[good], weights[good]
     total = np.bincount(person, weights, n)
@@ -260,15 +263,12 @@ def _filter(
     weights = weights / total[person]
     mean = np.stack([np.bincount(person, weights * column, n) for column in samples.T], axis=1)
     positions = np.where(seen[:, None], origin + size * (mean + 0.5), centres)
-    references = [cloud.histogram for cloud in state.clouds]
-    if settings.color:
-        references = adapted(references, observation, around, positions, settings.keep_histogram)
+    looks = looks_of(observation, around, positions) if settings.color else ()
     parts = np.split(np.arange(len(samples)), np.cumsum(np.bincount(person, minlength=n))[:-1]) if n else []
     clouds = tuple(
-        Cloud(cloud.person, samples[part], weights[part], reference)
-        for cloud, part, reference in zip(state.clouds, parts, references, strict=True)
+        Cloud(cloud.person, samples[part], weights[part], cloud.histogram) for cloud, part in zip(state.clouds, parts, strict=True)
     )
-    return Filtered(positions, seen, clouds, around.color_s)
+    return Filtered(positions, seen, clouds, looks, settings.keep_histogram, around.color_s)
 
 
 def _propagate(

@@ -10,14 +10,16 @@ from time import thread_time
 
 import numpy as np
 
-from hmc.tracking.appearance import adapt, color_surface, histogram
+from hmc.tracking.appearance import color_surface, histogram
 from hmc.tracking.blobs import Observation
 from hmc.tracking.region import person_radii, region_distance
 
-__all__ = ["Surroundings", "adapted", "blocking", "look_around"]
+__all__ = ["Surroundings", "blocking", "look_around", "looks_of"]
 
 #: Colour of a voxel inside the hull, and of a surface voxel that no camera sees.
 INNER, UNSEEN = -2, -1
+#: Fewer coloured voxels tell nothing of a person.
+LEAST_COLORED = 30
 
 
 @dataclass(frozen=True)
@@ -74,13 +76,13 @@ def look_around(observation: Observation, centres: np.ndarray, reach_m: float, l
     return Surroundings(tuple(rows), colors, thread_time() - begun)
 
 
-def blocking(x: np.ndarray, y: np.ndarray, person: np.ndarray, centres: np.ndarray, sharpness: float) -> np.ndarray:
+def blocking(points: np.ndarray, person: np.ndarray, centres: np.ndarray, sharpness: float) -> np.ndarray:
     """How little the other persons' exclusion zones hinder each point (Canton, Eq. 4.12 and 4.13), in the xy plane.
 
     Parameters
     ----------
-    x, y : ndarray, shape (n,)
-        Points, world, metres.
+    points : ndarray, shape (n, 2) or (n, 3)
+        World, metres.
     person : ndarray of int, shape (n,)
         Whose each point is: a row of `centres`.
     centres : ndarray, shape (k, 3)
@@ -93,6 +95,7 @@ def blocking(x: np.ndarray, y: np.ndarray, person: np.ndarray, centres: np.ndarr
     ndarray, shape (n,)
         Product over the others, 0 to 1.
     """
+    x, y = points[:, 0], points[:, 1]
     free = np.ones(len(x))
     if sharpness > 0 and len(centres) > 1:
         for k, centre in enumerate(centres):
@@ -101,31 +104,26 @@ def blocking(x: np.ndarray, y: np.ndarray, person: np.ndarray, centres: np.ndarr
     return free
 
 
-def adapted(
-    references: list[np.ndarray], observation: Observation, surroundings: Surroundings, positions: np.ndarray, keep: float
-) -> list[np.ndarray]:
-    """The persons' reference histograms after a frame (Eq. 4.11).
+def looks_of(observation: Observation, surroundings: Surroundings, positions: np.ndarray) -> tuple[np.ndarray, ...]:
+    """What each person looks like in this frame: the histogram of the coloured voxels in their ellipsoid (Eq. 4.11).
 
-    A coloured voxel counts for the person in whose ellipsoid it lies; one in several ellipsoids counts for nobody, so that people who
-    stand together do not take on one another's colours.
+    A voxel in several ellipsoids counts for nobody, so that people who stand together do not take on one another's colours.
 
     Parameters
     ----------
-    references : list of ndarray, shape (n_colors,) or (0,)
-        One a person; empty as long as nothing is known.
     observation : Observation
     surroundings : Surroundings
     positions : ndarray, shape (k, 3)
         The new estimates.
-    keep : float
-        Share of the old histogram.
 
     Returns
     -------
-    list of ndarray
+    tuple of ndarray, shape (n_colors,) or (0,)
+        Empty where fewer than `LEAST_COLORED` voxels have a colour.
     """
     colored = np.flatnonzero(surroundings.colors >= 0)
     inside = region_distance(observation.points[colored], positions, person_radii(positions, 1.0, 1.0)) <= 1
     inside &= inside.sum(axis=1, keepdims=True) == 1
     bins = surroundings.colors[colored]
-    return [adapt(reference, histogram(bins[mine]), keep) for reference, mine in zip(references, inside.T, strict=True)]
+    enough = inside.sum(axis=0) >= LEAST_COLORED
+    return tuple(histogram(bins[mine] if many else bins[:0]) for mine, many in zip(inside.T, enough, strict=True))

@@ -106,4 +106,6 @@ def tracker_of(settings: Settings) -> Tracker:
 def _following(preset: str) -> FollowingSettings:
     if preset == "canton2009":
         return FollowingSettings(exclusion="remove")
+    if preset == "alike":
+        return FollowingSettings(filter_gain=0.5)
     return FollowingSettings()

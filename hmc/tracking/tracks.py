@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from hmc.results import TrackTable
 from hmc.tracking.association import FollowingSettings, assign_voxels
 from hmc.tracking.blobs import Observation
-from hmc.tracking.following import finish, init
+from hmc.tracking.following import finish, init, original_number
 from hmc.tracking.lifecycle import Row
 from hmc.tracking.trackers import Tracker, make_tracker
 
@@ -47,7 +48,7 @@ def run(
         rows += info.rows
         n_frames += 1
     rows += finish(state, n_frames, tracker.following)
-    return table_of(rows, fps, gap_s)
+    return table_of(rows, fps, gap_s, state.same)
 
 
 def frame_rng(seed: int, frame: int) -> np.random.Generator:
@@ -55,8 +56,12 @@ def frame_rng(seed: int, frame: int) -> np.random.Generator:
     return np.random.default_rng((seed, frame))
 
 
-def table_of(rows: Iterable[Row], fps: float, gap_s: float = 1.0) -> TrackTable:
-    """The finished table: gaps up to `gap_s` seconds filled, persons numbered in the order in which they were first seen."""
+def table_of(rows: Iterable[Row], fps: float, gap_s: float = 1.0, same: tuple[tuple[int, int], ...] = ()) -> TrackTable:
+    """The finished table: gaps up to `gap_s` seconds filled, persons numbered in the order in which they were first seen.
+
+    `same` are the persons who came back, with the numbers that they had before (`hmc.tracking.following.TrackerState`).
+    """
+    rows = [replace(row, person=original_number(same, row.person)) for row in rows]
     return renumber(fill_gaps(from_rows(rows), round(gap_s * fps)))
 
 
