@@ -22,7 +22,18 @@ from hmc.tracking.following import Filtered, StepInfo, TrackerState, advance, fi
 from hmc.tracking.region import PERSON_RADIUS_M
 from hmc.tracking.surroundings import Surroundings, blocking, look_around, looks_of
 
-__all__ = ["SparseSettings", "finish", "init", "neighbourhood_counts", "pseudo_likelihood", "spread_out", "step"]
+__all__ = [
+    "SparseSettings",
+    "filter_samples",
+    "finish",
+    "init",
+    "neighbourhood_counts",
+    "propagate",
+    "pseudo_likelihood",
+    "sample_likelihood",
+    "spread_out",
+    "step",
+]
 
 #: Bits that each of the three counts of a neighbourhood has.
 COUNT_BITS = 10
@@ -112,7 +123,11 @@ def step(
     settings = SparseSettings() if settings is None else settings
 
     def follow(state: TrackerState, predicted: np.ndarray, observation: Observation) -> Filtered:
-        return _filter(rng, state, predicted, observation, settings)
+        last = np.array([track.position for track in state.tracks]).reshape(-1, 3)
+        centres = last + settings.drift * (predicted - last)
+        reach = settings.reach_m + settings.radius * observation.voxel_size_m
+        around = look_around(observation, centres, reach, settings.following.least_certain_m3, settings.color)
+        return filter_samples(rng, state, centres, observation, around, settings)
 
     return advance(state, frame, observation, settings.following, follow)
 
@@ -240,19 +255,37 @@ def _flat(person: np.ndarray, cells: Sequence[np.ndarray] | np.ndarray, shape: t
     return ((person * shape[1] + x) * shape[2] + y) * shape[3] + z
 
 
-def _filter(
-    rng: np.random.Generator, state: TrackerState, predicted: np.ndarray, observation: Observation, settings: SparseSettings
+def filter_samples(
+    rng: np.random.Generator,
+    state: TrackerState,
+    centres: np.ndarray,
+    observation: Observation,
+    around: Surroundings,
+    settings: SparseSettings,
 ) -> Filtered:
-    """Move everybody's samples by one frame."""
+    """Move everybody's samples by one frame, weigh them and take their means (Canton, Eq. 4.18).
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    state : TrackerState
+    centres : ndarray, shape (k, 3)
+        Where the state's tracks are expected, world, metres: the middle of the samples allowed and of the exclusion zones.
+    observation : Observation
+    around : Surroundings
+        The voxels near each.
+    settings : SparseSettings
+
+    Returns
+    -------
+    Filtered
+    """
     n, size, origin = len(state.tracks), observation.voxel_size_m, observation.room[0]
     last = np.array([track.position for track in state.tracks]).reshape(-1, 3)
-    centres = last + settings.drift * (predicted - last)
-    reach = settings.reach_m + settings.radius * size
-    around = look_around(observation, centres, reach, settings.following.least_certain_m3, settings.color)
-    samples, person = _propagate(rng, state.clouds, np.rint((centres - last) / size), observation, around, settings)
+    samples, person = propagate(rng, state.clouds, np.rint((centres - last) / size), observation, around, settings)
     weights = np.zeros(0)
     if len(samples):
-        weights = _likelihood(samples, person, state.clouds, observation, around, settings)
+        weights = sample_likelihood(samples, person, state.clouds, observation, around, settings)
         x, y = (origin[:2] + size * (samples[:, :2] + 0.5)).T
         weights *= (x - centres[person, 0]) ** 2 + (y - centres[person, 1]) ** 2 <= settings.reach_m**2
         weights *= blocking(np.stack([x, y], axis=1), person, centres, settings.blocking / PERSON_RADIUS_M**2)
@@ -271,7 +304,7 @@ def _filter(
     return Filtered(positions, seen, clouds, looks, settings.keep_histogram, around.color_s)
 
 
-def _propagate(
+def propagate(
     rng: np.random.Generator,
     clouds: tuple[Cloud, ...],
     drift: np.ndarray,
@@ -279,7 +312,24 @@ def _propagate(
     around: Surroundings,
     settings: SparseSettings,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Samples in this frame, (n, 3) int, and whose they are: the last ones resampled and moved, and voxels of the hull drawn anew."""
+    """Everybody's samples in this frame: the last ones resampled and moved, and voxels of the hull drawn anew.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    clouds : tuple of Cloud
+    drift : ndarray, shape (k, 3)
+        By how many voxels each person's samples move, whole numbers.
+    observation, around, settings
+        As for `filter_samples`.
+
+    Returns
+    -------
+    samples : ndarray of int, shape (n, 3)
+        Voxels; a person has no two the same.
+    person : ndarray of int, shape (n,)
+        Whose each is, ascending.
+    """
     most = max(1, round(settings.noise_m / observation.voxel_size_m))
     parts = []
     for k, (cloud, rows) in enumerate(zip(clouds, around.rows, strict=True)):
@@ -299,7 +349,7 @@ def _draw(rng: np.random.Generator, rows: np.ndarray, n: int) -> np.ndarray:
     return rows[((np.arange(n) + rng.random(n)) * (len(rows) / max(n, 1))).astype(np.int64)]
 
 
-def _likelihood(
+def sample_likelihood(
     samples: np.ndarray,
     person: np.ndarray,
     clouds: tuple[Cloud, ...],
@@ -307,7 +357,21 @@ def _likelihood(
     around: Surroundings,
     settings: SparseSettings,
 ) -> np.ndarray:
-    """Pseudo-likelihood of everybody's samples, shape (n,)."""
+    """Pseudo-likelihood of everybody's samples.
+
+    Parameters
+    ----------
+    samples, person
+        As from `propagate`; at least one.
+    clouds : tuple of Cloud
+    observation, around, settings
+        As for `filter_samples`.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        0 to 1.
+    """
     rows = np.concatenate(around.rows)
     codes = np.ones(len(rows), np.int32)
     known = np.array([settings.color and cloud.histogram.size > 0 for cloud in clouds])
