@@ -129,15 +129,21 @@ def overlap(voxels: np.ndarray, centres: np.ndarray, radii: np.ndarray, origin: 
 
     cells = first[:, None] + side[:, None]  # (n, side, 2)
     aside = ((cells - middle[:, None, :2]) / size[:, None, :2]) ** 2
-    inside = 1 - aside[:, :, None, 0] - aside[:, None, :, 1]
-    reach = size[:, 2, None, None] * np.sqrt(np.maximum(inside, 0))
-    height = middle[:, 2, None, None]
-    start, end = np.ceil(height - reach), np.floor(height + reach) + 1
-    full = np.where(inside >= 0, end - start, 0).sum(axis=(1, 2))
-    moved_cells = cells - low[:2]
-    column = (moved_cells[:, :, None, 0] * shape[1] + moved_cells[:, None, :, 1]) * (shape[2] + 1)
-    ends = [below.ravel().take(column + np.clip(at, 0, shape[2]).astype(np.int64)) for at in (start, end)]
-    held = np.where(inside >= 0, ends[1] - ends[0], 0).sum(axis=(1, 2))
+    aside = aside.astype(np.float32)
+    inside = (1 - aside[:, :, None, 0]) - aside[:, None, :, 1]
+    crossed = inside >= 0
+    counts = np.count_nonzero(crossed, axis=(1, 2))
+    reach = np.repeat(size[:, 2].astype(np.float32), counts) * np.sqrt(inside[crossed])
+    height = np.repeat(middle[:, 2].astype(np.float32), counts)
+    start, end = np.ceil(height - reach).astype(np.int32), np.floor(height + reach).astype(np.int32) + 1
+    moved_cells = (cells - low[:2]).astype(np.int32)
+    column = ((moved_cells[:, :, None, 0] * shape[1] + moved_cells[:, None, :, 1]) * (shape[2] + 1))[crossed]
+    flat = below.ravel()
+    top = np.int32(shape[2])
+    held = flat.take(column + np.minimum(end, top).clip(0)) - flat.take(column + np.minimum(start, top).clip(0))
+    ends = np.cumsum(counts)
+    # Sums a particle as differences of running sums: some ellipsoids may have no column.
+    held, full = (np.diff(np.append(0, np.cumsum(values))[np.append(0, ends)]) for values in (held, end - start))
     return held / np.maximum(full, 1)
 
 
