@@ -239,7 +239,7 @@ def _k_means(features: np.ndarray, is_person: np.ndarray, groups: np.ndarray, rn
 
 def _network(features: np.ndarray, is_person: np.ndarray, groups: np.ndarray, rng: np.random.Generator) -> Verdict:
     """A multilayer perceptron."""
-    return MLPClassifier(HIDDEN, solver="lbfgs", max_iter=1000, alpha=1e-3, random_state=_seed(rng)).fit(features, is_person).predict
+    return MLPClassifier(HIDDEN, learning_rate_init=0.01, tol=1e-3, max_iter=1000, random_state=_seed(rng)).fit(features, is_person).predict
 
 
 def _decision_tree(features: np.ndarray, is_person: np.ndarray, groups: np.ndarray, rng: np.random.Generator) -> Verdict:
