@@ -9,6 +9,7 @@ import sys
 import time
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
@@ -306,3 +307,77 @@ def test_ellipsoid_has_its_volume():
     assert occupied.sum() * VOXEL_M**3 == pytest.approx(4 / 3 * np.pi * np.prod(RADII_M), rel=0.01)
     assert len(shell) + len(interior) == occupied.sum()
     assert shell.mean(axis=0) == pytest.approx((np.array(occupied.shape) - 1) / 2)
+
+
+def test_the_documented_example_runs(tmp_path, capsys):
+    page = (ROOT / "docs" / "experiments.md").read_text(encoding="utf-8")
+    code = page.split("```python\n")[1].split("```")[0]
+    (tmp_path / "my_errors.py").write_text(code)
+    assert main(["run", str(tmp_path / "my_errors.py"), "--out", str(tmp_path / "out"), "--quick", "--workers", "1", "--quiet"]) == 0
+    assert "4 cells computed" in capsys.readouterr().out
+    assert all(f"`{name}`" in page for name in EXPERIMENTS)
+
+
+def tracking_cell(preset, voxel, method, n, motp_mm, mota, filter_s):
+    tracker, color = method
+    from hmc.experiments import Cell
+    from hmc.experiments.tracking_runs import parameters_of
+
+    results = {
+        "objects": 1000, "misses": round(1000 * (1 - mota)), "false_positives": 0, "mismatches": 0, "matches": 500,
+        "distance_m": 0.5 * motp_mm,
+        "frames": 250, "fps": 25.0, "rows": 1000, "filter_s": filter_s, "color_s": 0.0,
+    }  # fmt: skip
+    return Cell(parameters_of("somewhere@0", voxel, (tracker, color), n, preset, 0), results)
+
+
+def papers_cells():
+    """Cells that say what the thesis's Table 4.3 says, with times as in its Table 4.5."""
+    from hmc.experiments.table_4_3 import PAPER, PAPER_VOXELS, PRESETS
+    from hmc.experiments.tracking_runs import METHODS
+
+    cells = []
+    for preset in PRESETS:
+        for (name, n), values in PAPER.items():
+            method = next(key for key, label in METHODS.items() if label == name)
+            for k, voxel in enumerate(PAPER_VOXELS):
+                size = voxel**-3 if method[0] != "sparse" else 1000 * voxel**-0.1
+                cells.append(
+                    tracking_cell(
+                        preset, voxel, method, n, values[2 * k], values[2 * k + 1] / 100, 1e-5 * (n or 1) * size * (1.2 if method[1] else 1)
+                    )
+                )
+    return cells
+
+
+def test_what_the_paper_shows_holds_on_the_papers_own_figures():
+    from hmc.experiments import fig_4_13, fig_4_14, table_4_3, table_4_4
+
+    cells, plan = papers_cells(), Plan()
+    with house_style():
+        report = table_4_3.EXPERIMENT.report(cells, plan)
+        assert all(claim.holds for claim in report.claims if "colour" not in claim.text), [c for c in report.claims if not c.holds]
+        for row in report.tables[0].rows:
+            assert row["MOTP_mm"] == pytest.approx(row["MOTP_paper_mm"]) and row["MOTA_percent"] == pytest.approx(
+                row["MOTA_paper_percent"], abs=0.06
+            )
+        best = table_4_4.EXPERIMENT.report(cells, plan)
+        assert all(claim.holds for claim in best.claims)
+        rows = {(row["method"], row["preset"]): row for row in best.tables[0].rows}
+        assert rows["SS", "default"]["best_case"] == "2 cm, 800, color" and rows["SS", "default"]["MOTA_percent"] == pytest.approx(81.5)
+        assert rows["PF", "default"]["best_case"] == "2 cm, 100, color"
+        growth = fig_4_13.EXPERIMENT.report(cells, plan)
+        assert all(claim.holds for claim in growth.claims) and "naive -3.00" in growth.claims[0].detail
+        factors = fig_4_14.EXPERIMENT.report(cells, plan)
+        assert all(claim.holds for claim in factors.claims if "costs time" in claim.text)
+        for figure in (*report.figures.values(), *growth.figures.values(), *factors.figures.values()):
+            plt.close(figure)
+
+
+def test_scores_of_several_runs_are_taken_together():
+    from hmc.experiments.tracking_runs import scores_of
+
+    cells = [tracking_cell("default", 0.1, ("naive", False), None, motp, mota, 2.0) for motp, mota in ((100, 0.9), (200, 0.7))]
+    score = scores_of(cells)
+    assert score.motp_mm == pytest.approx(150) and score.mota == pytest.approx(0.8) and score.misses == pytest.approx(0.2)
+    assert score.rtf == pytest.approx(20 / 4) and score.filter_s == pytest.approx(0.002)
