@@ -55,6 +55,9 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
             axes.plot(at, [row["theory_ms"] for row in part], color=style["color"], linestyle=":", linewidth=1)
     left.set(xlabel="voxel (cm)", ylabel="filter, a frame and person (ms)", xscale="log", yscale="log")
     right.set(xlabel=f"samples, particles (voxels of {min(row['voxel_cm'] for row in rows):g} cm)", xscale="log", yscale="log")
+    sizes = sorted({row["voxel_cm"] for row in rows})
+    left.set_xticks(sizes, [f"{size:g}" for size in sizes])
+    left.minorticks_off()
     left.legend(title="dotted: theory")
     caption = "Processor time of the filters and the theory's growth (Canton, Table 4.5 and Figure 4.13)."
     return Report((Table("fig-4.13", caption, rows),), {"fig-4.13": figure}, tuple(_claims(rows)))

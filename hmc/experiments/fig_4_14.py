@@ -41,7 +41,7 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
                 style = {"color": COLOURS[tracker], "linestyle": "-" if color else "--", "marker": "o", "label": method}
                 for ax, key in zip(column, ("MOTP_mm", "MOTA_percent"), strict=True):
                     ax.plot([row["RTF"] for row in part], [row[key] for row in part], **style)
-            column[1].set(xlabel="real-time factor of the filter", xscale="log")
+            column[1].set(xlabel="real-time factor of the filter", xlim=(0, None))
         axes[0, 0].set_ylabel("MOTP (mm)")
         axes[1, 0].set_ylabel("MOTA (%)")
         axes[0, -1].legend()
