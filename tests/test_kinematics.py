@@ -169,5 +169,6 @@ def test_landmarks_lie_on_their_segments():
         assert carriers[landmark_index(name)] == index
         assert_allclose(points[:, landmark_index(name)], positions[:, index])
     head = [s.name for s in SEGMENTS].index("head")
-    tip = positions[:, head] + rotations[:, head, :, 2] * BODY.dimensions["head"]
+    up, ahead = rotations[:, head, :, 2], rotations[:, head, :, 0]
+    tip = positions[:, head] + up * BODY.dimensions["head"] + ahead * BODY.dimensions["head_forward"]
     assert_allclose(points[:, landmark_index("head_top")], tip)
