@@ -49,12 +49,15 @@ class UnseenPlaces:
         Of coarse voxels, and of the cameras made small.
     unseen : tuple of ndarray of bool, shape (height, width)
         In full size.
+    small_unseen : tuple of ndarray of bool
+        The same in the size of the small cameras.
     colors : tuple of PeopleColors or None
     """
 
     cameras: tuple[int, ...]
     tables: CarvingTables
     unseen: tuple[np.ndarray, ...]
+    small_unseen: tuple[np.ndarray, ...]
     colors: tuple[PeopleColors | None, ...]
 
 
@@ -92,7 +95,9 @@ def learn_from_people(
         # Each image is let go once it is learnt from: large ones and the growing models would not fit side by side.
         images = (replace_people(image, scenes[i].image) for image in _take(samples, i) if image is not None)
         models[c] = train_background(images, settings, scenes[i].unseen)
-    return models, UnseenPlaces(tuple(cameras), tables, tuple(scene.unseen for scene in scenes), tuple(scene.colors for scene in scenes))
+    unseen = tuple(scene.unseen for scene in scenes)
+    small = tuple(_resize(mask, camera.size) for mask, camera in zip(unseen, rig, strict=True))
+    return models, UnseenPlaces(tuple(cameras), tables, unseen, small, tuple(scene.colors for scene in scenes))
 
 
 def with_unseen_places(
@@ -113,16 +118,14 @@ def with_unseen_places(
     tuple of ndarray of bool, shape (height, width), or None; one a camera
     """
     sizes = [camera.size for camera in places.tables.rig]
-    differs, unseen = [], []
-    for c, hidden, size in zip(places.cameras, places.unseen, sizes, strict=True):
-        mask = masks[c]
-        differs.append(None if mask is None else _resize(mask, size))
-        unseen.append(_resize(hidden, size))
+    unseen = places.small_unseen
+    given = [masks[c] for c in places.cameras]
+    differs = [None if mask is None else _resize(mask, size) for mask, size in zip(given, sizes, strict=True)]
     maybe = [None if differ is None else differ | hidden for differ, hidden in zip(differs, unseen, strict=True)]
     surely, possibly = agreed_views(places.tables, maybe)
 
     def complete(i: int) -> np.ndarray | None:
-        image, mask = images[places.cameras[i]], masks[places.cameras[i]]
+        image, mask = images[places.cameras[i]], given[i]
         differ, sure, possible, colors = differs[i], surely[i], possibly[i], places.colors[i]
         if image is None or mask is None or differ is None or sure is None or possible is None or colors is None:
             return mask

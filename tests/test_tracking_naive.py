@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from hmc.results import TrackTable
-from hmc.tracking.association import assign_voxels
+from hmc.tracking.association import FollowingSettings, assign_voxels
 from hmc.tracking.blobs import observe
-from hmc.tracking.naive import NaiveSettings, finish, init, step
+from hmc.tracking.naive import finish, init, step
 from hmc.tracking.trackers import tracker_of
 from hmc.tracking.tracks import fill_gaps, from_rows, person_voxels, run, velocities
 from hmc.voxels.grid import VoxelGrid
@@ -31,7 +31,7 @@ def follow(volumes, settings=None):
     return run(
         ((frame, None if volume is None else observe(GRID, volume)) for frame, volume in enumerate(volumes)),
         FPS,
-        tracker_of(settings or NaiveSettings()),
+        tracker_of(settings or FollowingSettings()),
     )
 
 
@@ -205,12 +205,12 @@ def test_owners_match_a_loop_over_voxels():
 def test_removing_shared_voxels_as_in_the_thesis():
     observation = observe(GRID, person(-0.2, 0) | person(0.25, 0.1))
     positions = np.array([[-0.2, 0, 0.87], [0.25, 0.1, 0.87]])
-    owners, _ = assign_voxels(observation, positions, NaiveSettings(exclusion="remove"))
+    owners, _ = assign_voxels(observation, positions, FollowingSettings(exclusion="remove"))
     radii = np.array([0.45, 0.45, 1.2 * 0.87])
     inside = [(((observation.points - p) / radii) ** 2).sum(axis=1) <= 1 for p in positions]
     assert (owners[inside[0] & inside[1]] == -1).all() and (owners[inside[0] & ~inside[1]] == 0).all()
     with pytest.raises(ValueError, match="`exclusion` must be"):
-        NaiveSettings(exclusion="none")
+        FollowingSettings(exclusion="none")
 
 
 def test_person_voxels_on_a_finer_grid():

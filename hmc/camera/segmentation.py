@@ -227,6 +227,8 @@ def segment(
     mask, doubtful = _complete(found, cv2.threshold(answer, SHADOW - 1, 1, cv2.THRESH_BINARY)[1], image, model, settings)
     mask = mask.view(bool)
     doubtful = doubtful.view(bool) | mask
+    if model.unseen is not None:
+        doubtful &= ~model.unseen
     after = replace(model, people=mask, frame=model.frame + 1, settling=max(0, model.settling - 1), doubtful=doubtful)
     if after.settling or after.frame % settings.learn_every == 0:
         rate = SETTLING_RATE if after.settling else settings.learning_rate

@@ -12,14 +12,11 @@ from hmc.tracking.association import FollowingSettings
 from hmc.tracking.blobs import Observation
 from hmc.tracking.following import StepInfo, TrackerState, advance, finish, init
 
-__all__ = ["NaiveSettings", "finish", "init", "step"]
-
-#: The naive tracker has no parameters beyond those that every tracker has.
-NaiveSettings = FollowingSettings
+__all__ = ["finish", "init", "step"]
 
 
 def step(
-    state: TrackerState, frame: int, observation: Observation | None, settings: NaiveSettings | None = None
+    state: TrackerState, frame: int, observation: Observation | None, settings: FollowingSettings | None = None
 ) -> tuple[TrackerState, StepInfo]:
     """One frame on.
 
@@ -28,11 +25,12 @@ def step(
     state : TrackerState
     frame, observation
         As for `hmc.tracking.following.advance`.
-    settings : NaiveSettings, optional
+    settings : FollowingSettings, optional
+        The naive tracker has no parameters beyond those that every tracker has.
 
     Returns
     -------
     state : TrackerState
     info : StepInfo
     """
-    return advance(state, frame, observation, NaiveSettings() if settings is None else settings)
+    return advance(state, frame, observation, FollowingSettings() if settings is None else settings)
