@@ -13,7 +13,7 @@ import numpy as np
 
 from hmc.errors import InputError
 
-__all__ = ["LandmarkScores", "landmark_errors", "score"]
+__all__ = ["LandmarkScores", "landmark_errors", "mean_and_deviation", "score"]
 
 
 @dataclass(frozen=True)
@@ -98,11 +98,11 @@ def score(errors: np.ndarray, threshold: float, by: Literal["all", "joint", "fra
         raise InputError(f"`threshold` must be above 0; got {threshold}")
     axis = {"all": None, "joint": 0, "frame": 1}[by]
     estimated, expected, matched = np.isfinite(errors), ~np.isnan(errors), errors <= threshold
-    mean, spread = _mean_and_deviation(errors, estimated, axis)
+    mean, spread = mean_and_deviation(errors, estimated, axis)
     if by == "all":
-        frame_means, _ = _mean_and_deviation(errors, estimated, 1)
-        mean, spread = _mean_and_deviation(frame_means, np.isfinite(frame_means), None)
-    mmtp, sigma_mmtp = _mean_and_deviation(errors, matched, axis)
+        frame_means, _ = mean_and_deviation(errors, estimated, 1)
+        mean, spread = mean_and_deviation(frame_means, np.isfinite(frame_means), None)
+    mmtp, sigma_mmtp = mean_and_deviation(errors, matched, axis)
     n_expected = expected.sum(axis=axis)
     return LandmarkScores(
         mean=mean,
@@ -116,8 +116,16 @@ def score(errors: np.ndarray, threshold: float, by: Literal["all", "joint", "fra
     )
 
 
-def _mean_and_deviation(values: np.ndarray, chosen: np.ndarray, axis: int | None) -> tuple[np.ndarray, np.ndarray]:
-    """Mean and standard deviation of the chosen values along an axis; NaN where there are none."""
+def mean_and_deviation(values: np.ndarray, chosen: np.ndarray, axis: int | None) -> tuple[np.ndarray, np.ndarray]:
+    """Mean and standard deviation of the chosen values along an axis; NaN where there are none.
+
+    Parameters
+    ----------
+    values : ndarray
+    chosen : ndarray of bool, of the same shape
+    axis : int or None
+        None takes all values together.
+    """
     count = chosen.sum(axis=axis)
     mean = _divide(np.where(chosen, values, 0.0).sum(axis=axis), count)
     off = np.where(chosen, values - (mean if axis is None else np.expand_dims(mean, axis)), 0.0)
