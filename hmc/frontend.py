@@ -132,6 +132,7 @@ def stream_hulls(
     first: int | None = None,
     last: int | None = None,
     warm_up: int = 0,
+    masks: Iterable[MaskStep] | None = None,
     on_problem: Report | None = None,
 ) -> Iterator[HullStep]:
     """Silhouettes and hulls of the selected frames, in order.
@@ -143,6 +144,8 @@ def stream_hulls(
     settings : FrontendSettings, optional
     first, last, warm_up, on_problem
         As for `stream_masks`.
+    masks : iterable of MaskStep, optional
+        Silhouettes that were made before (`hmc.mask_store`), of the frames that are wanted; made here where left out.
 
     Yields
     ------
@@ -150,7 +153,9 @@ def stream_hulls(
     """
     settings = settings or FrontendSettings()
     tables = make_tables(grid, recording.rig)
-    for step in stream_masks(recording, settings, first=first, last=last, warm_up=warm_up, on_problem=on_problem):
+    if masks is None:
+        masks = stream_masks(recording, settings, first=first, last=last, warm_up=warm_up, on_problem=on_problem)
+    for step in masks:
         yield HullStep(step.index, step.images, step.masks, step.doubtful, *_hulls(tables, step, settings))
 
 

@@ -20,7 +20,7 @@ CAMERA = BASE | {"camera"}
 RECORDING = CAMERA | {"footage", "recording", "results"}
 VOXELS = CAMERA | {"voxels"}
 FRONTEND = RECORDING | {"voxels", "frontend", "never_empty"}
-TRACKING = FRONTEND | {"montecarlo", "tracking"}
+TRACKING = FRONTEND | {"mask_store", "montecarlo", "tracking"}
 POSE = TRACKING | {"pose"}
 EVALUATION = BASE | {"metrics", "results", "evaluation"}
 VIEW = POSE | {"rig_picture", "view"}
@@ -40,6 +40,7 @@ MAY_IMPORT = {
     "voxels": VOXELS,
     "never_empty": RECORDING | {"voxels"},
     "frontend": FRONTEND,
+    "mask_store": FRONTEND,
     "tracking": TRACKING,
     "pose": POSE,
     "evaluation": EVALUATION,

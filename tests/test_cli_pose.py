@@ -8,6 +8,7 @@ import pytest
 from drawn import draw_recording
 from numpy.testing import assert_array_equal
 
+from hmc import frontend
 from hmc.cli import main
 from hmc.montecarlo.filters import AnnealedSettings
 from hmc.pose import person, sequence
@@ -109,6 +110,16 @@ def test_a_stopped_run_goes_on_and_ends_as_if_it_had_not_been(tmp_path, monkeypa
     one, other = (read_pose(tmp_path / folder / "pose.npz") for folder in ("cut", "whole"))
     assert_array_equal(one.states, other.states)
     assert sorted(path.name for path in (tmp_path / "cut").iterdir()) == ["joints.csv", "pose.npz", "run.toml", "tracks.csv"]
+
+
+def test_the_recording_is_segmented_once(tmp_path, monkeypatch):
+    calls = []
+    stream = frontend.stream_masks
+    monkeypatch.setattr(frontend, "stream_masks", lambda *args, **options: calls.append(args) or stream(*args, **options))
+    assert quick(tmp_path / "kept") == 0 and len(calls) == 1
+    monkeypatch.setattr(sequence, "kept_masks", lambda *args: None)
+    assert quick(tmp_path / "again") == 0 and len(calls) == 3
+    assert (tmp_path / "kept" / "joints.csv").read_bytes() == (tmp_path / "again" / "joints.csv").read_bytes()
 
 
 def test_a_given_height_is_the_body_s(tmp_path, capsys):

@@ -14,6 +14,8 @@ __all__ = ["add_parser", "run"]
 METHODS = ("apf",)
 #: The journal of a run that is not finished.
 POSE_JOURNAL = ".pose.journal"
+#: Its silhouettes, which the tracker leaves for the poses.
+MASKS = ".masks"
 
 
 def add_parser(subparsers) -> argparse.ArgumentParser:
@@ -89,7 +91,7 @@ def run(args: argparse.Namespace) -> int:
         print(f"{args.out}: its result has other parameters or another recording; starting anew")
 
     problems: list[str] = [*recording.problems]
-    track_journal, pose_journal = args.out / JOURNAL, args.out / POSE_JOURNAL
+    track_journal, pose_journal, masks = args.out / JOURNAL, args.out / POSE_JOURNAL, args.out / MASKS
     tracks = track_recording(
         recording,
         args.track_voxel,
@@ -97,6 +99,7 @@ def run(args: argparse.Namespace) -> int:
         frontend,
         seed=args.seed,
         journal=track_journal,
+        masks=masks,
         key=key,
         on_problem=problems.append,
         progress=lambda steps, total: progress(steps, total, "track", args.quiet),
@@ -111,6 +114,7 @@ def run(args: argparse.Namespace) -> int:
         settings=following,
         frontend=frontend,
         journal=pose_journal,
+        masks=masks,
         key=key,
         on_problem=problems.append,
         progress=lambda steps, total: progress(steps, total, "pose", args.quiet),
@@ -120,8 +124,8 @@ def run(args: argparse.Namespace) -> int:
     write_joints(paths["joints.csv"], people.poses)
     write_pose(paths["pose.npz"], people.states)
     write_run(paths["run.toml"], args.method, parameters, args.seed, **source, problems=list(dict.fromkeys(problems)))
-    for journal in (track_journal, pose_journal):
-        for file in args.out.glob(f"{journal.name}*"):
+    for temporary in (track_journal, pose_journal, masks):
+        for file in args.out.glob(f"{temporary.name}*"):
             file.unlink()
     for person in np.unique(people.poses.persons):
         rows = people.poses.persons == person

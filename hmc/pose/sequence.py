@@ -18,6 +18,7 @@ import numpy as np
 from hmc.frontend import FrontendSettings, HullStep, stream_hulls
 from hmc.journal import append_journal, open_journal
 from hmc.landmarks import LANDMARKS
+from hmc.mask_store import kept_masks
 from hmc.pose.annealed.hull_target import HullTarget, make_target
 from hmc.pose.annealed.presets import PosePreset
 from hmc.pose.body.joints import DOF_NAMES
@@ -68,6 +69,7 @@ def pose_recording(
     settings: FollowSettings | None = None,
     frontend: FrontendSettings | None = None,
     journal: str | Path | None = None,
+    masks: str | Path | None = None,
     key: str = "",
     on_problem: Callable[[str], None] | None = None,
     progress: Callable[[Iterable[HullStep], int], Iterable[HullStep]] | None = None,
@@ -89,6 +91,8 @@ def pose_recording(
     frontend : FrontendSettings, optional
     journal : path, optional
         File in which the run is kept, and from which it goes on.
+    masks : path, optional
+        File in which silhouettes were kept under the same key; where it lacks any that are needed, they are made again.
     key : str
         Says what the run depends on. A journal with another key is begun anew.
     on_problem : callable, optional
@@ -119,7 +123,8 @@ def pose_recording(
     if first is None:
         return _assemble(done)
     report = on_problem or logger.warning
-    stream = stream_hulls(recording, grid, frontend, first=first, warm_up=WARM_UP_FRAMES, on_problem=report)
+    kept = None if masks is None else kept_masks(masks, key, first, end)
+    stream = stream_hulls(recording, grid, frontend, first=first, warm_up=WARM_UP_FRAMES, masks=kept, on_problem=report)
     for hull in progress(stream, end - first) if progress else stream:
         for number, target in targets_of(recording, grid, tracks, hull).items():
             done_to = states[number].done_to

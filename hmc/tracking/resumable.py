@@ -21,6 +21,7 @@ import numpy as np
 from hmc.errors import InputError
 from hmc.frontend import FrontendSettings, HullStep, stream_hulls
 from hmc.journal import append_journal, open_journal
+from hmc.mask_store import keep_masks
 from hmc.recording import Recording
 from hmc.results import TrackTable
 from hmc.tracking.blobs import Observation, observe
@@ -50,6 +51,7 @@ def track_recording(
     *,
     seed: int = 0,
     journal: str | Path | None = None,
+    masks: str | Path | None = None,
     key: str = "",
     on_problem: Callable[[str], None] | None = None,
     on_timing: Callable[[Timing], None] | None = None,
@@ -68,6 +70,8 @@ def track_recording(
         Of the tracker's random numbers.
     journal : path, optional
         File in which the run is kept, and from which it goes on.
+    masks : path, optional
+        File in which all silhouettes are kept for a later pass (`hmc.mask_store`).
     key : str
         Says what the run depends on. A journal with another key is begun anew.
     on_problem : callable, optional
@@ -103,6 +107,8 @@ def track_recording(
         report("one camera does not tell how far away people are; two at least are needed to find them, better four")
     end = recording.start + recording.n_frames
     stream = stream_hulls(recording, grid, frontend, first=done.next_frame, warm_up=WARM_UP_FRAMES, on_problem=note)
+    if masks is not None:
+        stream = keep_masks(masks, key, done.next_frame, stream, note)
     hulls: Iterable[HullStep] = stream if done.next_frame < end else ()
     timing, before = done.timing, perf_counter()
     for hull in progress(hulls, end - done.next_frame) if progress else hulls:
