@@ -7,8 +7,9 @@ persons' clouds of samples; without one, each person is at the centroid of their
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from time import thread_time
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +19,17 @@ from hmc.tracking.blobs import Observation, blob_features
 from hmc.tracking.cloud import Cloud, Departed
 from hmc.tracking.ghosts import real_people
 from hmc.tracking.identity import exchange_mistaken, learn_looks, recognise
-from hmc.tracking.lifecycle import Candidate, Row, Track, confirm, delete, newcomers, propose, still_a_person
+from hmc.tracking.lifecycle import (
+    Candidate,
+    Row,
+    Track,
+    confirm,
+    delete,
+    looks_like_person,
+    newcomers,
+    propose,
+    still_a_person,
+)
 
 __all__ = ["Filter", "Filtered", "StepInfo", "TrackerState", "advance", "finish", "init", "original_number"]
 
@@ -96,6 +107,8 @@ class Filtered:
         Share of the reference histogram that stays (Eq. 4.11).
     color_s : float
         Processor seconds spent on colouring voxels.
+    efficiency : ndarray, shape (k,)
+        Survival rate of each person's particles (Eq. 3.11), 0 to 1; empty where there are none.
     """
 
     positions: np.ndarray
@@ -104,6 +117,7 @@ class Filtered:
     looks: tuple[np.ndarray, ...] = ()
     keep_histogram: float = 1.0
     color_s: float = 0.0
+    efficiency: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
 
 #: ``filter(state, predicted, observation)``: the state's tracks should be at ``predicted``, shape (k, 3).
@@ -189,11 +203,20 @@ def advance(
         clouds = learn_looks(followed, clouds, looks, filtered.keep_histogram)
     candidates = propose(state.candidates, _newcomers(observation, owners, frame, settings), followed, settings.lifecycle)
     candidates, fresh, earlier = confirm(candidates, state.next_person, state.fps, settings.lifecycle)
-    kept = delete((*followed, *fresh), frame, state.fps, observation.room, settings.lifecycle)
+    # Whose voxels are whose is not certain where people stand together, and where nothing is seen there is nothing to judge.
+    judged = supported & ~shared
+    like = _by_person(state.tracks, looks_like_person(owned, settings.lifecycle), judged)
+    working = _by_person(state.tracks, filtered.efficiency, np.ones(len(filtered.efficiency), bool))
+    kept = delete((*followed, *fresh), frame, state.fps, observation.room, settings.lifecycle, like_person=like, efficiency=working)
     numbers = np.array([*(track.person for track in state.tracks), -1])
     info = StepInfo((*rows, *earlier), numbers[owners], tuple(int(number) for number in numbers[:-1][shared]), filtered.color_s, filter_s)
     after = TrackerState(state.fps, kept, candidates, state.next_person + len(fresh), (), state.departed, state.same)
     return (_with_clouds(after, followed, clouds, frame) if filter else after), info
+
+
+def _by_person(tracks: tuple[Track, ...], values: np.ndarray, told: np.ndarray) -> dict[int, Any]:
+    """The values of those tracks of which something is told, by person number."""
+    return {tracks[k].person: values[k].item() for k in np.flatnonzero(told)}
 
 
 def _with_clouds(state: TrackerState, followed: tuple[Track, ...], clouds: tuple[Cloud, ...], frame: int) -> TrackerState:

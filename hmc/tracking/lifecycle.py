@@ -72,7 +72,7 @@ class LifecycleSettings:
         that somebody left behind (Canton, section 4.2.3, third criterion of deletion).
     least_efficiency, efficiency_s : float
         A track is deleted when the survival rate of its filter's particles (Canton, Eq. 3.11) has been below this share for so long
-        (section 4.2.3, second criterion).
+        (section 4.2.3, second criterion). Of Sparse Sampling, the share of the samples that found a voxel of their own.
     least_distance_m : float
         No candidate nearer to a track than this, horizontally (section 4.2.3, criterion of creation).
     same_place_m, same_place_s : float

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hmc.errors import InputError
-from hmc.montecarlo import systematic
+from hmc.montecarlo import survival_rate, systematic
 from hmc.tracking.association import FollowingSettings
 from hmc.tracking.blobs import Observation
 from hmc.tracking.cloud import Cloud
@@ -186,7 +186,7 @@ def _filter(
     sd = np.array([settings.noise_m_s, settings.noise_m_s, settings.noise_z_m_s]) / state.fps
     reach = 2 * PERSON_RADIUS_M + 2 * sd[0]
     around = look_around(observation, centres, reach, settings.following.least_certain_m3, settings.color)
-    positions, moved = centres.copy(), []
+    positions, efficiency, moved = centres.copy(), np.zeros(len(centres)), []
     for k, cloud in enumerate(state.clouds):
         begun = len(cloud.points) > 0
         particles = cloud.points[systematic(rng, cloud.weights, settings.particles)] + centres[k] - last[k] if begun else centres[k]
@@ -206,10 +206,10 @@ def _filter(
             moved.append((np.zeros((0, 3)), np.zeros(0)))
             continue
         weights = (weights / best) ** settings.sharpness
+        efficiency[k] = survival_rate(weights)
         moved.append((particles, weights / weights.sum()))
         positions[k] = moved[k][1] @ particles
     looks = looks_of(observation, around, positions) if settings.color else ()
     clouds = tuple(Cloud(cloud.person, *pair, cloud.histogram) for cloud, pair in zip(state.clouds, moved, strict=True))
-    return Filtered(
-        positions, np.array([len(cloud.points) > 0 for cloud in clouds], bool), clouds, looks, settings.keep_histogram, around.color_s
-    )
+    seen = np.array([len(cloud.points) > 0 for cloud in clouds], bool)
+    return Filtered(positions, seen, clouds, looks, settings.keep_histogram, around.color_s, efficiency)

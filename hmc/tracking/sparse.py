@@ -283,7 +283,7 @@ def filter_samples(
     n, size, origin = len(state.tracks), observation.voxel_size_m, observation.room[0]
     last = np.array([track.position for track in state.tracks]).reshape(-1, 3)
     samples, person = propagate(rng, state.clouds, np.rint((centres - last) / size), observation, around, settings)
-    weights = np.zeros(0)
+    weights, drawn = np.zeros(0), np.bincount(person, minlength=n)
     if len(samples):
         weights = sample_likelihood(samples, person, state.clouds, observation, around, settings)
         x, y = (origin[:2] + size * (samples[:, :2] + 0.5)).T
@@ -294,6 +294,7 @@ def filter_samples(
     total = np.bincount(person, weights, n)
     seen = total > 0
     weights = weights / total[person]
+    efficiency = seen / np.maximum(drawn * np.bincount(person, weights**2, n), 1e-12)
     mean = np.stack([np.bincount(person, weights * column, n) for column in samples.T], axis=1)
     positions = np.where(seen[:, None], origin + size * (mean + 0.5), centres)
     looks = looks_of(observation, around, positions) if settings.color else ()
@@ -301,7 +302,7 @@ def filter_samples(
     clouds = tuple(
         Cloud(cloud.person, samples[part], weights[part], cloud.histogram) for cloud, part in zip(state.clouds, parts, strict=True)
     )
-    return Filtered(positions, seen, clouds, looks, settings.keep_histogram, around.color_s)
+    return Filtered(positions, seen, clouds, looks, settings.keep_histogram, around.color_s, efficiency)
 
 
 def propagate(

@@ -1,0 +1,76 @@
+"""When tracks end: furniture that somebody left behind, and filters that find hardly anything (Canton 2009, section 4.2.3)."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_tracking_naive import FPS, GRID, box, follow, line, nothing, person
+
+from hmc.tracking.association import FollowingSettings
+from hmc.tracking.blobs import observe
+from hmc.tracking.cloud import Cloud
+from hmc.tracking.following import Filtered, advance, init
+from hmc.tracking.lifecycle import LifecycleSettings
+from hmc.tracking.trackers import make_tracker, tracker_of
+
+CHAIR = box((-0.3, -0.25, 0), (0.25, 0.25, 0.8))
+
+
+def states(tracker, volumes):
+    """The state after each frame."""
+    state, rng = init(FPS), np.random.default_rng(0)
+    for frame, volume in enumerate(volumes):
+        state, _ = tracker.step(rng, state, frame, observe(GRID, volume))
+        yield state
+
+
+@pytest.mark.parametrize("name", ["naive", "particle", "sparse"])
+def test_a_chair_that_somebody_left_behind_is_nobody_after_a_while(name):
+    tracker = make_tracker(name, color=False if name != "naive" else None)
+    volumes = [person(0, 0)] * 20 + [CHAIR] * 80
+    alive = [len(state.tracks) for state in states(tracker, volumes)]
+    limit = round(tracker.following.lifecycle.unlike_s * FPS)
+    assert set(alive[10:20]) == {1}
+    assert set(alive[20 + limit + 2 :]) == {0}
+
+
+def test_a_person_who_sits_down_or_bends_stays():
+    seated = box((-0.2, -0.2, 0), (0.2, 0.2, 1.25)) | box((-0.2, -0.2, 0), (0.5, 0.2, 0.55))
+    bent = box((-0.2, -0.2, 0), (0.2, 0.2, 0.9)) | box((-0.2, -0.2, 0.7), (0.6, 0.2, 0.95))
+    for shape in (seated, bent):
+        table = follow([person(0, 0)] * 20 + [shape] * 100)
+        assert set(table.persons) == {0} and len(table.frames) == 120
+
+
+def followed_with(efficiency, n=40):
+    """Numbers of the tracks after n frames in which a filter that sees the person works so well."""
+    settings = FollowingSettings(lifecycle=LifecycleSettings(efficiency_s=0.5))
+    state = init(FPS)
+
+    def filter(state, predicted, observation):
+        k = len(state.tracks)
+        clouds = tuple(Cloud(track.person, np.zeros((1, 3)), np.ones(1)) for track in state.tracks)
+        return Filtered(predicted, np.ones(k, bool), clouds, efficiency=np.full(k, efficiency))
+
+    for frame in range(n):
+        state, _ = advance(state, frame, observe(GRID, person(0, 0)), settings, filter)
+    return [track.person for track in state.tracks]
+
+
+def test_a_track_whose_filter_hardly_finds_anything_ends():
+    assert followed_with(0.5) == [0]
+    assert 0 not in followed_with(0.01)
+
+
+@pytest.mark.parametrize("name", ["particle", "sparse"])
+@pytest.mark.parametrize("size", [20, 1000])
+def test_filters_work_well_on_people_and_not_at_all_on_nothing(name, size):
+    tracker = make_tracker(name, color=False, particles=size)
+    # Nothing else may end the track: not the missing voxels, and not the verdict.
+    lifecycle = replace(tracker.following.lifecycle, patience_s=100.0, edge_patience_s=100.0, unlike_s=100.0)
+    following = replace(tracker.following, lifecycle=lifecycle)
+    tracker = tracker_of(replace(tracker.settings, following=following))
+    path = [person(*place) for place in line((-0.8, 0), (0.8, 0), 30)]
+    alive = [len(state.tracks) for state in states(tracker, path + [nothing()] * 40)]
+    assert set(alive[10:30]) == {1}
+    assert alive[-1] == 0
