@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from hmc.camera.silhouettes import cut_halo, evidence, fill_gaps
+from hmc.camera.silhouettes import cut_halo, evidence, fill_gaps, in_planes
 from hmc.errors import InputError
 
 __all__ = ["BackgroundModel", "SegmentationSettings", "segment", "segment_views", "train_background"]
@@ -184,7 +184,7 @@ def train_background(
         variance = np.stack([variance[..., 0], variance[..., 1:].mean(axis=2)], axis=-1)
         deviation = np.maximum(np.sqrt(variance), np.array(LEAST_DEVIATION, np.float32))
     mean[..., 0] = np.maximum(mean[..., 0], 1)
-    return BackgroundModel(mixture, mean, deviation, np.zeros(mean.shape[:2], bool), unseen=unseen)
+    return BackgroundModel(mixture, in_planes(mean), in_planes(deviation), np.zeros(mean.shape[:2], bool), unseen=unseen)
 
 
 def segment(
@@ -310,13 +310,15 @@ def _learn(model: BackgroundModel, image: np.ndarray, hidden: np.ndarray, rate: 
     """
     mean = model.mean
     seen = 1 - hidden
-    step = cv2.copyTo(cv2.subtract(_luma_chroma(image), mean, dtype=cv2.CV_32F), seen)
+    step = cv2.copyTo(np.subtract(_luma_chroma(image), mean, dtype=np.float32, order="C"), seen)
     coarse = (max(1, mean.shape[1] // 8), max(1, mean.shape[0] // 8))
     window = (coarse[0] // 2 + 1, coarse[1] // 2 + 1)
     weight = cv2.blur(cv2.resize(seen.astype(np.float32), coarse, interpolation=cv2.INTER_AREA), window)
     around = cv2.blur(cv2.resize(step, coarse, interpolation=cv2.INTER_AREA), window) / np.maximum(weight, 1e-3)[..., None]
     cv2.copyTo(cv2.resize(around, mean.shape[1::-1]), hidden, step)
-    cv2.scaleAdd(step, rate, mean, dst=mean)
+    for channel in range(3):
+        plane = mean[..., channel]
+        cv2.scaleAdd(cv2.extractChannel(step, channel), rate, plane, dst=plane)
     np.maximum(mean[..., 0], 1, out=mean[..., 0])
     # There the mixture is shown the mean, one deviation up and down in turns: shown no noise at all, it would come to expect none.
     turn = 1 if model.frame // settings.learn_every % 2 else -1

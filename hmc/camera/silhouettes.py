@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-__all__ = ["Evidence", "cut_halo", "evidence", "fill_gaps"]
+__all__ = ["Evidence", "cut_halo", "evidence", "fill_gaps", "in_planes"]
 
 
 @dataclass(frozen=True)
@@ -50,31 +50,35 @@ def evidence(image: np.ndarray, mean: np.ndarray, deviation: np.ndarray) -> Evid
     mean : ndarray of float32, shape (height, width, 3)
         The empty scene in luma and chroma (OpenCV's YCrCb, chroma centred on 128); luma at least 1.
     deviation : ndarray of float32, shape (height, width, 2)
-        Standard deviations of luma and of chroma (both axes alike).
+        Standard deviations of luma and of chroma (both axes alike). Quickest where each channel of both lies in one piece (`in_planes`).
 
     Returns
     -------
     Evidence
     """
-    difference = cv2.subtract(cv2.cvtColor(image, cv2.COLOR_BGR2YCrCb), mean, dtype=cv2.CV_32F)
-    # Noise is rougher than people: a 3 x 3 average halves it.
-    cv2.GaussianBlur(difference, (3, 3), 0, dst=difference)
-    # Planes are cut out one by one: `cv2.split` takes several times longer of a part of an image.
-    luma, red, blue = (cv2.extractChannel(difference, channel) for channel in range(3))
+    colour = cv2.cvtColor(image, cv2.COLOR_BGR2YCrCb)
+    # Plane by plane: `cv2.split` takes several times longer of a part of an image. Noise is rougher than people: a 3 x 3 average halves it.
+    luma, red, blue = (
+        cv2.GaussianBlur(np.subtract(cv2.extractChannel(colour, channel), mean[..., channel], dtype=np.float32), (3, 3), 0)
+        for channel in range(3)
+    )
     contrast, spare = np.abs(luma), np.abs(red)
     np.maximum(contrast, spare, out=contrast)
     np.maximum(contrast, np.abs(blue, out=spare), out=contrast)
-    lost = np.empty_like(luma)
-    np.negative(np.divide(luma, mean[..., 0], out=lost), out=lost)
-    np.minimum(np.maximum(lost, 0, out=lost), 1, out=lost)
-    for colour, channel in ((red, 1), (blue, 2)):  # chroma shrinks with the light
+    lost = np.divide(luma, mean[..., 0])
+    np.negative(np.clip(lost, -1, 0, out=lost), out=lost)
+    for chroma, channel in ((red, 1), (blue, 2)):  # chroma shrinks with the light
         np.subtract(mean[..., channel], 128, out=spare)
-        np.add(colour, np.multiply(spare, lost, out=spare), out=colour)
-        np.multiply(colour, colour, out=colour)
-    np.copyto(spare, deviation[..., 1])
-    spare *= spare
+        np.add(chroma, np.multiply(spare, lost, out=spare), out=chroma)
+        np.multiply(chroma, chroma, out=chroma)
+    np.multiply(deviation[..., 1], deviation[..., 1], out=spare)
     chroma2 = np.divide(np.add(red, blue, out=red), spare, out=red)
     return Evidence(np.divide(luma, deviation[..., 0], out=luma), chroma2, lost, contrast)
+
+
+def in_planes(array: np.ndarray) -> np.ndarray:
+    """The same values, (height, width, channels), with each channel's in one piece of memory."""
+    return np.moveaxis(np.ascontiguousarray(np.moveaxis(array, -1, 0)), 0, -1)
 
 
 def fill_gaps(

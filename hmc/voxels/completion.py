@@ -58,7 +58,7 @@ class CompletionTables:
         Of the room in coarse voxels.
     cells : tuple of int
         Number of floor cells along x and y.
-    cell_pixels : tuple of ndarray of int32, shape (n_cells,), one a camera
+    cell_pixels : tuple of ndarray of int64, shape (n_cells,), one a camera
         Flat pixel on which each cell's centre falls; ``width * height`` where the camera does not see it.
     pixel_cells : tuple of ndarray of int32, shape (height, width), one a camera
         Flat cell at which each pixel's ray meets the floor; ``n_cells`` where it does not.
@@ -96,7 +96,7 @@ def make_completion_tables(room: np.ndarray, rig: Rig) -> CompletionTables:
     for camera in rig:
         column, row, seen = pixel_of_voxel(camera, centres)
         width, height = camera.size
-        cell_pixels.append(np.where(seen, row * width + column, width * height).astype(np.int32))
+        cell_pixels.append(np.where(seen, row * width + column, width * height).astype(np.int64))
         pixel_cells.append(np.full((height, width), nx * ny, np.int32))
         for top in range(0, height, BAND_PX):  # large images would need much memory at once
             band = slice(top, min(top + BAND_PX, height))
@@ -139,14 +139,21 @@ def complete_masks(
     if not len(voxels):
         return tuple(masks)
     voxels = np.stack(np.unravel_index(voxels, grid.shape), axis=-1)
-    points, pixels = grid.centres(voxels), pixels_at(tables.carving, voxels)
+    points, pixels = grid.centres(voxels), pixels_at(tables.carving, voxels).astype(np.int64)  # as gathers want them
     before = {c: np.ascontiguousarray(mask).view(np.uint8) for c, mask in given.items()}
     done, losers = before, set[int]()
     for _ in range(ROUNDS):
-        agreed = _votes(done, pixels) >= LEAST_VIEWS
-        joined = {c: _join(tables.carving, c, points, pixels[c], agreed, done[c], possible[c]) for c in given}
-        done = {c: mask for c, (mask, _) in joined.items()}
+        agreed = np.flatnonzero(_votes(done, pixels) >= LEAST_VIEWS)
+        if not len(agreed):
+            break
+        joined, there = {}, points[agreed]
+        for c in given:
+            image, scale = _shown(tables.carving.rig[c], there, pixels[c].take(agreed))
+            joined[c] = _join(image, scale, done[c], possible[c], grid.voxel_size_m)
         losers |= {c for c, (_, lost) in joined.items() if lost > LEAST_LOSS}
+        last, done = done, {c: mask for c, (mask, _) in joined.items()}
+        if all(done[c] is last[c] for c in given):  # another round would find the same
+            break
     if len(losers) < max(2, LEAST_LOSERS * len(given)):
         return tuple(masks)
     return tuple(mask if mask is None or done[c] is before[c] else done[c].view(bool) for c, mask in enumerate(masks))
@@ -196,16 +203,17 @@ def floor_shadows(tables: CompletionTables, masks: Sequence[np.ndarray | None], 
     -------
     ndarray of bool, shape `tables.cells`
     """
-    doubting = np.zeros(tables.cells, np.int32)
-    bare = np.zeros(tables.cells, np.int32)
+    n_cells = tables.cells[0] * tables.cells[1]
+    doubting, bare = np.zeros(n_cells, np.uint8), np.zeros(n_cells, np.uint8)
     for pixels, mask, doubt in zip(tables.cell_pixels, masks, doubtful, strict=True):
         if mask is None or doubt is None:
             continue
-        counts = (pixels < mask.size) & ~mask.ravel().take(pixels, mode="clip")
-        doubted = doubt.ravel().take(pixels, mode="clip")
-        doubting += (counts & doubted).reshape(tables.cells)
-        bare += (counts & ~doubted).reshape(tables.cells)
-    seeds = ((doubting >= 2) & (doubting > bare)).view(np.uint8)
+        told = np.full(mask.size + 1, 2, np.uint8)  # 0: bare, 1: doubted, 2: nothing, as somebody hides it or it is not in the image
+        np.maximum(doubt.ravel().view(np.uint8), 2 * mask.ravel().view(np.uint8), out=told[:-1])
+        told = told.take(pixels)
+        doubting += told == 1
+        bare += told == 0
+    seeds = ((doubting >= 2) & (doubting > bare)).view(np.uint8).reshape(tables.cells)
     shadow = cv2.morphologyEx(seeds, cv2.MORPH_CLOSE, np.ones((SHADOW_CLOSE,) * 2, np.uint8))
     return cv2.dilate(shadow, np.ones((SHADOW_RIM,) * 2, np.uint8)).view(bool)
 
@@ -223,30 +231,34 @@ def _possible(mask: np.ndarray, doubt: np.ndarray | None, shadow: np.ndarray, ce
     if doubt is None:
         return mask
     out = mask.copy()
-    doubts = np.flatnonzero(doubt & ~mask)
+    doubts = np.flatnonzero(doubt > mask)
     out.ravel()[doubts] = ~shadow.take(cells.ravel().take(doubts))
     return out
 
 
-def _join(
-    tables: CarvingTables, c: int, points: np.ndarray, pixels: np.ndarray, agreed: np.ndarray, mask: np.ndarray, possible: np.ndarray
-) -> tuple[np.ndarray, float]:
-    """A mask with the possible pixels that lie deep in the agreed voxels' image, and their neighbours; the share of it that they are."""
-    camera, voxel_m = tables.rig[c], tables.grid.voxel_size_m
+def _shown(camera: Camera, points: np.ndarray, pixels: np.ndarray) -> tuple[np.ndarray, float]:
+    """Image of voxels, 1 or 0, by the pixels on which they fall; and how many pixels a metre is there."""
     width, height = camera.size
-    shown = agreed & (pixels < width * height)
-    if not shown.any():
+    image: np.ndarray = np.zeros((height, width), np.uint8)
+    seen = pixels < width * height
+    if not seen.all():
+        points, pixels = points[seen], pixels[seen]
+    image.ravel()[pixels] = 1
+    n = max(1, len(points))
+    depth = float(camera.rotation[2] @ (np.ones(len(points)) @ points / n) + camera.translation[2])
+    return image, float(camera.matrix[0, 0]) / depth
+
+
+def _join(shape: np.ndarray, scale: float, mask: np.ndarray, possible: np.ndarray, voxel_m: float) -> tuple[np.ndarray, float]:
+    """A mask with the possible pixels that lie deep in the agreed voxels' image, and their neighbours; the share of it that they are.
+
+    The very mask and 0 where there is nothing to join.
+    """
+    left, top, columns, rows = cv2.boundingRect(shape)
+    if not rows:
         return mask, 0.0
-    depth = float(camera.rotation[2] @ points[shown].mean(axis=0) + camera.translation[2])
-    scale = float(camera.matrix[0, 0]) / depth  # pixels a metre
-    row, column = np.divmod(pixels[shown], width)
     margin = round((voxel_m + NEAR_M) * scale) + 4
-    box = (
-        slice(max(0, int(row.min()) - margin), int(row.max()) + margin),
-        slice(max(0, int(column.min()) - margin), int(column.max()) + margin),
-    )
-    shape: np.ndarray = np.zeros((height, width), np.uint8)
-    shape[row, column] = 1
+    box = slice(max(0, top - margin), top + rows - 1 + margin), slice(max(0, left - margin), left + columns - 1 + margin)
     shape = cv2.morphologyEx(shape[box], cv2.MORPH_CLOSE, np.ones((round(voxel_m * scale) + 3,) * 2, np.uint8))
     old = np.ascontiguousarray(mask[box])
     free = shape & possible[box].view(np.uint8) & (1 - old)
