@@ -7,6 +7,7 @@ import numpy as np
 
 from hmc.camera.model import Rig, look_at, project
 from hmc.pose.annealed.hull_target import HullTarget, make_target
+from hmc.pose.annealed.rays import with_rays
 from hmc.synthetic import actions, gait
 from hmc.synthetic.actor import make_actor, pose_mesh
 from hmc.synthetic.motions import place
@@ -27,6 +28,7 @@ class Act:
     height_m: float
     grid: VoxelGrid
     targets: list[HullTarget]
+    masks: list[list[np.ndarray]]  # a frame and camera
     landmarks: np.ndarray  # (n, 15, 3)
     velocities: np.ndarray  # (n, 3), of the pelvis
     heading: float  # radians, at the start
@@ -51,15 +53,16 @@ def act(
     moved = place(MOTIONS[motion](actor.skeleton, times, rng), (-0.3, -0.2), heading_deg)
     rig, grid = ring(cameras), VoxelGrid.from_room(ROOM, voxel_m)
     tables = make_tables(grid, rig)
-    targets = []
+    targets, silhouettes = [], []
     for root, orientations in zip(moved.root, moved.orientations, strict=True):
         vertices, _ = pose_mesh(actor, root, orientations)
         masks = [silhouette(camera, vertices, actor.triangles) for camera in rig]
+        silhouettes.append(masks)
         strict, tolerant = carve_levels(tables, masks, (0, 1))
-        targets.append(make_target(grid, np.argwhere(strict), np.argwhere(tolerant)))
+        targets.append(with_rays(make_target(grid, np.argwhere(strict), np.argwhere(tolerant)), rig, masks))
     truth = landmark_positions(actor.skeleton, moved.root, moved.orientations)
     velocities = np.gradient(moved.root, 1 / fps, axis=0) if frames > 1 else np.zeros((1, 3))
-    return Act(fps, height_m, grid, targets, truth, velocities, np.radians(heading_deg))
+    return Act(fps, height_m, grid, targets, silhouettes, truth, velocities, np.radians(heading_deg))
 
 
 def silhouette(camera, vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:

@@ -46,6 +46,25 @@ def test_what_is_not_near_is_farther_in_every_particle(deviation, reach):
             assert np.all(distance[~near[c]] > reach)
 
 
+@pytest.mark.parametrize("deviation", [0.02, 0.3])
+def test_rays_that_are_not_near_pass_farther_off_in_every_particle(deviation):
+    states, cones = states_around_standing(deviation), BODY.cones
+    maps = cone_maps(cones, place_segments(BODY, states, np.zeros(3)))
+    rng = np.random.default_rng(1)
+    points, directions = rng.normal(0, 0.7, (60, 3)), rng.normal(size=(60, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    directions[::4] = 0
+    near = cones_near(cones, maps, points, 0.06, directions)
+    assert not near.all()
+    np.testing.assert_array_equal(near[:, ::4], cones_near(cones, maps, points, 0.06)[:, ::4])
+    along = points + np.linspace(-3, 3, 601)[:, None, None] * directions
+    for state in states:
+        rotations, positions = segment_transforms(BODY, state)
+        for c, segment in enumerate(cones.segment):
+            distance = cone_distance(cones, c, (along - positions[segment]) @ rotations[segment]).min(0)
+            assert np.all(distance[~near[c]] > 0.06)
+
+
 def test_spread_is_the_farthest_from_the_mean():
     points = np.random.default_rng(2).normal(size=(4, 3, 9))
     middle, far = spread(points)

@@ -7,6 +7,7 @@ from numpy.testing import assert_allclose
 from posed import COST, body_of, crossed_arms, mean_error, true_state, with_cylinders
 
 from hmc.pose.annealed.penetration import axis_points
+from hmc.pose.annealed.rays import points_to_explain
 from hmc.pose.annealed.refine import RefineSettings, refine, residual_rows, residual_values
 from hmc.pose.annealed.symmetric import BodyPoints, SymmetricSettings, symmetric_cost
 from hmc.pose.body.joints import N_DOF, dof_index
@@ -15,12 +16,13 @@ from hmc.pose.body.kinematics import landmarks
 GROUPS = ("outside", "unexplained", "depth", "posture")
 
 
-@pytest.fixture(scope="module")
-def scene():
-    """A person who gestures: body, its points, frame, hull points, the true state."""
+@pytest.fixture(scope="module", params=[0.0, 0.7], ids=["hull", "rays"])
+def scene(request):
+    """A person who gestures: body, its points, frame, what is to be explained, the true state."""
     acted = act("gesture")
     body, points = body_of(acted.height_m)
-    return body, points, acted.targets[0], acted.targets[0].surface[::4], true_state(body, acted)
+    hull = points_to_explain(np.random.default_rng(0), acted.targets[0], 600, request.param)
+    return body, points, acted.targets[0], hull, true_state(body, acted)
 
 
 def placed(state: np.ndarray, like: np.ndarray) -> np.ndarray:
@@ -63,7 +65,9 @@ def test_derivatives_are_exact_for_cylinders(scene, pose):
         assert smooth[rows].mean() > 0.95
         fine = np.flatnonzero(smooth)
         fine = fine[(fine >= rows.start) & (fine < rows.stop)]
-        assert_allclose(jacobian[fine], measured[fine], atol=1e-6 * max(1.0, np.abs(measured[fine]).max()), err_msg=name)
+        exact = np.isclose(jacobian[fine], measured[fine], rtol=0, atol=1e-6 * max(1.0, np.abs(measured[fine]).max())).all(axis=1)
+        # Past a flat end, the place of a ray that is nearest to the axis is not quite the nearest to the cylinder.
+        assert exact.mean() > 0.7 if name == "unexplained" and hull[:, 3:].any() else exact.all(), name
         if name != "depth" or pose == 1:
             assert np.abs(measured[fine]).max() > 1e-4  # there was something to test
 
@@ -80,24 +84,25 @@ def test_derivatives_for_flesh_point_the_right_way(scene, pose):
         a, b = jacobian[rows][fine], measured[rows][fine]
         cosine = (a * b).sum(1) / (np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1))
         if cosine.size:
-            assert cosine.min() > 0.7 and np.median(cosine) > 0.97, name
+            assert np.quantile(cosine, 0.1) > 0.9 and np.median(cosine) > 0.97, name
+            assert cosine.min() > (0.0 if hull[:, 3:].any() else 0.7), name
         assert not np.any(jacobian[rows][smooth[rows] & ~fine])  # what does not change has no derivative
 
 
-@pytest.mark.parametrize("settings", [COST, SymmetricSettings(0.08, 0.4, 3.0, 1e-4)])
+@pytest.mark.parametrize("settings", [COST, SymmetricSettings(cap_m=0.08, explain_weight=0.4, overlap_weight=3.0, posture_weight=1e-4)])
 def test_residuals_square_to_the_cost(scene, settings):
     """The refinement interpolates the distance field, the particles take the nearest voxel: the same up to the voxel's size."""
     body, points, target, hull, true = scene
     for state in (true, *poses(scene)):
         residuals, _ = residual_rows(body, points, state, target, hull, settings)
-        assert residuals @ residuals == pytest.approx(symmetric_cost(body, points, state[None], target, hull, settings)[0], rel=0.1)
+        assert residuals @ residuals == pytest.approx(symmetric_cost(body, points, state[None], target, hull, settings)[0], rel=0.15)
         assert_allclose(residual_values(body, points, state, target, hull, settings), residuals, atol=1e-5)
 
 
 def test_nothing_pulls_beyond_the_cap(scene):
     body, points, target, hull, true = scene
     far = true.copy()
-    far[:2] += 3.0
+    far[2] += 50.0
     residuals, jacobian = residual_rows(body, points, far, target, hull, COST)
     both = slice(0, len(points.surface.points) + len(hull))
     assert not jacobian[both].any()

@@ -13,7 +13,8 @@ from typing import Literal
 import numpy as np
 
 from hmc.landmarks import LANDMARKS
-from hmc.pose.annealed.hull_target import HullTarget, sample_points
+from hmc.pose.annealed.hull_target import HullTarget
+from hmc.pose.annealed.rays import points_to_explain
 from hmc.pose.annealed.refine import RefineSettings, refine
 from hmc.pose.annealed.symmetric import BodyPoints, SymmetricSettings, symmetric_cost
 from hmc.pose.body.inverse import fit_landmarks
@@ -118,9 +119,9 @@ def first_poses(
     noise = rng.standard_normal(states.shape) * spread
     noise[:, :, 0] = 0.0  # the template itself takes part
     states = np.clip(states + noise, body.limits.low, body.limits.high).reshape(n_headings, n_templates * variants, -1)
-    coarse = sample_points(rng, target.surface, 150)
+    coarse = points_to_explain(rng, target, 150, cost_settings.ray_share)
     costs = symmetric_cost(body, samples, states.reshape(-1, states.shape[-1]), target, coarse, cost_settings).reshape(n_headings, -1)
-    points = sample_points(rng, target.surface, 400)
+    points = points_to_explain(rng, target, 400, cost_settings.ray_share)
     candidates = []
     settings = RefineSettings(iterations=10)
     for states_there, costs_there in zip(states, costs, strict=True):

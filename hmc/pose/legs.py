@@ -13,7 +13,8 @@ import numpy as np
 
 from hmc.landmarks import landmark_index
 from hmc.pose.annealed.apf import PoseFilter
-from hmc.pose.annealed.hull_target import HullTarget, sample_points
+from hmc.pose.annealed.hull_target import HullTarget
+from hmc.pose.annealed.rays import points_to_explain
 from hmc.pose.annealed.refine import refine, residual_values
 from hmc.pose.body.kinematics import landmarks
 from hmc.pose.body.model import BodyModel
@@ -90,7 +91,7 @@ def leg_choice(rng: np.random.Generator, filt: PoseFilter, state: np.ndarray, ta
     if target is None or preset.refine is None:
         states, costs = np.stack([state, state]), np.zeros(2)
     else:
-        points = sample_points(rng, target.surface, preset.fine_hull_points)
+        points = points_to_explain(rng, target, preset.fine_hull_points, preset.symmetric.ray_share)
         start = swapped_pose(body, state, "legs")
         states = np.stack([state, refine(body, samples, start, target, points, preset.symmetric, preset.refine)[0]])
         values = [residual_values(body, samples, one, target, points, preset.symmetric) for one in states]

@@ -21,6 +21,7 @@ from hmc.landmarks import LANDMARKS
 from hmc.mask_store import kept_masks
 from hmc.pose.annealed.hull_target import HullTarget, make_target
 from hmc.pose.annealed.presets import PosePreset
+from hmc.pose.annealed.rays import with_rays
 from hmc.pose.body.joints import DOF_NAMES
 from hmc.pose.body.kinematics import landmarks
 from hmc.pose.person import Decided, FollowSettings, PersonState, PersonTask, PoseTask, person_step, taken_up
@@ -166,8 +167,14 @@ def targets_of(recording: Recording, grid: VoxelGrid, tracks: TrackTable, hull: 
     if observation is not None:
         # The tolerant hull is shared out among the people; the rest of the loose one is anybody's.
         spare, floor_z = hull.loose & ~hull.tolerant, float(recording.room[0, 2])
-        for person, voxels in zip(targets, person_voxels(observation, tracks.positions[rows]), strict=True):
-            targets[person] = make_target(grid, voxels[hull.strict[tuple(voxels.T)]], voxels, spare, floor_z)
+        tolerant = person_voxels(observation, tracks.positions[rows])
+        strict = [voxels[hull.strict[tuple(voxels.T)]] for voxels in tolerant]
+        for k, person in enumerate(targets):
+            target = make_target(grid, strict[k], tolerant[k], spare, floor_z)
+            if target is not None:
+                others = grid.centres(np.concatenate([np.zeros((0, 3), int), *strict[:k], *strict[k + 1 :]]))
+                target = with_rays(target, recording.rig, hull.masks, others)
+            targets[person] = target
     return targets
 
 

@@ -16,9 +16,10 @@ import numpy as np
 from hmc.montecarlo.filters import AnnealedSettings
 from hmc.pose.annealed.apf import PoseFilter, PoseInfo, PoseState, make_filter, pose_init, pose_step
 from hmc.pose.annealed.fit_body import FitBodyInfo, fit_body
-from hmc.pose.annealed.hull_target import HullTarget, sample_points
+from hmc.pose.annealed.hull_target import HullTarget
 from hmc.pose.annealed.limb_search import LIMBS, search_limbs
 from hmc.pose.annealed.presets import PosePreset
+from hmc.pose.annealed.rays import points_to_explain
 from hmc.pose.annealed.refine import refine, residual_values
 from hmc.pose.body.flesh import surface_coordinates
 from hmc.pose.body.kinematics import landmarks
@@ -244,7 +245,7 @@ def _best_hypothesis(frame_rng, filt, fps, targets, usable, velocities, floor_z,
     pool.sort(key=lambda entry: entry[0])
     # All candidates are compared in the frame that was easiest to explain.
     anchor = pool[0][1]
-    points = sample_points(frame_rng(anchor), targets[anchor].surface, preset.fine_hull_points)
+    points = points_to_explain(frame_rng(anchor), targets[anchor], preset.fine_hull_points, preset.symmetric.ray_share)
     here = [state for _, where, state in pool if where == anchor]
     trials = [*here, *swapped_poses(body, here[0]), *swapped_poses(body, here[min(1, len(here) - 1)])]
     refined = [refine(body, samples, trial, targets[anchor], points, preset.symmetric, preset.refine) for trial in trials]
@@ -304,7 +305,9 @@ def _fit(frame_rng, filt, fps, targets, states, infos, settings, height_known):
     held_out, rest = good[1::3], [k for k in good if k not in good[1::3]]
     picks = sorted({rest[round(q * (len(rest) - 1))] for q in np.linspace(0, 1, settings.body_frames)})
     held_out = held_out[:: max(1, len(held_out) // 8)]
-    points = {k: sample_points(frame_rng(k), targets[k].surface, preset.fine_hull_points) for k in {*picks, *held_out}}
+    points = {
+        k: points_to_explain(frame_rng(k), targets[k], preset.fine_hull_points, preset.symmetric.ray_share) for k in {*picks, *held_out}
+    }
     fit_settings = replace(preset.fit_body, scale_deviation=0.015) if height_known else preset.fit_body
     body, _, info = fit_body(
         filt.body,

@@ -11,9 +11,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hmc.montecarlo.filters import AnnealedInfo, ParticleState, annealed_step, particle_init
-from hmc.pose.annealed.hull_target import HullTarget, sample_points
+from hmc.pose.annealed.hull_target import HullTarget
 from hmc.pose.annealed.limb_search import lost_limbs, search_limbs
 from hmc.pose.annealed.presets import PosePreset, drift
+from hmc.pose.annealed.rays import points_to_explain
 from hmc.pose.annealed.refine import refine, residual_values
 from hmc.pose.annealed.scores import (
     ScoreTable,
@@ -180,7 +181,7 @@ def pose_step(rng: np.random.Generator, filt: PoseFilter, state: PoseState, targ
 def _polish(rng, filt, preset, starts, anchor, target):
     """Refine several starts, take the best, look for limbs that the hulls contradict."""
     body, samples = filt.body, filt.samples
-    points = sample_points(rng, target.surface, preset.fine_hull_points)
+    points = points_to_explain(rng, target, preset.fine_hull_points, preset.symmetric.ray_share)
     trials = [refine(body, samples, start, target, points, preset.symmetric, preset.refine, anchor=anchor) for start in starts]
     evaluations = sum(info.evaluations for _, info in trials)
     estimate, _ = min(trials, key=lambda trial: trial[1].cost_after)
@@ -196,7 +197,7 @@ def _polish(rng, filt, preset, starts, anchor, target):
 
 
 def _by_symmetric_cost(rng, filt, target):
-    points = sample_points(rng, target.surface, filt.preset.hull_points)
+    points = points_to_explain(rng, target, filt.preset.hull_points, filt.preset.symmetric.ray_share)
 
     def log_likelihood(states: np.ndarray) -> np.ndarray:
         return -symmetric_cost(filt.body, filt.samples, states, target, points, filt.preset.symmetric)

@@ -78,8 +78,10 @@ def spread(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return middle, np.sqrt(off.sum(axis=1).max(axis=1))
 
 
-def cones_near(cones: Cones, maps: ConeMaps, points: np.ndarray, reach: np.ndarray | float) -> np.ndarray:
-    """Which cones may come within `reach` of which points in some particle: bool, shape (n_cones, m).
+def cones_near(
+    cones: Cones, maps: ConeMaps, points: np.ndarray, reach: np.ndarray | float, directions: np.ndarray | None = None
+) -> np.ndarray:
+    """Which cones may come within `reach` of which points, or of the rays through them, in some particle: bool, shape (n_cones, m).
 
     The axis of every particle's cone lies as near to the mean axis as its ends do.
 
@@ -90,12 +92,21 @@ def cones_near(cones: Cones, maps: ConeMaps, points: np.ndarray, reach: np.ndarr
     points : ndarray, shape (m, 3)
     reach : float or ndarray, shape (m,)
         Metres.
+    directions : ndarray, shape (m, 3), optional
+        Of the rays, of unit length; zero for points that are none.
     """
     start, far_start = spread(maps.start)
     end, far_end = spread(maps.start + maps.axis * cones.lengths.astype(maps.axis.dtype)[:, None, None])
     axis = end - start
     between = points - start[:, None]
-    along = np.einsum("cmi,ci->cm", between, axis) / np.maximum(np.sum(axis**2, axis=1), 1e-12)[:, None]
-    between -= np.clip(along, 0, 1)[:, :, None] * axis[:, None]
+    along, squared = np.einsum("cmi,ci->cm", between, axis), np.sum(axis**2, axis=1)[:, None]
+    if directions is not None:
+        # Seen along the ray, both get shorter by what lies along it.
+        axis_along = axis @ directions.T
+        along -= np.einsum("cmi,mi->cm", between, directions) * axis_along
+        squared = squared - axis_along**2
+    between -= np.clip(along / np.maximum(squared, 1e-12), 0, 1)[:, :, None] * axis[:, None]
+    if directions is not None:
+        between -= np.einsum("cmi,mi->cm", between, directions)[:, :, None] * directions
     margin = np.maximum(far_start, far_end) + cones.radii.max(axis=(1, 2)) + 1e-4
     return np.einsum("cmi,cmi->cm", between, between) < (margin[:, None] + reach) ** 2

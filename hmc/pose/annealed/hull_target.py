@@ -43,6 +43,8 @@ class HullTarget:
         Of the strict hull.
     floor_z : float or None
         Height of the floor, metres, where people stand on one.
+    rays : ndarray, shape (m, 6), or None
+        Rays of the silhouettes that show the person (`hmc.pose.annealed.rays`), where these are known.
     """
 
     distance: np.ndarray
@@ -52,6 +54,7 @@ class HullTarget:
     surface: np.ndarray
     volume_m3: float
     floor_z: float | None = None
+    rays: np.ndarray | None = None
 
 
 def make_target(
@@ -126,12 +129,12 @@ def sample_points(rng: np.random.Generator, points: np.ndarray, n: int) -> np.nd
     Parameters
     ----------
     rng : numpy.random.Generator
-    points : ndarray, shape (m, 3)
+    points : ndarray, shape (m, ...)
     n : int
 
     Returns
     -------
-    ndarray, shape (min(m, n), 3)
+    ndarray, shape (min(m, n), ...)
     """
     if len(points) <= n:
         return points

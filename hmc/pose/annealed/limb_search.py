@@ -8,6 +8,7 @@ import numpy as np
 
 from hmc.montecarlo.truncated import truncated_normal
 from hmc.pose.annealed.hull_target import HullTarget, sample_points
+from hmc.pose.annealed.rays import places_and_directions
 from hmc.pose.annealed.refine import RefineSettings, refine
 from hmc.pose.annealed.symmetric import POSTURE, BodyPoints, SymmetricSettings, body_distance, outside_distance, symmetric_cost
 from hmc.pose.body.joints import DOF_NAMES, dof_index
@@ -141,8 +142,9 @@ def _draw(rng: np.random.Generator, settings: SearchSettings, body: BodyModel, s
     dofs = LIMBS[limb]
     low, high = body.limits.low[dofs], body.limits.high[dofs]
     centre, _ = limb_joint(body, state, limb)
-    near = np.linalg.norm(hull_points - centre, axis=1) < sum(limb_lengths(body, limb)) + settings.far_m
-    goals = hull_points[near & (body_distance(body, state[None], hull_points)[0] > settings.far_m)]
+    places, _ = places_and_directions(hull_points)
+    near = np.linalg.norm(places - centre, axis=1) < sum(limb_lengths(body, limb)) + settings.far_m
+    goals = places[near & (body_distance(body, state[None], hull_points)[0] > settings.far_m)]
     n_reach = round(settings.reach_share * settings.draws) if len(goals) else 0
     n_common = (settings.draws - n_reach) // 2
     n_any = settings.draws - n_reach - n_common

@@ -62,7 +62,7 @@ class PosePreset:
     drift_scale : float
         Factor on `drift`.
     surface_samples, hull_points : int
-        Points of the body's surface and of the hull's in the symmetric cost, for the particles.
+        Points of the body's surface, and rays and points of the hull's, in the symmetric cost, for the particles.
     fine_hull_points : int
         The same in the refinement.
     density : float
@@ -85,8 +85,8 @@ class PosePreset:
     annealed: AnnealedSettings = field(default_factory=AnnealedSettings)
     drift_scale: float = 1.0
     surface_samples: int = 350
-    hull_points: int = 150
-    fine_hull_points: int = 400
+    hull_points: int = 250
+    fine_hull_points: int = 600
     density: float = 1.0
     symmetric: SymmetricSettings = field(default_factory=SymmetricSettings)
     refine: RefineSettings | None = None

@@ -1,8 +1,9 @@
 """Local least-squares refinement of a pose: Gauss-Newton steps with damping on the symmetric cost's distances.
 
 Each body-surface sample outside the tolerant hull pulls its segment back along the hull's distance field; each point of the
-strict hull's surface outside the body pulls the nearest cone towards itself. Both move with the twists of the joints
-(Canton 2009, Eq. A.1), so the Jacobian needs no differences; it takes the flesh as round and straight near each point.
+strict hull's surface outside the body, and each ray that misses it, pulls the nearest cone towards itself. Both move with
+the twists of the joints (Canton 2009, Eq. A.1), so the Jacobian needs no differences; it takes
+the flesh as round and straight near each point.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from hmc.pose.annealed.cone_maps import ConeMaps, cone_maps, to_cones
 from hmc.pose.annealed.floor import floor_gap, lowest_support
 from hmc.pose.annealed.hull_target import HullTarget, distance_gradient
 from hmc.pose.annealed.penetration import penetration_depth, penetration_rows
+from hmc.pose.annealed.rays import places_and_directions, slide_to_axis
 from hmc.pose.annealed.symmetric import POSTURE, BodyPoints, SymmetricSettings, body_distance, cone_shapes, squared_distance
 from hmc.pose.body.flesh import place_points
 from hmc.pose.body.joints import N_DOF
@@ -200,7 +202,7 @@ def _distances(body, samples, state, target, hull_points, settings) -> _Distance
     carrier = samples.surface.segment
     points = np.einsum("nij,nj->ni", rotations[carrier], samples.surface.points) + positions[carrier]
     outside, slope = distance_gradient(target, points)
-    unexplained, towards, nearest = _hull_to_body(body.cones, maps, hull_points)
+    unexplained, towards, nearest, hull_places = _hull_to_body(body.cones, maps, hull_points)
     depth, outward, axis_places, segment, other = penetration_rows(body, samples.axes, rotations, positions, maps)
     gap, lowest, shank = np.zeros(0), np.zeros((0, 3)), np.zeros(0, int)
     if target.floor_z is not None:
@@ -218,7 +220,7 @@ def _distances(body, samples, state, target, hull_points, settings) -> _Distance
         cap=cap,
         weight=weight,
         directions=(slope, towards, -outward, np.tile([0.0, 0.0, 1.0], (len(gap), 1))),
-        places=(points, hull_points, axis_places, lowest),
+        places=(points, hull_places, axis_places, lowest),
         # What carries both parts leaves them where they are to one another.
         movers=(_TO_WORLD + carrier, _TO_WORLD + nearest, len(_MASKS) * other + segment, _TO_WORLD + shank),
         axes=axes,
@@ -282,21 +284,29 @@ def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=1)
 
 
-def _hull_to_body(cones: Cones, maps: ConeMaps, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Distance of hull points to the nearest cone; how it changes when that cone moves (minus the outward direction); its segment.
+def _hull_to_body(cones: Cones, maps: ConeMaps, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Distance of hull points or rays to the nearest cone; how it changes when that cone moves (minus the outward direction); its
+    segment; the point, or that of the ray which is nearest.
 
     Which cone is nearest is found in single precision.
     """
-    local = to_cones(maps, points)
+    places, directions = places_and_directions(points)
+    local = to_cones(maps, places)
+    if directions is not None:
+        along = (maps.to_cone[:, :, :3, 0].reshape(-1, 3) @ directions.T).reshape(local.shape)
+        moved = slide_to_axis(local.swapaxes(0, 1), along.swapaxes(0, 1), cones.lengths[:, None])
     squared = np.empty((len(local), len(points)), np.float32)
     squared_distance(local.swapaxes(0, 1).astype(np.float32), *cone_shapes(cones), out=squared)
     nearest = squared.argmin(0)
-    x, y, along = local[nearest, :, np.arange(len(points))].T
-    clipped = np.clip(along, 0, cones.lengths[nearest])
+    x, y, z = local[nearest, :, np.arange(len(points))].T
+    clipped = np.clip(z, 0, cones.lengths[nearest])
     t = (clipped / cones.lengths[nearest])[:, None]
     a, b = ((1 - t) * cones.radii[nearest, 0] + t * cones.radii[nearest, 1]).T
     shrink = 1 - 1 / np.sqrt(np.maximum((x / a) ** 2 + (y / b) ** 2, 1.0))
-    outward = np.stack([x * shrink, y * shrink, along - clipped], axis=1)
+    outward = np.stack([x * shrink, y * shrink, z - clipped], axis=1)
     distance = np.sqrt(np.einsum("ki,ki->k", outward, outward))
     outward /= np.maximum(distance, 1e-9)[:, None]
-    return distance, -np.einsum("ki,kij->kj", outward, maps.to_cone[nearest, :, :3, 0]), cones.segment[nearest]
+    if directions is not None:
+        # The ray's nearest point moves along with the cone, but along the ray, where the distance does not change.
+        places = places + moved[nearest, np.arange(len(points)), None] * directions
+    return distance, -np.einsum("ki,kij->kj", outward, maps.to_cone[nearest, :, :3, 0]), cones.segment[nearest], places

@@ -1,8 +1,8 @@
-"""The symmetric cost: body outside the tolerant hull, and strict hull that no part of the body explains.
+"""The symmetric cost: body outside the tolerant hull, and silhouettes that no part of the body explains.
 
 Canton's four scores (section 6.5) ask only that what the body fills be occupied, so a limb folded into the trunk costs
-nothing. Here the hull's own surface has to be explained too. The strict hull (every camera agrees) is what must be
-explained; the tolerant one (one camera may miss) is what the body must not leave.
+nothing. Here the silhouettes have to be explained too, ray by ray (`hmc.pose.annealed.rays`), and to a small part the surface of the
+strict hull (every camera agrees). The tolerant hull (one camera may miss) is what the body must not leave.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from hmc.pose.annealed.floor import floor_gap
 from hmc.pose.annealed.hull_target import HullTarget, distance_at
 from hmc.pose.annealed.penetration import AxisPoints, axis_points, depths_placed
 from hmc.pose.annealed.placing import place_segments
+from hmc.pose.annealed.rays import places_and_directions, slide_to_axis
 from hmc.pose.body.flesh import SurfaceSamples, surface_samples
 from hmc.pose.body.joints import DOF_NAMES
 from hmc.pose.body.model import BodyModel, Cones
@@ -64,10 +65,11 @@ class SymmetricSettings:
     cap_m : float
         Distances beyond this count as this (metres), so that furniture in the hull or a cut-off limb cannot pull without end.
     explain_weight : float
-        Weight of unexplained hull against body outside the hull. A hull is fatter than its person, the more so the fewer cameras there
-        are, so what it does not show weighs more than what it shows: with 1 the body swells and leans into ghosts. Measured at 1, .4, .2
-        and .1 (docs/accuracy.md): seven cameras hardly care, four and five lose a fifth to two fifths of their error down to .2; below
-        that, limbs get lost.
+        Weight of what the body does not explain against body outside the hull.
+    ray_share : float
+        Share of rays in what has to be explained; the rest is points of the strict hull's surface. A hull is fatter than its person, the
+        more so the fewer cameras there are, and its surface makes the body swell and lean into ghosts; rays alone sometimes leave an arm
+        before the trunk, which hides it. docs/accuracy.md has what both are worth.
     overlap_weight : float
         Weight of parts that reach into one another.
     posture_weight : float
@@ -78,7 +80,8 @@ class SymmetricSettings:
     """
 
     cap_m: float = 0.06
-    explain_weight: float = 0.25
+    explain_weight: float = 0.4
+    ray_share: float = 0.9
     overlap_weight: float = 2.0
     posture_weight: float = 3e-6
     floor_weight: float = 0.015
@@ -126,14 +129,14 @@ def _outside(samples: SurfaceSamples, placed: np.ndarray, target: HullTarget, or
 
 
 def body_distance(body: BodyModel, states: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Distance of hull points to the nearest truncated cone of the body.
+    """Distance of hull points, or of rays, to the nearest truncated cone of the body.
 
     Parameters
     ----------
     body : BodyModel
     states : ndarray, shape (n, 27)
-    points : ndarray, shape (k, 3)
-        World, metres.
+    points : ndarray, shape (k, 3) or (k, 6)
+        World, metres (`hmc.pose.annealed.rays`).
 
     Returns
     -------
@@ -141,32 +144,39 @@ def body_distance(body: BodyModel, states: np.ndarray, points: np.ndarray) -> np
         Metres; 0 inside the body.
     """
     # Relative to the points' middle: float32 then has digits to spare.
-    origin = points.mean(axis=0)
+    places, directions = places_and_directions(points)
+    origin = places.mean(axis=0)
     maps = cone_maps(body.cones, place_segments(body, states, origin))
-    return _to_body(body.cones, maps, points - origin).T
+    return _to_body(body.cones, maps, places - origin, directions).T
 
 
-def _to_body(cones: Cones, maps: ConeMaps, points: np.ndarray, near: np.ndarray | None = None) -> np.ndarray:
-    """Distance of points to the nearest of the cones that are near them, shape (k, n); infinite where none is.
+def _to_body(
+    cones: Cones, maps: ConeMaps, points: np.ndarray, directions: np.ndarray | None = None, near: np.ndarray | None = None
+) -> np.ndarray:
+    """Distance of points, or of rays through them, to the nearest of the cones that are near them, shape (k, n); infinite where none is.
 
     `near`, shape (n_cones, k), says which are; all by default.
     """
     n_cones, n = len(maps.start), maps.start.shape[-1]
+    cone, point = np.nonzero(np.ones((n_cones, len(points)), bool) if near is None else near)
+    edges = np.searchsorted(cone, np.arange(n_cones + 1))
     homogeneous = np.c_[points, np.ones(len(points))].astype(np.float32)
-    if near is None:
-        cone = np.repeat(np.arange(n_cones), len(points))
-        local = (homogeneous @ maps.to_cone.swapaxes(0, 1)).reshape(3, -1, n)
-    else:
-        cone, point = np.nonzero(near)
-        local = np.empty((3, len(cone), n), np.float32)
-        edges = np.searchsorted(cone, np.arange(n_cones + 1))
+    local = np.empty((3, len(cone), n), np.float32)
+    for to_cone, (start, stop) in zip(maps.to_cone, pairwise(edges), strict=True):
+        np.matmul(homogeneous[point[start:stop]], to_cone, out=local[:, start:stop])
+    along = None
+    if directions is not None:
+        along = np.empty_like(local)
+        directions = directions.astype(np.float32)
         for to_cone, (start, stop) in zip(maps.to_cone, pairwise(edges), strict=True):
-            np.matmul(homogeneous[point[start:stop]], to_cone, out=local[:, start:stop])
+            np.matmul(directions[point[start:stop]], to_cone[:, :3], out=along[:, start:stop])
     length, first, slope = (values[cone] for values in cone_shapes(cones))
     squared = np.empty((len(cone), n), np.float32)
     step = max(1, CHUNK // n)
     for begin in range(0, len(cone), step):
         rows = slice(begin, begin + step)
+        if along is not None:
+            slide_to_axis(local[:, rows], along[:, rows], length[rows])
         squared_distance(local[:, rows], length[rows], first[rows], slope[rows], squared[rows])
     if near is None:
         return np.sqrt(squared.reshape(n_cones, -1, n).min(axis=0))
@@ -226,7 +236,7 @@ def symmetric_cost(
     hull_points: np.ndarray,
     settings: SymmetricSettings,
 ) -> np.ndarray:
-    """Mean squared distance of the body from the hulls, of the hull from the body, depth of its parts in one another, and posture.
+    """Mean squared distance of body from hulls, of silhouettes and hull from the body, depth of its parts in one another, and posture.
 
     Parameters
     ----------
@@ -234,8 +244,8 @@ def symmetric_cost(
     points : BodyPoints
     states : ndarray, shape (n, 27)
     target : HullTarget
-    hull_points : ndarray, shape (k, 3)
-        Points of the strict hull's surface (`hmc.pose.annealed.hull_target.sample_points`).
+    hull_points : ndarray, shape (k, 3) or (k, 6)
+        What has to be explained (`hmc.pose.annealed.rays.points_to_explain`).
     settings : SymmetricSettings
 
     Returns
@@ -244,12 +254,13 @@ def symmetric_cost(
         Square metres.
     """
     cap = np.float32(settings.cap_m)
-    origin = hull_points.mean(axis=0)
+    places, directions = places_and_directions(hull_points)
+    origin = places.mean(axis=0)
     placed = place_segments(body, states, origin)
     maps = cone_maps(body.cones, placed)
     outside = np.minimum(_outside(points.surface, placed, target, origin), cap)
-    near = cones_near(body.cones, maps, hull_points - origin, settings.cap_m)
-    unexplained = np.minimum(_to_body(body.cones, maps, hull_points - origin, near), cap)
+    near = cones_near(body.cones, maps, places - origin, settings.cap_m, directions)
+    unexplained = np.minimum(_to_body(body.cones, maps, places - origin, directions, near), cap)
     depth = depths_placed(body, points.axes, placed, maps)
     gap = np.zeros(len(states))
     if target.floor_z is not None:
