@@ -6,6 +6,8 @@ import pytest
 from hmc.results import TrackTable
 from hmc.tracking.association import FollowingSettings, assign_voxels
 from hmc.tracking.blobs import observe
+from hmc.tracking.joined import cut_between
+from hmc.tracking.lifecycle import one_or_two
 from hmc.tracking.naive import finish, init, step
 from hmc.tracking.trackers import tracker_of
 from hmc.tracking.tracks import fill_gaps, from_rows, person_voxels, run, velocities
@@ -257,3 +259,35 @@ def test_gaps_longer_than_asked_stay():
 def test_bad_frame_rate_is_refused():
     with pytest.raises(ValueError, match="`fps` must be a positive"):
         init(0.0)
+
+
+@pytest.mark.parametrize("gap", [0.36, 0.42])
+def test_two_who_hold_each_other_from_the_first_frame_are_two(gap):
+    n = 30
+    a = [np.array([-gap / 2, 0.0])] * n + line((-gap / 2, 0), (-1.5, 0), n)
+    b = [np.array([gap / 2, 0.0])] * n + line((gap / 2, 0), (1.6, 0), n)
+    table = follow([person(*p) | person(*q, height=1.65) for p, q in zip(a, b, strict=True)])
+    assert set(table.persons) == {0, 1} and len(table.frames) == 4 * n
+    left = 0 if table.positions[0, 0] < 0 else 1
+    assert errors(table, left, a).max() < 0.15 and errors(table, 1 - left, b).max() < 0.15
+
+
+def test_who_came_in_behind_another_is_let_go_when_seen():
+    """The two are one, half hidden, when the track begins; later both are seen, still touching."""
+    n = 20
+    single, pair = person(0, 0), person(0, 0) | person(0.4, 0, height=1.65)
+    table = follow([single] * n + [pair] * n + [person(*p) | person(*q, height=1.65) for p, q in
+                                                zip(line((0, 0), (-1, 0), n), line((0.4, 0), (1.4, 0), n), strict=True)])  # fmt: skip
+    assert set(table.persons) == {0, 1}
+    assert table.frames[table.persons == 1].min() == n
+
+
+def test_one_person_is_not_cut():
+    settings = FollowingSettings()
+    arms = box((-0.9, -0.06, 1.3), (0.9, 0.06, 1.42))
+    hands = box((-0.4, -0.06, 1.4), (-0.3, 0.06, 2.0)) | box((0.3, -0.06, 1.4), (0.4, 0.06, 2.0))
+    for volume in (person(0, 0, radius=0.3), person(0, 0) | arms, person(0, 0) | arms | hands):
+        observation = observe(GRID, volume)
+        assert len(observation.points) * 0.05**3 > settings.lifecycle.least_joined_m3
+        assert len(one_or_two(observation, np.arange(len(observation.points)), settings.lifecycle)) == 1
+    assert cut_between(np.zeros((1, 3)), 0.05) is None

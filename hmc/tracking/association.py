@@ -11,10 +11,10 @@ import numpy as np
 
 from hmc.errors import InputError
 from hmc.tracking.blobs import Observation
-from hmc.tracking.lifecycle import LifecycleSettings, Track, looks_like_person, unowned_blobs
+from hmc.tracking.lifecycle import LifecycleSettings, Track, looks_like_person, one_or_two, unowned_blobs
 from hmc.tracking.region import person_radii, region_distance
 
-__all__ = ["FollowingSettings", "assign_voxels", "find_again", "head_centre", "locating_voxels", "predict"]
+__all__ = ["FollowingSettings", "assign_voxels", "find_again", "head_centre", "let_go", "locating_voxels", "predict"]
 
 
 @dataclass(frozen=True)
@@ -158,6 +158,39 @@ def predict(tracks: tuple[Track, ...], fps: float) -> np.ndarray:
         World, metres.
     """
     return np.array([track.position + track.velocity * (1.0, 1.0, 0.0) / fps for track in tracks]).reshape(-1, 3)
+
+
+def let_go(
+    observation: Observation, owners: np.ndarray, positions: np.ndarray, shared: np.ndarray, settings: FollowingSettings
+) -> tuple[np.ndarray, dict[int, np.ndarray]]:
+    """Free the voxels of a second person whom a track holds beside its own, because the two were one when it began.
+
+    Parameters
+    ----------
+    observation : Observation
+    owners : ndarray of int, shape (n,)
+        Row of `positions` that owns each voxel, or -1.
+    positions : ndarray, shape (k, 3)
+        Where the persons should be, world, metres.
+    shared : ndarray of bool, shape (k,)
+        Those whose component has another owner too; they hold nobody.
+    settings : FollowingSettings
+
+    Returns
+    -------
+    owners : ndarray of int, shape (n,)
+        The owners after that.
+    freed : dict of int to ndarray of int
+        By row of `positions`, the observation's voxels that were let go.
+    """
+    owners, freed = owners.copy(), {}
+    sure = np.bincount(owners[observation.certain & (owners >= 0)], minlength=len(positions)) * observation.voxel_size_m**3
+    for k in np.flatnonzero((sure > settings.lifecycle.least_joined_m3) & ~shared):
+        parts = one_or_two(observation, np.flatnonzero(owners == k), settings.lifecycle)
+        if len(parts) > 1:
+            freed[int(k)] = max(parts, key=lambda rows: np.hypot(*(observation.points[rows].mean(axis=0) - positions[k])[:2]))
+            owners[freed[int(k)]] = -1
+    return owners, freed
 
 
 def find_again(

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from hmc.errors import InputError
-from hmc.tracking.association import FollowingSettings, assign_voxels, find_again, head_centre, locating_voxels, predict
+from hmc.tracking.association import FollowingSettings, assign_voxels, find_again, head_centre, let_go, locating_voxels, predict
 from hmc.tracking.blobs import Observation, blob_features
 from hmc.tracking.cloud import Cloud, Departed
 from hmc.tracking.ghosts import real_people
@@ -27,6 +27,7 @@ from hmc.tracking.lifecycle import (
     delete,
     looks_like_person,
     newcomers,
+    one_or_two,
     propose,
     still_a_person,
 )
@@ -174,7 +175,8 @@ def advance(
     filter_s = thread_time() - begun - filtered.color_s
     positions = filtered.positions
     claimed, shared = assign_voxels(observation, positions, settings)
-    owners = find_again(state.tracks, frame, state.fps, observation, claimed, settings)
+    kept, freed = let_go(observation, claimed, predicted, shared, settings)
+    owners = find_again(state.tracks, frame, state.fps, observation, kept, settings)
     owned = blob_features(observation.points, owners, n, size)
     best = locating_voxels(observation, owners, n, settings)
     located = blob_features(observation.points, np.where(best, owners, -1), n, size)
@@ -182,8 +184,8 @@ def advance(
         filter_s = thread_time() - begun
     certain = blob_features(observation.points, np.where(observation.certain, owners, -1), n, size)
     supported = still_a_person(owned, certain, state.tracks, settings.lifecycle)
-    # Of a person who was found again elsewhere, the filter knows nothing.
-    known = filtered.seen & ~np.isin(np.arange(n), owners[claimed != owners])
+    # Of a person who was found again elsewhere, the filter knows nothing; of one who held another it stands between the two.
+    known = filtered.seen & ~np.isin(np.arange(n), [*freed, *owners[kept != owners]])
     measured = np.where(known[:, None], positions, located.centroid)
     gain = np.where(shared, np.where(known, settings.filter_gain, settings.shared_gain), 1.0)
     tracks, rows = [], []
@@ -201,16 +203,17 @@ def advance(
     if filtered.looks:
         followed, clouds, looks = exchange_mistaken(followed, clouds, filtered.looks)
         clouds = learn_looks(followed, clouds, looks, filtered.keep_histogram)
-    candidates = propose(state.candidates, _newcomers(observation, owners, frame, settings), followed, settings.lifecycle)
+    strangers, parted = _newcomers(observation, owners, tuple(freed.values()), frame, settings)
+    candidates = propose(state.candidates, strangers, followed, settings.lifecycle, parted)
     candidates, fresh, earlier = confirm(candidates, state.next_person, state.fps, settings.lifecycle)
     # Whose voxels are whose is not certain where people stand together, and where nothing is seen there is nothing to judge.
     judged = supported & ~shared
     like = _by_person(state.tracks, looks_like_person(owned, settings.lifecycle), judged)
     working = _by_person(state.tracks, filtered.efficiency, np.ones(len(filtered.efficiency), bool))
-    kept = delete((*followed, *fresh), frame, state.fps, observation.room, settings.lifecycle, like_person=like, efficiency=working)
+    staying = delete((*followed, *fresh), frame, state.fps, observation.room, settings.lifecycle, like_person=like, efficiency=working)
     numbers = np.array([*(track.person for track in state.tracks), -1])
     info = StepInfo((*rows, *earlier), numbers[owners], tuple(int(number) for number in numbers[:-1][shared]), filtered.color_s, filter_s)
-    after = TrackerState(state.fps, kept, candidates, state.next_person + len(fresh), (), state.departed, state.same)
+    after = TrackerState(state.fps, staying, candidates, state.next_person + len(fresh), (), state.departed, state.same)
     return (_with_clouds(after, followed, clouds, frame) if filter else after), info
 
 
@@ -272,19 +275,27 @@ def finish(state: TrackerState, n_frames: int, settings: FollowingSettings | Non
     return tuple(confirm(state.candidates, state.next_person, state.fps, short)[2])
 
 
-def _newcomers(observation: Observation, owners: np.ndarray, frame: int, settings: FollowingSettings) -> list[Row]:
-    """Where person-like sets of voxels are that no track owns and that are no ghosts."""
-    sets = newcomers(observation, owners, settings.lifecycle)
+def _newcomers(
+    observation: Observation, owners: np.ndarray, freed: tuple[np.ndarray, ...], frame: int, settings: FollowingSettings
+) -> tuple[list[Row], list[Row]]:
+    """Where person-like sets of voxels are that no track owns and that are no ghosts, and where people are whom a track let go."""
+    held = owners.copy()
+    held[np.concatenate([np.zeros(0, int), *freed])] = 0
+    sets = newcomers(observation, held, settings.lifecycle)
     if sets and observation.views is not None:
         points = [observation.points[rows] for rows in sets]
-        real = real_people(observation.views, observation.points[owners >= 0], points, observation.voxel_size_m)
+        real = real_people(observation.views, observation.points[held >= 0], points, observation.voxel_size_m)
         sets = [rows for rows, one in zip(sets, real, strict=True) if one]
+    # Cut after the ghosts are out: of two who hold each other, one may hide the other in most views.
+    sets = [part for rows in sets for part in one_or_two(observation, rows, settings.lifecycle)]
     person = np.full(len(owners), -1)
-    for j, rows in enumerate(sets):
+    for j, rows in enumerate((*sets, *freed)):
         person[rows] = j
-    best = locating_voxels(observation, person, len(sets), settings)
-    located = [observation.points[best & (person == j)] for j in range(len(sets))]
-    return [Row(frame, -1, points.mean(axis=0), head_centre(points)) for points in located]
+    n = len(sets) + len(freed)
+    best = locating_voxels(observation, person, n, settings)
+    located = [observation.points[best & (person == j)] for j in range(n)]
+    rows = [Row(frame, -1, points.mean(axis=0), head_centre(points)) for points in located]
+    return rows[: len(sets)], rows[len(sets) :]
 
 
 def _update(

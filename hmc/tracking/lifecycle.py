@@ -8,7 +8,7 @@ the younger of two tracks that stand in one place, and one whose filter hardly f
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -18,6 +18,7 @@ from scipy.spatial import cKDTree
 
 from hmc.tracking.blobs import Blobs, Observation, blob_features
 from hmc.tracking.features import feature_matrix
+from hmc.tracking.joined import cut_between
 from hmc.tracking.person_tree import PersonTree, default_tree, predict_person, read_tree
 from hmc.voxels.components import label_voxels
 
@@ -30,6 +31,7 @@ __all__ = [
     "delete",
     "looks_like_person",
     "newcomers",
+    "one_or_two",
     "propose",
     "unowned_blobs",
 ]
@@ -54,7 +56,7 @@ class LifecycleSettings:
     least_volume_m3, most_volume_m3 : float
         A hull is fatter than its person; the most leaves room for two who come in arm in arm.
     least_joined_m3 : float
-        A set larger than this may be several people.
+        A set larger than this may be several people; so may one of which the strict hull is.
     most_side_m, least_side_m : float
         Longest horizontal side (arms stretched out) and least value of the longer side (a ghost is a thin column).
     keep_volume_m3, keep_top_m : float
@@ -298,6 +300,35 @@ def newcomers(observation: Observation, owners: np.ndarray, settings: LifecycleS
     return sets
 
 
+def one_or_two(observation: Observation, rows: np.ndarray, settings: LifecycleSettings) -> list[np.ndarray]:
+    """A set of voxels, or the two people in it (`hmc.tracking.joined`), each of whom must look like a person.
+
+    Parameters
+    ----------
+    observation : Observation
+    rows : ndarray of int
+        The set's voxels.
+    settings : LifecycleSettings
+
+    Returns
+    -------
+    list of ndarray of int
+        One or two parts of `rows`.
+    """
+    sure = rows[observation.certain[rows]]
+    cut = (
+        cut_between(observation.points[sure], observation.voxel_size_m)
+        if len(sure) * observation.voxel_size_m**3 > settings.least_joined_m3
+        else None
+    )
+    if cut is None:
+        return [rows]
+    axis, limit = cut
+    second = observation.points[:, :2] @ axis > limit
+    sides = blob_features(observation.points[sure], second[sure].astype(int), 2, observation.voxel_size_m)
+    return [rows[~second[rows]], rows[second[rows]]] if looks_like_person(sides, settings).all() else [rows]
+
+
 def _strict_parts(observation: Observation, rows: np.ndarray, settings: LifecycleSettings) -> list[np.ndarray]:
     """Components of the voxels in `rows`, each a part of `rows`, that look like people."""
     if rows.size == 0:
@@ -311,7 +342,7 @@ def _strict_parts(observation: Observation, rows: np.ndarray, settings: Lifecycl
 
 
 def propose(
-    candidates: tuple[Candidate, ...], seen: list[Row], tracks: tuple[Track, ...], settings: LifecycleSettings
+    candidates: tuple[Candidate, ...], seen: list[Row], tracks: tuple[Track, ...], settings: LifecycleSettings, parted: Sequence[Row] = ()
 ) -> tuple[Candidate, ...]:
     """Carry the candidates on with what was seen in this frame, nearest pairs first, and start new ones.
 
@@ -321,8 +352,10 @@ def propose(
     seen : list of Row
         Person-like sets of voxels of this frame that no track owns.
     tracks : tuple of Track
-        Nothing nearer to one of these than `least_distance_m` is a candidate.
+        Nothing of what was seen nearer to one of these than `least_distance_m` is a candidate.
     settings : LifecycleSettings
+    parted : sequence of Row
+        People whom a track let go (`hmc.tracking.association.let_go`): candidates, however near they are.
 
     Returns
     -------
@@ -330,6 +363,7 @@ def propose(
         Those missed more often than seen are gone.
     """
     apart = [row for row in seen if all(_gap(row.position, track.position) >= settings.least_distance_m for track in tracks)]
+    apart += parted
     pairs = sorted(
         (distance, c, s)
         for c, candidate in enumerate(candidates)
