@@ -1,11 +1,13 @@
 """`hmc check`: each fault is told, several are told together, and a good recording has nothing to tell."""
 
+import re
 from dataclasses import replace
 
 import cv2
 import numpy as np
 import pytest
 from conftest import write_images, write_video
+from drawn import draw_recording, walk
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
@@ -51,6 +53,63 @@ def test_a_camera_that_has_moved_is_named(body_folder, ring):
     write_calibration(body_folder / "calibration.toml", moved)
     (warning,) = sentences(check_recording(body_folder), "warning")
     assert warning.startswith("camera 'cam_03': its silhouettes do not fit the calibration")
+
+
+@pytest.mark.parametrize(("camera", "degrees"), [("cam_01", 2.0), ("cam_04", -2.5)])
+def test_a_camera_that_is_a_few_pixels_off_is_named(tmp_path, ring, camera, degrees):
+    """About its vertical axis: 2 degrees are 4 pixels of a focal length of 114."""
+    folder = draw_recording(tmp_path / "walk", ring, walk(6), silhouettes=True)
+    write_calibration(folder / "calibration.toml", Rig(tuple(turned(c, degrees) if c.name == camera else c for c in ring)))
+    (warning,) = sentences(check_recording(folder), "warning")
+    assert warning.startswith(f"camera '{camera}': ") and "of its silhouettes lie outside what the other cameras see" in warning
+    pixels, way = re.search(r"moved (\d+) px (left|right)", warning).groups()
+    assert 2 <= int(pixels) <= 6 and way == ("right" if degrees > 0 else "left")
+
+
+def test_a_video_that_is_late_is_named(tmp_path, ring):
+    folder = draw_recording(tmp_path / "walk", ring, walk(12), silhouettes=True)
+    assert sentences(check_recording(folder), "warning") == []
+    late = folder / "silhouettes" / "cam_02"
+    for index in range(11, 0, -1):
+        (late / f"{index:06d}.png").write_bytes((late / f"{max(0, index - 2):06d}.png").read_bytes())
+    (warning,) = sentences(check_recording(folder), "warning")
+    assert warning.startswith("camera 'cam_02': ") and "early or late" in warning
+
+
+def test_legs_behind_a_table_are_nobody_s_fault(tmp_path, ring):
+    folder = draw_recording(tmp_path / "walk", ring, walk(6), silhouettes=True)
+    for camera in ("cam_01", "cam_03"):
+        for file in (folder / "silhouettes" / camera).iterdir():
+            mask = cv2.imread(str(file), cv2.IMREAD_GRAYSCALE)
+            rows = np.flatnonzero(mask.any(axis=1))
+            mask[int(rows[0] + 0.6 * len(rows)) :] = 0
+            cv2.imwrite(str(file), mask)
+    assert sentences(check_recording(folder), "warning") == []
+
+
+@pytest.mark.parametrize("depth", [0.1, 0.18])
+def test_feet_below_the_floor_are_told(body_folder, ring, depth):
+    """Posts, as an ellipsoid has no feet."""
+    circle = np.linspace(0, 2 * np.pi, 90)
+    post = np.concatenate([np.stack([0.12 * np.cos(circle), 0.12 * np.sin(circle), np.full(90, z)], axis=-1) for z in (0.0, 1.7)])
+    for camera in ring:
+        hull = cv2.convexHull(np.round(project(camera, post)[0]).astype(np.int32))
+        mask = cv2.fillConvexPoly(np.zeros((120, 160), np.uint8), hull, 255)
+        cv2.imwrite(str(body_folder / "silhouettes" / camera.name / "000000.png"), mask)
+    assert sentences(check_recording(body_folder), "warning") == []
+    lower = [replace(camera, translation=camera.translation + camera.rotation[:, 2] * depth) for camera in ring]
+    write_calibration(body_folder / "calibration.toml", lower)
+    (warning,) = sentences(check_recording(body_folder), "warning")
+    told = int(re.match(r"people's feet are (\d+) cm below the floor", warning).group(1))
+    assert 100 * depth - 5 <= told <= 100 * depth + 3
+
+
+def test_people_beyond_a_wall_are_told(tmp_path, ring):
+    folder = draw_recording(tmp_path / "walk", ring, walk(3), silhouettes=True)
+    (folder / "recording.toml").write_text("room = [[-2.0, -2.0, 0.0], [0.8, 2.0, 1.5]]\n")
+    warnings = sentences(check_recording(folder), "warning")
+    assert len(warnings) == 2 and "beyond the room's limit x = 0.8 m" in warnings[0] and "z = 1.5 m" in warnings[1]
+    assert all("widen `room`" in warning for warning in warnings)
 
 
 def test_swapped_cameras_are_noticed(body_folder):
@@ -149,6 +208,16 @@ def test_lengths_rates_gaps_and_dark_images(recording_folder, ring):
     warnings = sentences(check_recording(recording_folder), "warning")
     assert any("1 of 5 images are missing, the first is frame 2" in warning for warning in warnings)
     assert "cam_01: frame 1 cannot be read; left out" in warnings
+
+
+@pytest.mark.parametrize("name", ["r1", "r2", "r3", "r4"])
+def test_good_recordings_of_another_program_are_quiet(shared_data, name):
+    assert sentences(check_recording(shared_data / "rendered" / name), "warning") == []
+
+
+def test_a_calibration_that_is_known_to_be_off_is_told(shared_data):
+    (warning,) = sentences(check_recording(shared_data / "bodytrack"), "warning")
+    assert warning.startswith("camera 'cam_03': ")
 
 
 def test_background_is_told(recording_folder, ring):

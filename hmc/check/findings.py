@@ -16,7 +16,7 @@ import numpy as np
 from hmc.camera.calibration import CalibrationEntry, build_camera, read_entries
 from hmc.camera.coverage import estimate_room, in_view
 from hmc.camera.model import Camera, Rig, undistort
-from hmc.check.silhouettes import disagreements
+from hmc.check.silhouettes import hull_findings, probe_masks
 from hmc.errors import InputError
 from hmc.footage import IMAGE_SUFFIXES, VIDEO_SUFFIXES, Footage, read_footage
 from hmc.recording import Frame, Recording, find_views, gaps, iterate_frames, open_recording, wrong_sizes, wrong_units
@@ -291,5 +291,5 @@ def _read(recording: Recording, read_all: bool) -> list[str]:
         if image is not None and image.max() < 10:
             dark.add(camera.name)
     sentences.extend(f"camera '{name}': its first image is black" for name in sorted(dark))
-    sentences.extend(disagreements(recording, probes))
+    sentences.extend(hull_findings(recording, probe_masks(recording, probes)))
     return sentences

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import cv2
 import numpy as np
 
 from hmc.camera.coverage import inside_image
-from hmc.camera.model import Camera, project
+from hmc.camera.model import Camera, Rig, project
+from hmc.camera.segmentation import BackgroundModel, segment, train_background
+from hmc.check.hull import Hull, best_move, beyond_room, fine_hull, floor_height, misfit, odd_camera
 from hmc.recording import Frame, Recording, background_frames
 
-__all__ = ["disagreements", "silhouette_agreement"]
+__all__ = ["disagreements", "hull_findings", "probe_masks", "silhouette_agreement"]
 
 #: Spacing of the points that the hull is made of (metres; wider in a room that would need more than MAX_POINTS).
 SPACING_M = 0.06
@@ -22,10 +25,12 @@ CELL = 1.5
 #: A cell counts as silhouette from this share of its pixels on; a point may be somebody's from the lower one, so that thin limbs stay.
 COVERED = 0.5
 TOUCHED = 0.2
-#: Grey levels by which a pixel must differ from the empty scene; well above the noise of a camera, to need no model of it.
-DIFFERENCE = 40
-#: More than this share of an image in the foreground says that the light changed, not that somebody is there.
-FULL = 0.5
+#: Cameras that must show somebody for a fine hull to tell anything.
+LEAST_VIEWS = 4
+#: Feet this far below the floor are told, metres: in good rigs they come out between -.02 and .02, a post 40 cm wide at -.05.
+LEAST_DEPTH_M = 0.065
+#: Frames of the empty scene that are learnt from.
+LEARNT_FRAMES = 20
 #: Share of a silhouette that the others' hull explains: .97 or so in a good rig, .83 where furniture hides half of the person from two
 #: cameras, .5 to .9 when one camera is turned by 5 degrees, below .4 when two videos are swapped.
 GOOD_AGREEMENT = 0.9
@@ -44,15 +49,37 @@ class _View(NamedTuple):
     shape: tuple[int, int]
 
 
-def disagreements(recording: Recording, frames: Sequence[Frame]) -> list[str]:
-    """Name the cameras whose silhouettes do not fit the others'.
-
-    Silhouettes are those on disk, or else the difference from the median background frame; where there are neither, nothing is said.
+def probe_masks(recording: Recording, frames: Sequence[Frame]) -> list[Sequence[np.ndarray | None]]:
+    """The silhouettes of a few frames: those on disk, or else what differs from the empty scene; none where there are neither.
 
     Parameters
     ----------
     recording : Recording
     frames : sequence of Frame
+
+    Returns
+    -------
+    list (frames) of sequence (cameras) of ndarray of bool, shape (h, w), or None
+    """
+    if recording.has_silhouettes:
+        return [frame.silhouettes or (None,) * len(recording.rig) for frame in frames]
+    with ThreadPoolExecutor() as pool:
+        models = list(pool.map(lambda c: _learn(recording, c), range(len(recording.rig))))
+    masks: list[list[np.ndarray | None]] = [[None] * len(models) for _ in frames]
+    for c, model in enumerate(models):
+        for frame, found in zip(frames, masks, strict=True):
+            if model is not None:
+                found[c], model = segment(model, frame.images[c])
+    return list(masks)
+
+
+def disagreements(recording: Recording, masks: Sequence[Sequence[np.ndarray | None]]) -> list[str]:
+    """Name the cameras whose silhouettes do not fit the others'.
+
+    Parameters
+    ----------
+    recording : Recording
+    masks : sequence (frames) of sequence (cameras) of ndarray, shape (h, w) bool, or None
         A few moments, with somebody in the room.
 
     Returns
@@ -60,8 +87,6 @@ def disagreements(recording: Recording, frames: Sequence[Frame]) -> list[str]:
     list of str
         Empty when all fit; else one sentence, for the camera without which all others fit, or for all of them.
     """
-    empty = [None if recording.has_silhouettes else _empty_scene(recording, index) for index in range(len(recording.rig))]
-    masks = [_masks(frame, empty) for frame in frames]
     if all(len([mask for mask in frame if mask is not None]) < 3 for frame in masks):
         return []
     views = _views(recording)
@@ -87,6 +112,55 @@ def disagreements(recording: Recording, frames: Sequence[Frame]) -> list[str]:
         f"silhouettes and calibration disagree (share of each that fits the others': {listed}); "
         "is each video that of its camera, and are they synchronised?"
     ]
+
+
+def hull_findings(recording: Recording, masks: Sequence[Sequence[np.ndarray | None]]) -> list[str]:
+    """What a fine hull tells: people below the floor or beyond the walls, a camera that is off by a few pixels or frames.
+
+    Parameters
+    ----------
+    recording, masks
+        As for `disagreements`, to which it is left to say that cameras do not fit at all.
+
+    Returns
+    -------
+    list of str
+    """
+    rig, room = recording.rig, recording.room
+    moments = [frame for frame in masks if sum(mask is not None and mask.any() for mask in frame) >= LEAST_VIEWS]
+    hulls = [hull for hull in (fine_hull(rig, frame, room) for frame in moments) if len(hull.strict)]
+    cut = [
+        f"people reach {reach:.1f} m beyond the room's limit {'xyz'[axis]} = {room[end, axis]:g} m, where {share:.0%} of their volume is "
+        "cut off; widen `room` in recording.toml"
+        for end, axis, share, reach in beyond_room(hulls, room)
+    ]
+    depth = float(room[0, 2]) - floor_height(hulls, float(room[0, 2]))
+    if depth >= LEAST_DEPTH_M:
+        cut.append(
+            f"people's feet are {depth * 100:.0f} cm below the floor, where they are cut off; the floor must be at z = 0 in the "
+            "calibration, and the room's lower limit at the floor"
+        )
+    return cut or disagreements(recording, masks) or _odd_camera(rig, hulls)
+
+
+def _odd_camera(rig: Rig, hulls: Sequence[Hull]) -> list[str]:
+    """A sentence on the camera that is off by a few pixels or frames."""
+    shares = misfit(rig, hulls, range(len(rig)))
+    odd = odd_camera(rig, hulls, shares)
+    if odd is None:
+        return []
+    c, others = odd
+    outside = shares[:, shares.shape[1] // 2, shares.shape[2] // 2]
+    sentence = f"camera '{rig[c].name}': {outside[c]:.1%} of its silhouettes lie outside what the other cameras see"
+    if others is not None:
+        sentence += f", and so do {np.nanmean(np.delete(outside, c)):.1%} of theirs, but only {others:.1%} without it"
+    move = best_move(shares[c])
+    if move is not None:
+        then, (right, down) = move
+        ways = ((right, ("left", "right")), (down, ("up", "down")))
+        way = " and ".join(f"{round(abs(n) * max(rig[c].size) / 640)} px {words[n > 0]}" for n, words in ways if n)
+        sentence += f"; {then:.1%} of its own would if they were moved {way}"
+    return [f"{sentence}; has it moved since it was calibrated, or is its video early or late?"]
 
 
 def silhouette_agreement(views: Sequence[_View], masks: Sequence[Sequence[np.ndarray | None]], members: Sequence[int]) -> np.ndarray:
@@ -157,16 +231,7 @@ def _coarse(mask: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
     return cv2.resize(mask.astype(np.float32), shape[::-1], interpolation=cv2.INTER_AREA).ravel()
 
 
-def _masks(frame: Frame, empty: Sequence[np.ndarray | None]) -> list[np.ndarray | None]:
-    if frame.silhouettes is not None:
-        return list(frame.silhouettes)
-    masks: list[np.ndarray | None] = []
-    for image, scene in zip(frame.images, empty, strict=True):
-        mask = None if image is None or scene is None else cv2.medianBlur(cv2.absdiff(image, scene), 5).max(axis=2) > DIFFERENCE
-        masks.append(None if mask is None or mask.mean() > FULL else mask)
-    return masks
-
-
-def _empty_scene(recording: Recording, index: int) -> np.ndarray | None:
-    frames = list(background_frames(recording, index, limit=5))
-    return np.median(frames, axis=0).astype(np.uint8) if frames else None
+def _learn(recording: Recording, index: int) -> BackgroundModel | None:
+    if not recording.n_background_frames[index]:
+        return None
+    return train_background(background_frames(recording, index, LEARNT_FRAMES))
