@@ -34,6 +34,8 @@ class HullTarget:
         to the strict one; 0 inside both. A crop around the person.
     tolerant : ndarray of bool, shape (nx, ny, nz)
         The tolerant hull in the same crop.
+    loose : ndarray of bool, shape (nx, ny, nz)
+        Where else the person may be, in the same crop.
     origin : ndarray, shape (3,)
         Centre of the crop's first voxel, world, metres.
     voxel_size_m : float
@@ -49,6 +51,7 @@ class HullTarget:
 
     distance: np.ndarray
     tolerant: np.ndarray
+    loose: np.ndarray
     origin: np.ndarray
     voxel_size_m: float
     surface: np.ndarray
@@ -98,10 +101,12 @@ def make_target(
     core[tuple((strict - low).T)] = True
     distance = _distance_to(occupied, grid.voxel_size_m)
     distance += STRICT_SHARE * np.minimum(_distance_to(core, grid.voxel_size_m), STRICT_CAP_M)
+    maybe = np.zeros(shape, bool) if loose is None else _crop(loose, low, shape)
     if loose is not None:
-        distance = np.minimum(distance, _distance_to(_crop(loose, low, shape), grid.voxel_size_m) + LOOSE_M)
+        distance = np.minimum(distance, _distance_to(maybe, grid.voxel_size_m) + LOOSE_M)
     surface = grid.centres(np.argwhere(core & ~ndimage.binary_erosion(core)) + low)
-    return HullTarget(distance, occupied, grid.centres(low), grid.voxel_size_m, surface, len(strict) * grid.voxel_size_m**3, floor_z)
+    volume_m3 = len(strict) * grid.voxel_size_m**3
+    return HullTarget(distance, occupied, maybe, grid.centres(low), grid.voxel_size_m, surface, volume_m3, floor_z)
 
 
 def _crop(volume: np.ndarray, low: np.ndarray, shape: np.ndarray) -> np.ndarray:

@@ -37,7 +37,9 @@ def with_rays(target: HullTarget, rig: Rig, masks: Sequence[np.ndarray | None], 
     -------
     HullTarget
     """
-    shell = target.tolerant & ~ndimage.binary_erosion(target.tolerant)
+    # The loose hull too: a leg that furniture hides from all cameras but one or two is in no other, and plain to see in these.
+    possible = target.tolerant | target.loose
+    shell = possible & ~ndimage.binary_erosion(possible)
     points = np.concatenate([target.surface, target.origin + target.voxel_size_m * np.argwhere(shell)])
     return replace(target, rays=silhouette_rays(rig, masks, points, target.voxel_size_m, others))
 
