@@ -26,12 +26,20 @@ def append_journal(path: str | Path, record: Mapping[str, Any]) -> None:
         Made, with its folder, where it does not exist.
     record : mapping
         Plain values and arrays; an array comes back as nested lists.
+
+    Raises
+    ------
+    InputError
+        When the file system does not let it be written.
     """
     path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
     line = json.dumps(record, default=_plain, separators=(",", ":")) + "\n"
-    with open(path, "a", encoding="utf-8") as file:
-        file.write(line)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with open(path, "a", encoding="utf-8") as file:
+            file.write(line)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror or error}); choose another folder, or make room") from error
 
 
 def open_journal(path: str | Path | None, key: str) -> list[dict[str, Any]]:
@@ -53,7 +61,8 @@ def open_journal(path: str | Path | None, key: str) -> list[dict[str, Any]]:
     records = read_journal(path)
     if records and records[0].get("key") == key:
         return records[1:]
-    Path(path).unlink(missing_ok=True)
+    if Path(path).exists():
+        Path(path).unlink()
     append_journal(path, {"key": key})
     return []
 

@@ -167,7 +167,8 @@ def open_recording(path: str | Path, cameras: Sequence[str] | None = None, start
     total = min(total, stated or total)
     if start < 0 or start >= total or (frames is not None and frames < 1):
         raise InputError(
-            f"{path}: nothing to read from frame {start} on ({'all' if frames is None else frames} frames); it has {total} frames"
+            f"{path}: nothing to read from frame {start} on ({'all' if frames is None else frames} frames); it has {total} frames, "
+            f"0 to {total - 1}: choose other --start and --frames"
         )
 
     background = _find_background(path, rig, problems)

@@ -376,7 +376,7 @@ def read_run(path: str | Path) -> dict[str, Any]:
     except OSError as error:
         raise InputError(f"{path}: cannot read it ({error.strerror})") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: not a TOML file ({error})") from error
+        raise InputError(f"{path}: not a TOML file ({error}); mend it, or delete it and run again") from error
 
 
 def run_selection(directory: str | Path) -> tuple[int, int | None]:

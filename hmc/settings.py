@@ -34,7 +34,7 @@ def read_settings(path: Path) -> dict[str, Any]:
     try:
         settings = tomllib.loads(file.read_text(encoding="utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{file}: not a TOML file ({error})") from None
+        raise InputError(f"{file}: not a TOML file ({error}); mend or remove it") from None
     for key in settings:
         if key not in SETTINGS:
             near = difflib.get_close_matches(key, SETTINGS, 1, 0.0)

@@ -132,6 +132,13 @@ def test_a_reference_elsewhere_and_tracks_without_centroids(result, truth, tmp_p
     assert "MOTP 60.0 mm" in out and "poses" not in out
 
 
+def test_a_result_of_another_recording_is_told(result, recording, tmp_path, capsys):
+    for made, told in ((tmp_path / "elsewhere" / recording.name, False), (tmp_path / "other_take", True)):
+        write_run(result / "run.toml", "apf", {}, 0, recording=made)
+        assert main(["evaluate", str(result), str(recording)]) == 0
+        assert (f"the result was made from {made}" in capsys.readouterr().out) == told
+
+
 def test_wrong_input_is_one_line_and_exit_code_2(result, tmp_path, capsys):
     empty = tmp_path / "empty"
     empty.mkdir()

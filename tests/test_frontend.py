@@ -68,7 +68,7 @@ def test_a_light_switch_is_reported_once_and_survived(tmp_path, ring):
     for camera in ring:
         for index in (4, 5):
             file = path / "images" / camera.name / f"{index:06d}.png"
-            cv2.imwrite(str(file), np.clip(cv2.imread(str(file)).astype(int) + 100, 0, 255).astype(np.uint8))
+            cv2.imwrite(str(file), np.clip(cv2.imread(str(file)).astype(int) + (120, 70, 0), 0, 255).astype(np.uint8))
     recording = open_recording(path)
     problems = []
     steps = list(stream_hulls(recording, VoxelGrid.from_room(recording.room, 0.1), on_problem=problems.append))

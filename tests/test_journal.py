@@ -1,5 +1,7 @@
 """Taking up a journal: of the same run, of another one, and none."""
 
+from pathlib import Path
+
 import pytest
 
 from hmc.errors import InputError
@@ -36,3 +38,12 @@ def test_a_damaged_journal_is_not_thrown_away(tmp_path):
     with pytest.raises(InputError, match="line 2: damaged"):
         open_journal(path, "a")
     assert path.exists()
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
+def test_a_full_disk_is_told(tmp_path):
+    with pytest.raises(InputError, match=r"/dev/full: cannot be written .*; choose another folder, or make room"):
+        append_journal("/dev/full", {"key": "a"})
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="journal: cannot be written"):
+        open_journal(tmp_path / "file" / "journal", "a")

@@ -127,16 +127,40 @@ def test_light_that_drifts_is_followed():
         mask, following = segment(following, image, settings)
         assert mask is not None
     assert overlap(mask, truth) > 0.85
-    assert segment(frozen, image)[0] is None
+    assert following.mean[..., 0].mean() > 1.1 * frozen.mean[..., 0].mean()
 
 
-@pytest.mark.parametrize("light", [1.4, 0.45])
+@pytest.mark.parametrize("light", [1.3, 0.6])
+def test_automatic_exposure_and_flicker_cost_nothing(light):
+    scene = Scene(8)
+    model = trained(scene)
+    for i in range(12):
+        scene.light = 1.0 if i % 2 else light
+        image, truth = scene.person(x=100 + 4 * i)
+        mask, model = segment(model, image)
+        assert mask is not None and overlap(mask, truth) > 0.85
+
+
+@pytest.mark.parametrize("frames", [1, 2])
+def test_a_flash_costs_no_more_than_its_frames(frames):
+    """A flash is of another colour than the light, so that it is no matter of exposure."""
+    scene = Scene(9)
+    model = trained(scene)
+    for i in range(14):
+        scene.light = np.array([1.7, 1.4, 1.2]) if 4 <= i < 4 + frames else 1.0
+        image, truth = scene.person(x=100 + 4 * i)
+        mask, model = segment(model, image)
+        assert (mask is None) if i == 4 else (4 < i < 4 + frames or overlap(mask, truth) > 0.85)
+    assert model.before is None
+
+
+@pytest.mark.parametrize("light", [(1.6, 1.4, 1.2), (0.3, 0.4, 0.6)])
 def test_a_light_switch_costs_the_camera_one_frame(light):
     scene = Scene(6)
     model = trained(scene)
     for _ in range(5):
         mask, model = segment(model, scene.person(x=120)[0])
-    scene.light = light
+    scene.light = np.array(light)
     mask, model = segment(model, scene.person(x=121)[0])
     assert mask is None
     for x in range(122, 134):

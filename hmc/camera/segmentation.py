@@ -41,6 +41,11 @@ MOST_SHADOW = 0.2
 SOLID_PX = 4
 #: How far around those squares the image is looked at, pixels of a 640 x 480 image.
 MARGIN_PX = 24
+#: From this share of the image in the foreground on, all of it may have become brighter or darker; by less than that factor is none.
+#: Every so many pixels of each row and column tell. Brought back, it must leave no more than that share in the foreground.
+SUSPECT_SHARE, LEAST_GAIN, GAIN_STEP, MOST_LEFT = 0.03, 1.02, 8, 0.2
+#: Grey level from which on a pixel may be brighter than it looks.
+OVEREXPOSED = 250
 #: Share of the new image when everything changed at once, and in the frames after that.
 SWITCH_RATE = 0.5
 SETTLING_RATE = 0.2
@@ -118,6 +123,8 @@ class BackgroundModel:
         Images segmented so far.
     settling : int
         Frames left of learning quickly, after a light was switched.
+    before : ndarray of float32, shape (height, width, 3), or None
+        The mean before the light was switched, while settling: what changed may have been a flash.
     doubtful : ndarray of bool, shape (height, width), or None
         Where the last image is not quite the empty scene: the silhouette, shadows, and near people whatever differs a little. What
         other cameras see decides there (`hmc.voxels.completion`). None before the first image.
@@ -131,6 +138,7 @@ class BackgroundModel:
     people: np.ndarray
     frame: int = 0
     settling: int = 0
+    before: np.ndarray | None = None
     doubtful: np.ndarray | None = None
     unseen: np.ndarray | None = None
 
@@ -205,7 +213,8 @@ def segment(
     -------
     mask : ndarray of bool, shape (height, width), or None
         ``None`` where there is no image, and where more than `max_foreground` of it changed at once: the camera does not vote in this
-        frame, and the background is learnt anew around where people were last.
+        frame, and the background is learnt anew around where people were last. An image that as a whole is brighter or darker by one
+        factor (automatic exposure, flicker) is brought back first.
     model : BackgroundModel
 
     Raises
@@ -220,8 +229,12 @@ def segment(
         raise InputError(
             f"the image is {image.shape[1]} x {image.shape[0]} pixels, the background {model.mean.shape[1]} x {model.mean.shape[0]}"
         )
-    answer = model.mixture.apply(image, learningRate=0)
-    found = cv2.threshold(answer, FOREGROUND - 1, 1, cv2.THRESH_BINARY)[1]
+    if model.before is not None and _nearer(image, model.before, model.mean):  # it was a flash
+        model.mean[...] = model.before
+        model = replace(model, before=None)
+    answer, found = _apply(model, image)
+    if cv2.countNonZero(found) > SUSPECT_SHARE * found.size:
+        image, answer, found = _level(model, image, answer, found)
     if cv2.countNonZero(found) > settings.max_foreground * found.size:
         return None, _adapt_to_switch(model, image, settings)
     mask, doubtful = _complete(found, cv2.threshold(answer, SHADOW - 1, 1, cv2.THRESH_BINARY)[1], image, model, settings)
@@ -230,6 +243,8 @@ def segment(
     if model.unseen is not None:
         doubtful &= ~model.unseen
     after = replace(model, people=mask, frame=model.frame + 1, settling=max(0, model.settling - 1), doubtful=doubtful)
+    if not after.settling and after.before is not None:
+        after = replace(after, before=None)
     if after.settling or after.frame % settings.learn_every == 0:
         rate = SETTLING_RATE if after.settling else settings.learning_rate
         people = mask if model.unseen is None else mask | model.unseen
@@ -260,6 +275,38 @@ def segment_views(
     run = map if pool is None else pool.map
     results = list(run(segment, models, images, [settings] * len(models)))
     return tuple(mask for mask, _ in results), tuple(model for _, model in results)
+
+
+def _apply(model: BackgroundModel, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """What the mixture says of an image, and where that is foreground, 1 or 0."""
+    answer = model.mixture.apply(image, learningRate=0)
+    return answer, cv2.threshold(answer, FOREGROUND - 1, 1, cv2.THRESH_BINARY)[1]
+
+
+def _level(model: BackgroundModel, image: np.ndarray, answer: np.ndarray, found: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The image as bright as the background, with the mixture's answer to it, where that explains most of the foreground."""
+    few = slice(None, None, GAIN_STEP), slice(None, None, GAIN_STEP)
+    luma = _luma_chroma(image[few])[..., 0]
+    told: np.ndarray = (luma < OVEREXPOSED) & ~model.people[few]
+    if not told.any():
+        return image, answer, found
+    gain = float(np.median(luma[told] / model.mean[few][told, 0]))
+    if 1 / LEAST_GAIN < gain < LEAST_GAIN:
+        return image, answer, found
+    level = cv2.convertScaleAbs(image, alpha=1 / gain)
+    # What is overexposed may have been as bright as the scene is.
+    np.maximum(level, _as_image(model.mean), out=level, where=image >= OVEREXPOSED)
+    level_answer, level_found = _apply(model, level)
+    left = cv2.countNonZero(level_found)
+    better = left < cv2.countNonZero(found) and left < MOST_LEFT * found.size
+    return (level, level_answer, level_found) if better else (image, answer, found)
+
+
+def _nearer(image: np.ndarray, one: np.ndarray, other: np.ndarray) -> bool:
+    """Whether most of an image is nearer to one background than to another."""
+    few = slice(None, None, GAIN_STEP), slice(None, None, GAIN_STEP)
+    luma = _luma_chroma(image[few])[..., 0]
+    return bool(np.median(np.abs(luma - one[few][..., 0])) < np.median(np.abs(luma - other[few][..., 0])))
 
 
 def _complete(
@@ -333,13 +380,14 @@ def _adapt_to_switch(model: BackgroundModel, image: np.ndarray, settings: Segmen
     side = 2 * round(2 * settings.keep_out_px * max(image.shape[:2]) / 640) + 1
     near = cv2.dilate(model.people.view(np.uint8), np.ones((side, side), np.uint8))
     outside = (1 - near)[..., None].astype(np.float32)
+    before = model.mean.copy() if model.before is None else model.before
     old = _as_image(model.mean).astype(np.float32)
     window = (4 * side + 1, 4 * side + 1)
     gain = (cv2.blur(image * outside, window) + 1e-3) / (cv2.blur(old * outside, window) + 1e-3)
     empty = np.where(near[..., None] > 0, np.clip(old * gain, 0, 255), image).astype(np.uint8)
     model.mean[...] = _luma_chroma(empty)
     model.mixture.apply(empty, learningRate=SWITCH_RATE)
-    return replace(model, frame=model.frame + 1, settling=SETTLING_FRAMES)
+    return replace(model, frame=model.frame + 1, settling=SETTLING_FRAMES, before=before)
 
 
 def _luma_chroma(image: np.ndarray) -> np.ndarray:

@@ -70,9 +70,10 @@ def run(args: argparse.Namespace) -> int:
             f"positives, {tracks.mismatches} mismatches in {tracks.objects} person-frames{tracks_note}"
         )
         report["tracks"] = track_summary(tracks)
-    for note in poses.notes if poses is not None else ():
+    notes = [*(poses.notes if poses is not None else ()), *made_from(args.directory, args.recording)]
+    for note in notes:
         print(f"note: {note}")
-    report["notes"] = list(poses.notes) if poses is not None else []
+    report["notes"] = notes
     write_toml(args.directory / "metrics.toml", {"truth": str(args.truth or args.recording), "start": start, "frames": frames, **report})
     return 0
 
@@ -99,6 +100,17 @@ def find_truth(recording: Path | None, truth: Path | None) -> tuple[Path | None,
     if not joints.exists() and not centroids.exists():
         raise InputError(f"{recording}: no truth/joints.csv and no truth/centroids.csv to compare with; give another table by --truth FILE")
     return (joints if joints.exists() else None), (centroids if centroids.exists() else None)
+
+
+def made_from(directory: Path, recording: Path | None) -> list[str]:
+    """A sentence where the result says that it was made from a recording of another name."""
+    from hmc.results import read_run
+
+    run = directory / "run.toml"
+    made = read_run(run).get("recording") if run.is_file() else None
+    if recording is None or not isinstance(made, str) or Path(made).name == recording.resolve().name:
+        return []
+    return [f"{run}: the result was made from {made}, not from {recording}; are they the same recording?"]
 
 
 def print_pose(poses, quiet: bool) -> None:

@@ -40,7 +40,7 @@ def read_toml(path: Path) -> list[CalibrationEntry]:
     try:
         tables = tomllib.loads(path.read_text(encoding="utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: not a TOML file ({error})") from None
+        raise InputError(f"{path}: not a TOML file ({error}); mend or remove it") from None
     return [
         _entry(path, label, table)
         for label, table in sorted(tables.items(), key=lambda item: natural_key(item[0]))
