@@ -44,8 +44,8 @@ class LegSettings:
     """
 
     lag_s: float = 1.0
-    doubt: float = 0.2
-    jump_weight: float = 3e-5
+    doubt: float = 0.02
+    jump_weight: float = 2e-5
     largest_jump_m_s: float = 2.8
     reach_s: float = 0.2
 
