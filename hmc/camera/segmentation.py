@@ -43,7 +43,7 @@ SOLID_PX = 4
 MARGIN_PX = 24
 #: From this share of the image in the foreground on, all of it may have become brighter or darker; by less than that factor is none.
 #: Every so many pixels of each row and column tell. Brought back, it must leave no more than that share in the foreground.
-SUSPECT_SHARE, LEAST_GAIN, GAIN_STEP, MOST_LEFT = 0.03, 1.02, 8, 0.2
+SUSPECT_SHARE, LEAST_GAIN, GAIN_STEP, MOST_LEFT = 0.03, 1.02, 16, 0.2
 #: Grey level from which on a pixel may be brighter than it looks.
 OVEREXPOSED = 250
 #: Share of the new image when everything changed at once, and in the frames after that.
