@@ -7,11 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from hmc.cli.common import add_selection_options, open_selected, positive_float, print_problems, progress, recording_source, whole_number
+from hmc.cli.pose_markers import add_marker_options, run_markers
 from hmc.cli.track import JOURNAL, add_tracker_options, selected_tracker
 
 __all__ = ["add_parser", "run"]
 
-METHODS = ("apf",)
+METHODS = ("apf", "marker-apf")
 #: The journal of a run that is not finished.
 POSE_JOURNAL = ".pose.journal"
 #: Its silhouettes, which the tracker leaves for the poses.
@@ -29,7 +30,7 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     )
     add_selection_options(parser)
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the result")
-    parser.add_argument("--method", choices=METHODS, default="apf", help="apf: annealed particle filter (default)")
+    parser.add_argument("--method", choices=METHODS, default="apf", help="apf: annealed particle filter (default); marker-apf: on markers")
     parser.add_argument("--preset", default="default", metavar="NAME", help="default, or canton2009 for the thesis's printed parameters")
     parser.add_argument("--voxel", type=positive_float, default=0.03, metavar="M", help="side of a voxel, metres (default: 0.03)")
     add_tracker_options(parser)
@@ -42,6 +43,7 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
         help="everybody's stature in metres; auto: estimated from each person's volume; by default what recording.toml says of a "
         "single person, else auto",
     )
+    add_marker_options(parser)
     return parser
 
 
@@ -60,6 +62,8 @@ def run(args: argparse.Namespace) -> int:
     from hmc.tracking.resumable import person_grid, track_recording
 
     recording = open_selected(args)
+    if args.method == "marker-apf":
+        return run_markers(args, _height(args.height, recording), recording)
     preset = pose_preset(args.preset)
     if args.out.is_file():
         raise InputError(f"--out {args.out}: is a file; give a folder")

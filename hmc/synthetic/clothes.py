@@ -11,7 +11,8 @@ from hmc.synthetic.skeleton import BONE_NAMES, Skeleton
 
 __all__ = ["PATTERNS", "Clothes", "dress"]
 
-PATTERNS = ("plain", "stripes", "checks", "dots")
+#: `markers` is plain, with little balls of the pattern's colour on the joints (`hmc.synthetic.markers`).
+PATTERNS = ("plain", "stripes", "checks", "dots", "markers")
 
 
 @dataclass(frozen=True)
@@ -21,7 +22,7 @@ class Clothes:
     Parameters
     ----------
     shirt, trousers, skin, hair, shoes : tuple of float
-    pattern : {"plain", "stripes", "checks", "dots"}
+    pattern : {"plain", "stripes", "checks", "dots", "markers"}
         Of the shirt.
     pattern_colour : tuple of float
     sleeves, legs : {"long", "short"}
@@ -121,7 +122,7 @@ def dress(
 
 
 def _pattern(name: str, vertices: np.ndarray) -> np.ndarray:
-    if name == "plain":
+    if name in ("plain", "markers"):
         return np.zeros(len(vertices), bool)
     x, y, z = (np.sin(vertices[:, k] * 2 * np.pi / period) for k, period in ((0, 0.11), (1, 0.11), (2, 0.09)))
     if name == "stripes":

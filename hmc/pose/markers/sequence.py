@@ -1,0 +1,187 @@
+"""One person's poses from a table of marker detections, frame by frame."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from hmc.camera.epipolar import undistorted_pixels
+from hmc.camera.model import Rig
+from hmc.errors import InputError
+from hmc.pose.annealed.apf import PoseState, pose_init
+from hmc.pose.body.joints import DOF_NAMES
+from hmc.pose.body.kinematics import landmarks
+from hmc.pose.body.model import BodyModel
+from hmc.pose.body.proportions import canton_body, default_body
+from hmc.pose.markers.body import fit_tips, with_skin_markers
+from hmc.pose.markers.detections import DetectionTable
+from hmc.pose.markers.filter import MarkerFilter, MarkerInfo, MarkerPreset, make_marker_filter, marker_step
+from hmc.pose.markers.likelihood import SeenMarkers, marker_views, observe_markers
+from hmc.pose.markers.points import find_points
+from hmc.pose.markers.start import LEAST_POINTS, start_pose
+from hmc.pose.sequence import PosedPeople
+from hmc.results import PoseStates, PoseTable
+
+__all__ = ["pose_from_markers", "seen_in_frame"]
+
+#: The pose is begun in the best of this many frames, evenly spread over this time from the first in which enough points were found.
+START_FRAMES, START_S = 4, 0.5
+#: Statures that are tried where none is given, metres.
+HEIGHTS_M = (1.55, 1.65, 1.75, 1.85, 1.95)
+#: After this many frames without a pose it is begun anew.
+LOST_FRAMES = 10
+#: Where markers are worn is learnt from at most this many frames.
+LEARN_FRAMES = 60
+
+
+def seen_in_frame(rig: Rig, views, detections: Sequence[np.ndarray], gate_px: float) -> SeenMarkers:
+    """One frame's detections, pixels as the images have them, ready for the likelihood.
+
+    Parameters
+    ----------
+    rig : Rig
+    views : MarkerViews
+        From `hmc.pose.markers.likelihood.marker_views`.
+    detections : sequence of ndarray, shape (n, 2)
+        One array a camera.
+    gate_px : float
+    """
+    return observe_markers(views, [undistorted_pixels(camera, uv) for camera, uv in zip(rig, detections, strict=True)], gate_px)
+
+
+def pose_from_markers(
+    rig: Rig,
+    table: DetectionTable,
+    frames: Sequence[int],
+    fps: float,
+    preset: MarkerPreset,
+    seed: int = 0,
+    *,
+    height_m: float | None = None,
+    skin: bool = True,
+    room: np.ndarray | None = None,
+    progress: Callable[[Iterable[Any], int], Iterable[Any]] | None = None,
+) -> PosedPeople:
+    """Estimate the poses of one person who wears markers.
+
+    Parameters
+    ----------
+    rig : Rig
+    table : DetectionTable
+    frames : sequence of int
+        Absolute frame numbers, rising.
+    fps : float
+    preset : MarkerPreset
+    seed : int
+        The same seed gives the same result.
+    height_m : float, optional
+        Stature; the best of several where left out.
+    skin : bool
+        Markers are worn on the skin, and where exactly is learnt from the first frames if the preset refines; otherwise they are the
+        joint centres themselves.
+    room : ndarray, shape (2, 3), optional
+        Where the person may be, metres.
+    progress : callable, optional
+        ``progress(frames, total)`` passes the frames on and may show how far they are.
+
+    Returns
+    -------
+    PosedPeople
+        Person 0, with the costs of Eq. 6.9; NaN in frames without a pose.
+
+    Raises
+    ------
+    InputError
+        When there is nowhere in these frames a pose to begin with.
+    """
+    views = marker_views(rig)
+    by_frame = {frame: table.in_frame(frame, rig.names) for frame in frames}
+
+    def seen(frame: int) -> SeenMarkers:
+        return seen_in_frame(rig, views, by_frame[frame], preset.likelihood.gate_px)
+
+    anchor, body, markers, state = _begin(seen, frames, fps, preset, height_m, skin, room)
+    if skin and preset.refine:
+        states, points = [], []
+        pose, filt = pose_init(state), make_marker_filter(markers, preset, fps)
+        for frame in frames[anchor : anchor + LEARN_FRAMES]:
+            pose, info = marker_step(_rng(seed, frame, 0), filt, pose, seen(frame))
+            states.append(pose.state)
+            points.append(info.points)
+        markers = fit_tips(body, markers, np.array(states), np.array(points))
+
+    filt = make_marker_filter(markers, preset, fps)
+    order = [*range(anchor, len(frames)), *range(anchor - 1, -1, -1)]
+    found: dict[int, tuple[PoseState, MarkerInfo]] = {}
+    pose, lost = pose_init(state), 0
+    for k in progress(order, len(order)) if progress else order:
+        if k == anchor - 1:
+            pose, lost = pose_init(found[anchor][0].state), 0
+        one = seen(frames[k])
+        pose, lost = _begun_anew(filt, pose, lost, one, room)
+        pose, info = marker_step(_rng(seed, frames[k], 1), filt, pose, one)
+        lost = 0 if info.status == "fitted" else lost + 1
+        found[k] = pose, info
+    return _people(frames, body, found)
+
+
+def _rng(seed: int, frame: int, stage: int) -> np.random.Generator:
+    return np.random.default_rng([seed, int(frame), stage])
+
+
+def _body(preset: MarkerPreset, height_m: float) -> BodyModel:
+    return canton_body(height_m) if preset.body == "canton" else default_body(height_m)
+
+
+def _begin(seen, frames, fps, preset, height_m, skin, room) -> tuple[int, BodyModel, BodyModel, np.ndarray]:
+    """The frame in which the first pose fits best, the body without and with markers, and the pose."""
+    heights = HEIGHTS_M if height_m is None else (height_m,)
+    best, least, tried, spacing = None, np.inf, 0, max(1, round(START_S * fps / START_FRAMES))
+    k = 0
+    while k < len(frames) and tried < START_FRAMES:
+        points = find_points(seen(frames[k]), room)
+        if len(points) < LEAST_POINTS:
+            k += 1
+            continue
+        for height in heights:
+            body = _body(preset, height)
+            markers = with_skin_markers(body) if skin else body
+            start = start_pose(markers, points)
+            if start is not None and start[1] < least:
+                best, least = (k, body, markers, start[0]), start[1]
+        tried += 1
+        k += spacing
+    if best is None:
+        raise InputError(
+            f"in no frame do {LEAST_POINTS} markers or more appear in enough views at places that agree; "
+            "check the detections and the calibration"
+        )
+    return best
+
+
+def _begun_anew(filt: MarkerFilter, pose: PoseState, lost: int, seen: SeenMarkers, room: np.ndarray | None) -> tuple[PoseState, int]:
+    if lost < LOST_FRAMES:
+        return pose, lost
+    start = start_pose(filt.body, find_points(seen, room))
+    return (pose, lost) if start is None else (pose_init(start[0]), 0)
+
+
+def _people(frames: Sequence[int], body: BodyModel, found: dict[int, tuple[PoseState, MarkerInfo]]) -> PosedPeople:
+    states = np.array([found[k][0].state for k in range(len(frames))])
+    status = [found[k][1].status for k in range(len(frames))]
+    fitted = np.array([one == "fitted" for one in status])
+    positions = np.where(fitted[:, None, None], landmarks(body, states), np.nan)
+    numbers, persons = np.array(frames, int), np.zeros(len(frames), int)
+    notes = [
+        f"{n} frame{'s' if n > 1 else ''} without a pose: {why}"
+        for why, n in sorted(Counter(one for one in status if one != "fitted").items())
+    ]
+    return PosedPeople(
+        PoseTable(numbers, persons, positions),
+        PoseStates(numbers, persons, states, DOF_NAMES, {0: body.dimensions}),
+        np.where(fitted, [found[k][1].cost for k in range(len(frames))], np.nan),
+        tuple(notes),
+    )

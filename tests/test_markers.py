@@ -1,0 +1,285 @@
+"""Poses from markers: lookups against brute force, geometry against OpenCV, detectors against what they are told, known poses."""
+
+import cv2
+import numpy as np
+import pytest
+
+from hmc.camera.epipolar import generalised_epipolar_distance
+from hmc.camera.model import Rig, look_at, project
+from hmc.errors import InputError
+from hmc.landmarks import LANDMARKS
+from hmc.montecarlo import AnnealedSettings, truncated_normal
+from hmc.pose.annealed.apf import pose_init
+from hmc.pose.annealed.presets import drift
+from hmc.pose.body.joints import dof_index
+from hmc.pose.body.kinematics import landmarks
+from hmc.pose.body.model import neutral_state
+from hmc.pose.body.proportions import default_body
+from hmc.pose.markers.body import fit_tips, place_tips, with_skin_markers
+from hmc.pose.markers.colour import ColourSettings, detect_markers, learn_marker_colour
+from hmc.pose.markers.detections import DetectionTable, read_detections, write_detections
+from hmc.pose.markers.filter import MarkerPreset, make_marker_filter, marker_preset, marker_step
+from hmc.pose.markers.likelihood import MarkerLikelihood, marker_cost, marker_views, observe_markers, project_markers
+from hmc.pose.markers.nearest import nearest_detections
+from hmc.pose.markers.points import find_points, triangulate
+from hmc.pose.markers.sequence import pose_from_markers
+from hmc.pose.markers.start import start_pose
+from hmc.pose.markers.synthetic import SyntheticDetector, detect_synthetic, marker_visibility, seen_by_ideal_detector
+
+BODY = default_body(1.75)
+GATE = 25.0
+
+
+def ring(n=5):
+    angles = np.arange(n) * 2 * np.pi / n + 0.2
+    places = [(2.8 * np.cos(a), 2.8 * np.sin(a), 1.9 + 0.2 * k) for k, a in enumerate(angles)]
+    return Rig(tuple(look_at(f"c{k}", (640, 480), place, (0, 0, 0.95), 60) for k, place in enumerate(places)))
+
+
+def standing(seed=None):
+    state = neutral_state("down", BODY.limits)
+    state[:3] = 0.1, -0.05, 0.95
+    state[dof_index("l_shoulder_x", "r_elbow_z", "l_hip_y")] += np.radians([-30, 60, -25])
+    if seed is not None:
+        state = truncated_normal(np.random.default_rng(seed), state, 0.5 * drift(30), BODY.limits.low, BODY.limits.high)
+    return state
+
+
+RIG = ring()
+VIEWS = marker_views(RIG)
+
+
+def detections(points, false=8, noise=0.0, seed=0):
+    rng = np.random.default_rng(seed)
+    uv, _ = project(RIG, points)
+    uv = uv + noise * rng.standard_normal(uv.shape)
+    return [np.concatenate([one, rng.uniform(one.min(0), one.max(0), (false, 2))]) for one in uv]
+
+
+def test_placed_tips_are_the_landmarks():
+    markers = with_skin_markers(BODY)
+    states = np.array([standing(seed) for seed in range(7)])
+    for body in (BODY, markers):
+        np.testing.assert_allclose(place_tips(body, states), landmarks(body, states).transpose(2, 1, 0), atol=2e-6)
+    offsets = np.linalg.norm(markers.tips - BODY.tips, axis=1)
+    assert (offsets > 0.005).all() and (offsets < 0.13).all()
+
+
+def test_nearest_detections_are_those_of_brute_force():
+    rng = np.random.default_rng(1)
+    points = rng.uniform(0, 300, (2, 3, 4, 50)).astype(np.float32) + rng.uniform(0, 200, (2, 3, 4, 1)).astype(np.float32)
+    seen = np.full((2, 3, 21), np.inf, np.float32)
+    seen[:, 0, :20], seen[:, 1, :1] = rng.uniform(0, 500, (2, 20)), 250  # many, one, and none in the last view
+    place, squared = nearest_detections(seen, points, 60.0)
+    distance = ((points[..., None] - seen[:, :, None, None]) ** 2).sum(axis=0)
+    wanted, least = distance.argmin(axis=-1), distance.min(axis=-1)
+    np.testing.assert_array_equal(place, np.where(least < 3600, wanted, 20))
+    np.testing.assert_allclose(squared, np.minimum(least, 3600), rtol=1e-6)
+    assert 0.05 < (place[0] < 20).mean() < 1 and (place[2] == 20).all()
+
+
+def test_cost_is_that_of_a_loop_over_landmarks_and_views():
+    states = np.array([standing(seed) for seed in range(6)])
+    seen = observe_markers(VIEWS, detections(landmarks(BODY, standing()), noise=2.0), GATE)
+    settings = MarkerLikelihood(GATE, reprojection=0.3)
+    cost, matched = marker_cost(seen, place_tips(BODY, states), settings)
+    for n, points in enumerate(landmarks(BODY, states)):
+        uv, _ = project(RIG, points)
+        scores = []
+        for m in range(15):
+            chosen, off = np.full((len(RIG), 2), np.nan), []
+            for view in range(len(RIG)):
+                apart = np.linalg.norm(seen.detections[view] - uv[view, m], axis=1)
+                off.append(min(1.0, apart.min() ** 2 / GATE**2))
+                if apart.min() <= GATE:
+                    chosen[view] = seen.detections[view][apart.argmin()]
+            k = int(np.isfinite(chosen[:, 0]).sum())
+            assert matched[m, n] == k
+            whole = generalised_epipolar_distance(VIEWS.fundamentals, chosen)
+            epipolar = 1.0 if k < 2 else min(1.0, whole / np.sqrt(k * (k - 1) / 2) / (2 * np.sqrt(2) * GATE))
+            scores.append(0.7 * epipolar + 0.3 * np.mean(off))
+        assert cost[n] == pytest.approx(np.mean(scores), abs=2e-4)
+
+
+def test_cost_is_least_at_the_true_pose_and_one_without_detections():
+    states = np.array([standing(), *(standing(seed) for seed in range(30))])
+    seen = observe_markers(VIEWS, detections(landmarks(BODY, standing()), false=0), GATE)
+    cost, matched = marker_cost(seen, place_tips(BODY, states), MarkerLikelihood(GATE))
+    assert cost.argmin() == 0 and cost[0] < 1e-3 and (matched[:, 0] == len(RIG)).all()
+    empty = observe_markers(VIEWS, [np.zeros((0, 2))] * len(RIG), GATE)
+    np.testing.assert_allclose(marker_cost(empty, place_tips(BODY, states), MarkerLikelihood(GATE))[0], 1, atol=1e-6)
+
+
+def test_markers_behind_a_camera_match_nothing():
+    uv = project_markers(VIEWS, np.array([[0.0, 50.0], [0.0, 50.0], [1.0, 1.0]]))
+    assert np.isfinite(uv).all()
+    front = project(RIG, np.array([0.0, 0.0, 1.0]))[0]
+    np.testing.assert_allclose(uv[:, :, 0].T, front, atol=1e-2)
+    assert (np.abs(uv[:, :, 1]).max(axis=0) > 1000)[project(RIG, np.array([50.0, 50.0, 1.0]))[1] == 0].all()
+
+
+def test_triangulation_is_opencvs_and_exact_over_many_views():
+    points = landmarks(BODY, standing())
+    uv, _ = project(RIG, points)
+    noisy = uv + np.random.default_rng(2).normal(0, 1, uv.shape)
+    pair = np.full_like(noisy, np.nan)
+    pair[:2] = noisy[:2]
+    theirs = cv2.triangulatePoints(VIEWS.projections[0], VIEWS.projections[1], noisy[0].T, noisy[1].T)
+    np.testing.assert_allclose(triangulate(VIEWS.projections, pair.swapaxes(0, 1)), (theirs[:3] / theirs[3]).T, atol=5e-3)
+    np.testing.assert_allclose(triangulate(VIEWS.projections, uv.swapaxes(0, 1)), points, atol=1e-9)
+    assert np.isnan(triangulate(VIEWS.projections, np.full((5, 2), np.nan))).all()
+
+
+def test_points_are_found_among_false_detections():
+    points = landmarks(BODY, standing())
+    found = find_points(observe_markers(VIEWS, detections(points, false=4, noise=0.5), GATE))
+    assert np.linalg.norm(points[:, None] - found, axis=-1).min(axis=1).max() < 0.02
+    assert find_points(observe_markers(VIEWS, [np.zeros((0, 2))] * len(RIG), GATE)).shape == (0, 3)
+
+
+def test_a_pose_begins_from_points_alone():
+    truth = standing(3)
+    truth[dof_index("root_rz")] = 2.4
+    points = np.random.default_rng(0).permutation(landmarks(BODY, truth))
+    state, cost = start_pose(BODY, points)
+    assert cost < 1e-3
+    assert np.linalg.norm(landmarks(BODY, state) - landmarks(BODY, truth), axis=1).mean() < 0.02
+    assert start_pose(BODY, points[:3]) is None
+
+
+def test_learnt_markers_are_where_they_were_worn():
+    rng = np.random.default_rng(5)
+    markers, states = with_skin_markers(BODY), np.array([standing(seed) for seed in range(9)])
+    worn = fit_tips(BODY, markers, states, landmarks(with_skin_markers(default_body(1.6)), states))
+    assert np.isfinite(worn.tips).all()
+    shifted = landmarks(markers, states) + rng.normal(0, 1e-3, (9, 15, 3))
+    shifted[:, 4] = np.nan
+    again = fit_tips(BODY, BODY, states, shifted)
+    np.testing.assert_allclose(np.delete(again.tips, 4, 0), np.delete(markers.tips, 4, 0), atol=3e-3)
+    np.testing.assert_array_equal(again.tips[4], BODY.tips[4])
+
+
+# --- detectors
+
+
+def test_flesh_hides_markers():
+    state = neutral_state("sideways", BODY.limits)
+    points, at = landmarks(BODY, state), LANDMARKS.index
+    sides = np.array([[0.0, 4.0, 0.0], [0.0, -4.0, 0.0], [4.0, 0.0, 0.2]])
+    seen = marker_visibility(BODY, state, points, sides)
+    assert seen[0, at("l_wrist")] and not seen[0, at("r_wrist")]
+    assert seen[1, at("r_hip")] and not seen[0, at("r_hip")]
+    assert seen[2].all()  # all are seen from the front
+
+
+def test_the_synthetic_detector_is_as_good_as_it_is_told():
+    rng, detector = np.random.default_rng(0), SyntheticDetector(0.8, 10, 9.0)
+    ideal = [np.full((1000, 2), 100.0), np.zeros((0, 2))]
+    boxes = np.array([[[500, 500], [600, 700]], [[0, 0], [10, 10]]], float)
+    counts, kept, off = [], [], []
+    for _ in range(60):
+        first, second = detect_synthetic(rng, ideal, detector, boxes)
+        true = first[first[:, 0] < 300]
+        kept.append(len(true))
+        off.append(true - 100)
+        counts += [len(first) - len(true), len(second)]
+    assert np.mean(kept) == pytest.approx(800, rel=0.01)
+    assert np.concatenate(off).var() == pytest.approx(9, rel=0.02)
+    assert min(counts) >= 0 and max(counts) <= 20 and np.mean(counts) == pytest.approx(10, abs=1.7)
+    assert all(len(one) == 0 for one in detect_synthetic(rng, [np.zeros((0, 2))], detector))
+    with pytest.raises(InputError, match="detection_rate"):
+        SyntheticDetector(1.2)
+
+
+def test_the_ideal_detector_sees_true_places():
+    truth = landmarks(BODY, standing())
+    ideal, state = seen_by_ideal_detector(BODY, RIG, truth, standing(1))
+    assert np.linalg.norm(landmarks(BODY, state) - truth, axis=1).max() < 0.02
+    for uv, found in zip(project(RIG, truth)[0], ideal, strict=True):
+        assert 5 < len(found) <= 15
+        assert np.linalg.norm(found[:, None] - uv, axis=-1).min(axis=1).max() < 1e-9
+
+
+def test_coloured_blobs_are_found_and_others_not():
+    rng = np.random.default_rng(3)
+    scene = np.full((240, 320, 3), (110, 120, 115), np.uint8)
+    cv2.rectangle(scene, (10, 10), (40, 40), (20, 220, 230), -1)  # as yellow as a marker, but part of the room
+    places = np.array([[100.0, 60.0], [200.0, 150.0], [260.0, 90.0]])
+    image = scene.copy()
+    for u, v in places.astype(int):
+        cv2.circle(image, (u, v), 3, (20, 220, 230), -1)
+    cv2.circle(image, (150, 200), 6, (40, 40, 200), -1)  # red
+    image = np.clip(image + rng.normal(0, 3, image.shape), 0, 255).astype(np.uint8)
+    colour = learn_marker_colour([(image, places[:2] + 0.4)])
+    found = detect_markers(image, colour, background=scene)
+    assert len(found) == 3
+    assert np.linalg.norm(places[:, None] - found, axis=-1).min(axis=1).max() < 0.5
+    assert len(detect_markers(image, colour)) > 3
+    assert detect_markers(scene, colour, background=scene).shape == (0, 2)
+    assert len(detect_markers(image, colour, ColourSettings(most=1))) == 1
+    with pytest.raises(InputError, match="no labelled marker"):
+        learn_marker_colour([(image, np.array([[900.0, 20.0]]))])
+
+
+def test_detections_come_back_from_their_table(tmp_path):
+    table = DetectionTable(np.array([3, 3, 7]), np.array(["c0", "c1", "c0"]), np.array([[1.25, 2], [3, 4.5], [5, 6]]))
+    write_detections(tmp_path / "d.csv", table)
+    back = read_detections(tmp_path / "d.csv", RIG.names)
+    np.testing.assert_array_equal(back.frames, table.frames)
+    np.testing.assert_allclose(back.uv, table.uv)
+    assert [len(uv) for uv in back.in_frame(3, RIG.names)] == [1, 1, 0, 0, 0]
+    for text, message in (
+        ("frame,camera,u\n1,c0,3\n", "no column 'v'"),
+        ("frame,camera,u,v\n1,c9,3,4\n", "line 2: no camera named 'c9'"),
+        ("frame,camera,u,v\n1,c0,3,\n", "line 2: `u` and `v` must be numbers"),
+        ("frame,camera,u,v\n1.5,c0,3,4\n", "`frame` must be a whole number"),
+    ):
+        (tmp_path / "bad.csv").write_text(text)
+        with pytest.raises(InputError, match=message):
+            read_detections(tmp_path / "bad.csv", RIG.names)
+
+
+# --- the filter
+
+
+LEAN = MarkerPreset("lean", "for tests", annealed=AnnealedSettings(2, 150, 0.1, 0.5), drift_scale=0.4, refine=True, search=True)
+
+
+def test_a_step_finds_the_pose_and_repeats_itself():
+    truth = standing(2)
+    seen = observe_markers(VIEWS, detections(landmarks(BODY, truth), noise=1.0), LEAN.likelihood.gate_px)
+    filt = make_marker_filter(BODY, LEAN, 30)
+    start = truncated_normal(np.random.default_rng(9), truth, 0.3 * drift(30), BODY.limits.low, BODY.limits.high)
+    (state, info), (again, _) = (marker_step(np.random.default_rng(1), filt, pose_init(start), seen) for _ in range(2))
+    np.testing.assert_array_equal(state.state, again.state)
+    assert info.status == "fitted" and np.isfinite(info.cost)
+    assert np.linalg.norm(landmarks(BODY, state.state) - landmarks(BODY, truth), axis=1).mean() < 0.02
+
+
+def test_without_markers_the_pose_stays():
+    filt, start = make_marker_filter(BODY, marker_preset("canton2009"), 30), pose_init(standing())
+    state, info = marker_step(np.random.default_rng(0), filt, start, observe_markers(VIEWS, [np.zeros((0, 2))] * 5, GATE))
+    np.testing.assert_array_equal(state.state, start.state)
+    assert "fewer than two views" in info.status
+    with pytest.raises(InputError, match="two cameras"):
+        marker_views(Rig(RIG.cameras[:1]))
+    with pytest.raises(InputError, match="no preset of markers named 'best'"):
+        marker_preset("best")
+
+
+def test_a_moving_person_from_a_table():
+    frames = np.arange(8)
+    states = np.array([standing() for _ in frames])
+    states[:, 0] += 0.04 * frames
+    states[:, dof_index("l_shoulder_x")] += 0.06 * frames[:, None]
+    truth = landmarks(BODY, states)
+    rows = [(frame, RIG.names[view], uv) for frame in frames for view, one in enumerate(detections(truth[frame], 2)) for uv in one]
+    rows = [row for row in rows if row[0] != 5]  # nothing was seen in frame 5
+    table = DetectionTable(np.array([r[0] for r in rows]), np.array([r[1] for r in rows]), np.array([r[2] for r in rows]))
+    people = pose_from_markers(RIG, table, frames.tolist(), 30, LEAN, height_m=1.75, skin=False)
+    errors = np.linalg.norm(people.poses.positions - truth, axis=-1)
+    assert np.isnan(errors[5]).all() and np.isnan(people.costs[5])
+    assert np.delete(errors, 5, 0).mean() < 0.02
+    assert people.notes == ("1 frame without a pose: markers in fewer than two views",)
+    with pytest.raises(InputError, match="6 markers or more"):
+        pose_from_markers(RIG, DetectionTable(np.zeros(0, int), np.zeros(0, str), np.zeros((0, 2))), [0, 1], 30, LEAN)
