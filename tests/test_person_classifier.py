@@ -73,7 +73,7 @@ def test_positions_get_the_component_that_fills_most_of_their_region():
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 8))
-@settings(max_examples=25)
+@settings(max_examples=25, deadline=None)
 def test_a_plain_tree_says_what_scikit_learn_says(seed, depth):
     rng = np.random.default_rng(seed)
     features = rng.normal(size=(120, len(FEATURES))).round(1)
@@ -87,7 +87,7 @@ def test_a_plain_tree_says_what_scikit_learn_says(seed, depth):
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=10)
+@settings(max_examples=10, deadline=None)
 def test_a_tree_comes_back_from_its_file(tmp_path_factory, seed):
     rng = np.random.default_rng(seed)
     grown = DecisionTreeClassifier(random_state=0).fit(rng.normal(size=(50, len(FEATURES))), rng.random(50) < 0.5)

@@ -25,9 +25,9 @@ __all__ = ["main", "other_scene", "render_brought_in", "training_recipes"]
 logger = logging.getLogger("hmc")
 
 #: Recipes whose furniture is brought in as it is.
-BROUGHT_IN = ("train_brought_in", "train_moved_tables")
+BROUGHT_IN = ("train_brought_in", "train_moved_tables", "train_floor_work")
 #: Recipes that are rendered once more.
-TWICE = ("train_arms", "train_brought_in", "train_close", "train_crowd")
+TWICE = ("train_arms", "train_brought_in", "train_close", "train_crowd", "train_low", "train_pushed")
 #: The rig of the second scene, by that of the first.
 OTHER_RIG = {"corners4_overhead": "ring7", "ring7": "corners4_overhead", "corners4": "ring7_overhead", "ring7_overhead": "corners4"}
 #: Statures of the second scene, as a share of the first's.

@@ -15,7 +15,7 @@ from hmc.tracking.resumable import person_grid
 
 __all__ = ["features_of", "test_sources", "training_sources"]
 
-_TEST_QUICK, _TEST = ("meeting_short", "train_brought_in"), ("meeting", "hug", "alike", "meeting_pass", "crossing")
+_TEST_QUICK, _TEST = ("meeting_short", "train_brought_in"), ("meeting", "hug", "alike", "meeting_pass", "crossing", "meeting_moved")
 _TRAIN_QUICK = ("train_seats", "train_moved_tables", "train_close")
 
 

@@ -125,6 +125,8 @@ class StepRecipe:
         In place of `seconds`: the time in the clip at which it ends.
     chair : int
         To sit on: the number of the piece of furniture, counted from 1; 0 sits down on the spot.
+    seat_m : float
+        Height of the seat, metres; without a chair and near the floor, somebody crouches.
     """
 
     do: str
@@ -134,6 +136,7 @@ class StepRecipe:
     seconds: float = 0.0
     until_s: float = 0.0
     chair: int = 0
+    seat_m: float = 0.45
 
 
 @dataclass(frozen=True)

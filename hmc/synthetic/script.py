@@ -220,7 +220,7 @@ def _acting(one: StepRecipe, skeleton: Skeleton, rng: np.random.Generator, here:
             # fits itself to the time it is given.
             stay = max(seconds, DOWN_S + UP_S + 0.1)
             own = np.interp(times, [0, DOWN_S, stay - UP_S, stay], [0, DOWN_S, SIT_S - UP_S, SIT_S])
-            motion = sit(skeleton, np.append(own, SIT_S), rng)
+            motion = sit(skeleton, np.append(own, SIT_S), rng, one.seat_m)
             motion = Motion(motion.root[:-1], motion.orientations[:-1])
         else:
             motion = ACTIONS[one.do](skeleton, np.maximum(times, 0), rng)

@@ -20,13 +20,16 @@ from hmc.tracking.cloud import Cloud, Departed
 from hmc.tracking.ghosts import real_people
 from hmc.tracking.identity import exchange_mistaken, learn_looks, recognise
 from hmc.tracking.lifecycle import (
+    FORGIVEN,
     Candidate,
     Row,
     Track,
     confirm,
     delete,
+    left_behind,
     looks_like_person,
     newcomers,
+    not_things,
     one_or_two,
     propose,
     still_a_person,
@@ -57,6 +60,8 @@ class TrackerState:
         Those who left and whose colours are known.
     same : tuple of (int, int)
         Numbers of persons who came back, and the numbers that they had before.
+    things : tuple of Row
+        What was taken for people and still stands there.
     """
 
     fps: float
@@ -66,6 +71,7 @@ class TrackerState:
     clouds: tuple[Cloud, ...] = ()
     departed: tuple[Departed, ...] = ()
     same: tuple[tuple[int, int], ...] = ()
+    things: tuple[Row, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -188,13 +194,18 @@ def advance(
     known = filtered.seen & ~np.isin(np.arange(n), [*freed, *owners[kept != owners]])
     measured = np.where(known[:, None], positions, located.centroid)
     gain = np.where(shared, np.where(known, settings.filter_gain, settings.shared_gain), 1.0)
+    like = looks_like_person(owned, settings.lifecycle)
     tracks, rows = [], []
     for k, track in enumerate(state.tracks):
         if supported[k]:
             head = head_centre(observation.points[best & (owners == k)])
             moved = predicted[k] + gain[k] * (measured[k] - predicted[k])
-            tracks.append(_update(track, frame, moved, gain[k], owned.volume_m3[k], head, bool(shared[k]), state.fps, settings))
-            rows.append(Row(frame, track.person, measured[k] if gain[k] == 1 or not known[k] else moved, head))
+            now = _update(track, frame, moved, gain[k], owned.volume_m3[k], head, bool(shared[k]), state.fps, settings)
+            row = Row(frame, track.person, measured[k] if gain[k] == 1 or not known[k] else moved, head)
+            held = (*track.doubtful, row)
+            told = like[k] and track.unlike <= FORGIVEN
+            tracks.append(replace(now, doubtful=() if told else held))
+            rows += [replace(one, person=track.person) for one in held] if told else []
         else:
             tracks.append(replace(track, position=predicted[k], velocity=track.velocity * 0.8))
 
@@ -204,16 +215,16 @@ def advance(
         followed, clouds, looks = exchange_mistaken(followed, clouds, filtered.looks)
         clouds = learn_looks(followed, clouds, looks, filtered.keep_histogram)
     strangers, parted = _newcomers(observation, owners, tuple(freed.values()), frame, settings)
-    candidates = propose(state.candidates, strangers, followed, settings.lifecycle, parted)
+    candidates = propose(state.candidates, not_things(strangers, state.things, settings.lifecycle), followed, settings.lifecycle, parted)
     candidates, fresh, earlier = confirm(candidates, state.next_person, state.fps, settings.lifecycle)
-    # Whose voxels are whose is not certain where people stand together, and where nothing is seen there is nothing to judge.
-    judged = supported & ~shared
-    like = _by_person(state.tracks, looks_like_person(owned, settings.lifecycle), judged)
+    # Where nothing is seen there is nothing to judge.
+    verdicts = _by_person(state.tracks, like, supported)
     working = _by_person(state.tracks, filtered.efficiency, np.ones(len(filtered.efficiency), bool))
-    staying = delete((*followed, *fresh), frame, state.fps, observation.room, settings.lifecycle, like_person=like, efficiency=working)
+    staying = delete((*followed, *fresh), frame, state.fps, observation.room, settings.lifecycle, like_person=verdicts, efficiency=working)
+    things = left_behind(state.things, followed, staying, observation.points[owners < 0], state.fps, settings.lifecycle)
     numbers = np.array([*(track.person for track in state.tracks), -1])
     info = StepInfo((*rows, *earlier), numbers[owners], tuple(int(number) for number in numbers[:-1][shared]), filtered.color_s, filter_s)
-    after = TrackerState(state.fps, staying, candidates, state.next_person + len(fresh), (), state.departed, state.same)
+    after = TrackerState(state.fps, staying, candidates, state.next_person + len(fresh), (), state.departed, state.same, things)
     return (_with_clouds(after, followed, clouds, frame) if filter else after), info
 
 
@@ -270,9 +281,10 @@ def finish(state: TrackerState, n_frames: int, settings: FollowingSettings | Non
     """
     settings = FollowingSettings() if settings is None else settings
     short = replace(settings.lifecycle, confirm_frames=n_frames, confirm_s=0.0)
+    doubtful = tuple(replace(row, person=track.person) for track in state.tracks for row in track.doubtful)
     if n_frames > max(settings.lifecycle.confirm_frames, round(settings.lifecycle.confirm_s * state.fps)):
-        return ()
-    return tuple(confirm(state.candidates, state.next_person, state.fps, short)[2])
+        return doubtful
+    return doubtful + tuple(confirm(state.candidates, state.next_person, state.fps, short)[2])
 
 
 def _newcomers(
@@ -294,8 +306,8 @@ def _newcomers(
     n = len(sets) + len(freed)
     best = locating_voxels(observation, person, n, settings)
     located = [observation.points[best & (person == j)] for j in range(n)]
-    rows = [Row(frame, -1, points.mean(axis=0), head_centre(points)) for points in located]
-    return rows[: len(sets)], rows[len(sets) :]
+    seen = [Row(frame, -1, points.mean(axis=0), head_centre(points)) for points in located]
+    return seen[: len(sets)], seen[len(sets) :]
 
 
 def _update(

@@ -29,12 +29,20 @@ __all__ = [
     "Track",
     "confirm",
     "delete",
+    "left_behind",
     "looks_like_person",
     "newcomers",
+    "not_things",
     "one_or_two",
     "propose",
     "unowned_blobs",
 ]
+
+
+#: A verdict for a person makes up for so many against.
+FORGIVEN = 2
+#: Somebody who stands where a thing was taken for a person has the head so much higher, metres.
+STANDS_HIGHER_M = 0.2
 
 
 @dataclass(frozen=True)
@@ -70,8 +78,8 @@ class LifecycleSettings:
     edge_m : float
         Width of that edge.
     unlike_s : float
-        A track is deleted when its voxels have not looked like a person for so long without a break, however many they are: furniture
-        that somebody left behind (Canton, section 4.2.3, third criterion of deletion).
+        A track is deleted when its voxels have not looked like a person for so long, however many they are: furniture that somebody left
+        behind (Canton, section 4.2.3, third criterion of deletion). A frame in which they do makes up for two in which they do not.
     least_efficiency, efficiency_s : float
         A track is deleted when the survival rate of its filter's particles (Canton, Eq. 3.11) has been below this share for so long
         (section 4.2.3, second criterion). Of Sparse Sampling, the share of the samples that found a voxel of their own.
@@ -85,7 +93,7 @@ class LifecycleSettings:
         What `person` names; None for "rules". Not to be given.
     """
 
-    person: str = "rules"
+    person: str = "tree"
     least_top_m: float = 0.9
     most_top_m: float = 2.6
     least_height_m: float = 0.6
@@ -168,9 +176,11 @@ class Track:
     crowded : int
         Frames in a row in which another, older track stood in the same place.
     unlike : int
-        Frames in a row in which its voxels did not look like a person.
+        Frames in which its voxels did not look like a person, less twice those since in which they did.
     inefficient : int
         Frames in a row in which hardly any of its filter's particles survived.
+    doubtful : tuple of Row
+        Where it was in the last frames, as long as its voxels do not look like a person: told only when they do again.
     """
 
     person: int
@@ -183,6 +193,7 @@ class Track:
     crowded: int = 0
     unlike: int = 0
     inefficient: int = 0
+    doubtful: tuple[Row, ...] = ()
 
 
 def looks_like_person(blobs: Blobs, settings: LifecycleSettings) -> np.ndarray:
@@ -451,12 +462,55 @@ def delete(
         crowded = track.crowded + 1 if near else 0
         unlike, inefficient = track.unlike, track.inefficient
         if like_person is not None and track.person in like_person:
-            unlike = 0 if like_person[track.person] else unlike + 1
+            unlike = max(unlike - FORGIVEN, 0) if like_person[track.person] else unlike + 1
         if efficiency is not None and track.person in efficiency:
             inefficient = inefficient + 1 if efficiency[track.person] < settings.least_efficiency else 0
         if crowded <= settings.same_place_s * fps and unlike <= settings.unlike_s * fps and inefficient <= settings.efficiency_s * fps:
             kept.append(replace(track, crowded=crowded, unlike=unlike, inefficient=inefficient))
     return tuple(kept)
+
+
+def left_behind(
+    before: tuple[Row, ...],
+    followed: tuple[Track, ...],
+    staying: tuple[Track, ...],
+    free: np.ndarray,
+    fps: float,
+    settings: LifecycleSettings,
+) -> tuple[Row, ...]:
+    """Things that were taken for people: the last rows of tracks that ended because they did not look like one, while something is there.
+
+    Parameters
+    ----------
+    before : tuple of Row
+        Those of the last frame.
+    followed, staying : tuple of Track
+        Before and after `delete`.
+    free : ndarray, shape (n, 3)
+        Centres of voxels that nobody owns, world, metres.
+    fps : float
+    settings : LifecycleSettings
+
+    Returns
+    -------
+    tuple of Row
+    """
+    alive = {track.person for track in staying}
+    ended = (track for track in followed if track.person not in alive and track.unlike >= settings.unlike_s * fps - 1)
+    things = (*before, *(track.doubtful[-1] for track in ended if track.doubtful))
+    near = settings.least_distance_m
+    return tuple(one for one in things if np.any(np.hypot(*(free - one.position)[:, :2].T) < near))
+
+
+def not_things(rows: list[Row], things: tuple[Row, ...], settings: LifecycleSettings) -> list[Row]:
+    """The rows that are not one of the things that were taken for people; somebody who stands there is higher."""
+    return [
+        row
+        for row in rows
+        if all(
+            _gap(row.position, one.position) > settings.least_distance_m or row.head[2] > one.head[2] + STANDS_HIGHER_M for one in things
+        )
+    ]
 
 
 def _expected(candidate: Candidate, frame: int) -> np.ndarray:

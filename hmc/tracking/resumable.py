@@ -223,13 +223,14 @@ def _histogram_of(plain: dict[str, Any]) -> np.ndarray:
 
 
 def _state_of(plain: dict[str, Any]) -> TrackerState:
-    tracks = tuple(Track(**_arrays(track)) for track in plain["tracks"])
+    tracks = tuple(Track(**_arrays(track) | {"doubtful": tuple(_row_of(row) for row in track["doubtful"])}) for track in plain["tracks"])
     candidates = tuple(Candidate(tuple(_row_of(row) for row in one["rows"]), one["missed"]) for one in plain["candidates"])
     clouds = tuple(Cloud(**_arrays(one) | {"histogram": _histogram_of(one["histogram"])}) for one in plain["clouds"])
     clouds = tuple(replace(cloud, points=cloud.points.reshape(-1, 3)) for cloud in clouds)
     departed = tuple(Departed(one["person"], _histogram_of(one["histogram"]), one["last_frame"]) for one in plain["departed"])
     same = tuple((now, before) for now, before in plain["same"])
-    return TrackerState(plain["fps"], tracks, candidates, plain["next_person"], clouds, departed, same)
+    things = tuple(_row_of(row) for row in plain["things"])
+    return TrackerState(plain["fps"], tracks, candidates, plain["next_person"], clouds, departed, same, things)
 
 
 def _row_of(plain: dict[str, Any]) -> Row:
