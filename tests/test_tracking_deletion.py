@@ -74,3 +74,17 @@ def test_filters_work_well_on_people_and_not_at_all_on_nothing(name, size):
     alive = [len(state.tracks) for state in states(tracker, path + [nothing()] * 40)]
     assert set(alive[10:30]) == {1}
     assert alive[-1] == 0
+
+
+def test_where_a_thing_was_taken_for_a_person_nothing_begins_while_it_stands_there():
+    """The whole of the thing does not look like a person, but its strict hull does, so that it would begin a track again and again."""
+    settings = FollowingSettings()
+    thing, sure = box((-0.75, -0.7, 0), (0.75, 0.7, 1.05)), box((-0.2, -0.2, 0), (0.2, 0.2, 1.05))
+    seen = [observe(GRID, person(0, 0))] * 20 + [observe(GRID, thing, sure)] * 150 + [observe(GRID, person(0, 0))] * 20
+    state, persons = init(FPS), []
+    for frame, observation in enumerate(seen):
+        state, info = advance(state, frame, observation, settings)
+        persons.append([row.person for row in info.rows if row.frame == frame])
+    assert persons[10:20] == [[0]] * 10
+    assert persons[20:170] == [[]] * 150
+    assert [person for [person] in persons[175:]] == [1] * 15

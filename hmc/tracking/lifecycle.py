@@ -497,9 +497,9 @@ def left_behind(
     """
     alive = {track.person for track in staying}
     ended = (track for track in followed if track.person not in alive and track.unlike >= settings.unlike_s * fps - 1)
-    things = (*before, *(track.doubtful[-1] for track in ended if track.doubtful))
     near = settings.least_distance_m
-    return tuple(one for one in things if np.any(np.hypot(*(free - one.position)[:, :2].T) < near))
+    there = (one for one in before if np.any(np.hypot(*(free - one.position)[:, :2].T) < near))
+    return (*there, *(track.doubtful[-1] for track in ended if track.doubtful))
 
 
 def not_things(rows: list[Row], things: tuple[Row, ...], settings: LifecycleSettings) -> list[Row]:
