@@ -26,14 +26,13 @@ from hmc.tracking.lifecycle import (
     Track,
     confirm,
     delete,
-    left_behind,
     looks_like_person,
     newcomers,
-    not_things,
     one_or_two,
     propose,
     still_a_person,
 )
+from hmc.tracking.things import left_behind, not_things
 
 __all__ = ["Filter", "Filtered", "StepInfo", "TrackerState", "advance", "finish", "init", "original_number"]
 

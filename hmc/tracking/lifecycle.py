@@ -29,10 +29,8 @@ __all__ = [
     "Track",
     "confirm",
     "delete",
-    "left_behind",
     "looks_like_person",
     "newcomers",
-    "not_things",
     "one_or_two",
     "propose",
     "unowned_blobs",
@@ -41,8 +39,6 @@ __all__ = [
 
 #: A verdict for a person makes up for so many against.
 FORGIVEN = 2
-#: Somebody who stands where a thing was taken for a person has the head so much higher, metres.
-STANDS_HIGHER_M = 0.2
 
 
 @dataclass(frozen=True)
@@ -468,49 +464,6 @@ def delete(
         if crowded <= settings.same_place_s * fps and unlike <= settings.unlike_s * fps and inefficient <= settings.efficiency_s * fps:
             kept.append(replace(track, crowded=crowded, unlike=unlike, inefficient=inefficient))
     return tuple(kept)
-
-
-def left_behind(
-    before: tuple[Row, ...],
-    followed: tuple[Track, ...],
-    staying: tuple[Track, ...],
-    free: np.ndarray,
-    fps: float,
-    settings: LifecycleSettings,
-) -> tuple[Row, ...]:
-    """Things that were taken for people: the last rows of tracks that ended because they did not look like one, while something is there.
-
-    Parameters
-    ----------
-    before : tuple of Row
-        Those of the last frame.
-    followed, staying : tuple of Track
-        Before and after `delete`.
-    free : ndarray, shape (n, 3)
-        Centres of voxels that nobody owns, world, metres.
-    fps : float
-    settings : LifecycleSettings
-
-    Returns
-    -------
-    tuple of Row
-    """
-    alive = {track.person for track in staying}
-    ended = (track for track in followed if track.person not in alive and track.unlike >= settings.unlike_s * fps - 1)
-    near = settings.least_distance_m
-    there = (one for one in before if np.any(np.hypot(*(free - one.position)[:, :2].T) < near))
-    return (*there, *(track.doubtful[-1] for track in ended if track.doubtful))
-
-
-def not_things(rows: list[Row], things: tuple[Row, ...], settings: LifecycleSettings) -> list[Row]:
-    """The rows that are not one of the things that were taken for people; somebody who stands there is higher."""
-    return [
-        row
-        for row in rows
-        if all(
-            _gap(row.position, one.position) > settings.least_distance_m or row.head[2] > one.head[2] + STANDS_HIGHER_M for one in things
-        )
-    ]
 
 
 def _expected(candidate: Candidate, frame: int) -> np.ndarray:
