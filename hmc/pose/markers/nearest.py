@@ -50,7 +50,9 @@ def nearest_detections(detections: np.ndarray, uv: np.ndarray, gate_px: float) -
         np.multiply(squared, squared, out=squared)
         np.multiply(other, other, out=other)
         np.add(squared, other, out=squared)
-        np.copyto(winner[:last], rank + 1, where=np.less(squared, best[:last], out=nearer[:last]))
+        np.less(squared, best[:last], out=nearer[:last])
+        # A later winner has the greater rank, so the maximum puts it in place; a masked copy takes three times as long.
+        np.maximum(winner[:last], nearer[:last].view(np.int8) * winner.dtype.type(rank + 1), out=winner[:last])
         np.minimum(best[:last], squared, out=best[:last])
     back = np.argsort(order)
     # Winners count among their cloud's candidates from 1; a 0 is none.
