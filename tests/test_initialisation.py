@@ -80,7 +80,9 @@ def test_a_person_on_a_stage():
     acted = act("walk")
     target = acted.targets[0]
     body, points = body_of(acted.height_m)
-    raised = replace(target, origin=target.origin + [0, 0, 1.5], surface=target.surface + [0, 0, 1.5])
+    raised = replace(
+        target, origin=target.origin + [0, 0, 1.5], surface=target.surface + [0, 0, 1.5], rays=target.rays + [0, 0, 1.5, 0, 0, 0]
+    )
     plain, cost = first_poses(np.random.default_rng(3), body, points, target, COST, floor_z=0.0)
     high, high_cost = first_poses(np.random.default_rng(3), body, points, raised, COST, floor_z=1.5)
     assert_allclose(high[0][:3], plain[0][:3] + [0, 0, 1.5], atol=0.03)
