@@ -16,7 +16,13 @@ from hmc.synthetic.skeleton import landmark_positions
 from hmc.voxels.carving import carve_levels, make_tables
 from hmc.voxels.grid import VoxelGrid
 
-MOTIONS = {"walk": gait.walk, "stand": actions.stand, "gesture": actions.gesture, "box": actions.box}
+
+def _seated(skeleton, times, rng):
+    """The middle of sitting down and getting up, which takes three seconds."""
+    return actions.sit(skeleton, np.interp(times, [times[0], times[-1] + 1e-9], [1.2, 1.9]), rng)
+
+
+MOTIONS = {"walk": gait.walk, "stand": actions.stand, "gesture": actions.gesture, "box": actions.box, "seated": _seated}
 ROOM = np.array([[-1.6, -1.6, 0.0], [1.6, 1.6, 2.3]])
 
 

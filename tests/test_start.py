@@ -13,7 +13,7 @@ from hmc.pose.annealed.apf import make_filter
 from hmc.pose.annealed.limb_search import SearchSettings
 from hmc.pose.annealed.presets import PRESETS
 from hmc.pose.body.kinematics import landmarks
-from hmc.pose.start import StartSettings, estimate_height, follow, start_person
+from hmc.pose.start import StartSettings, estimate_height, follow, possible_heights, start_person
 
 FEW = AnnealedSettings(layers=2, particles=50, survival_rate=0.1, spread=0.5)
 LEAN = replace(PRESETS["default"], symmetric=COST, annealed=FEW, search=SearchSettings(draws=80))
@@ -130,6 +130,22 @@ def test_stature_where_there_is_little_to_see():
     # A frame without hull and one with the arms up change little.
     arms_up = replace(target, surface=target.surface * [1, 1, 1.25])
     assert estimate_height([*acted.targets, None, arms_up]) == pytest.approx(estimate_height(acted.targets), abs=0.03)
+
+
+@pytest.mark.parametrize("height", [1.22, 1.38])
+def test_a_child_who_stands_is_no_adult_who_bends(height):
+    acted = act("gesture", frames=4, height_m=height)
+    started = start_person(rng_of(1), LEAN, acted.fps, acted.targets, None, acted.velocities, ROOM, QUICK)
+    assert started.filter.body.height_m == pytest.approx(height, rel=0.1)
+    errors = [mean_error(landmarks(started.filter.body, s.state), truth) for s, truth in zip(started.states, acted.landmarks, strict=True)]
+    assert np.mean(errors) < 0.10
+
+
+def test_an_adult_who_sits_is_no_child():
+    acted = act("seated", frames=4)
+    assert len(possible_heights(acted.targets)) == 2
+    started = start_person(rng_of(1), LEAN, acted.fps, acted.targets, None, acted.velocities, ROOM, QUICK)
+    assert started.filter.body.height_m == pytest.approx(1.7, rel=0.1)
 
 
 def test_without_any_hull_there_is_no_start():

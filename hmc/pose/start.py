@@ -27,7 +27,7 @@ from hmc.pose.body.model import BodyModel, neutral_state
 from hmc.pose.body.proportions import canton_body, default_body
 from hmc.pose.initialisation import first_poses, swapped_poses
 
-__all__ = ["StartSettings", "Started", "estimate_height", "follow", "start_person"]
+__all__ = ["StartSettings", "Started", "estimate_height", "follow", "possible_heights", "start_person"]
 
 #: Fewer frames say too little of a body: what they cannot tell apart, such as fat silhouettes from a tall person, would be fitted.
 LEAST_BODY_FRAMES = 6
@@ -35,6 +35,12 @@ LEAST_BODY_FRAMES = 6
 LEAST_START_SURFACE = 50
 #: The window's frames are thinned out to about so many a second before body and first pose are decided.
 DECIDE_FPS = 30.0
+#: A hull that ends lower than this is no adult who stands, metres; below the second, it is no child either.
+ADULT_M, CHILD_M = 1.45, 0.9
+#: An adult's mean stature, metres.
+ADULT_MEAN_M = 1.7
+#: A child is believed where its cost is below this share of an adult's who sits, kneels or bends.
+CHILD_GAIN = 0.9
 #: Random generator of a frame: the same whatever the order in which frames are visited.
 FrameRng = Callable[[int], np.random.Generator]
 
@@ -93,6 +99,8 @@ class Started:
 def estimate_height(targets: Sequence[HullTarget | None], floor_z: float = 0.0) -> float:
     """Stature from the tracked volume: how high the top of the hull commonly comes, if that is as high as an adult who stands.
 
+    The first of `possible_heights`.
+
     Parameters
     ----------
     targets : sequence of HullTarget or None
@@ -105,10 +113,28 @@ def estimate_height(targets: Sequence[HullTarget | None], floor_z: float = 0.0) 
     float
         Metres; an adult's mean stature where the person never stood up.
     """
+    return possible_heights(targets, floor_z)[0]
+
+
+def possible_heights(targets: Sequence[HullTarget | None], floor_z: float = 0.0) -> tuple[float, ...]:
+    """Statures that the tracked volume allows: an adult's, and where its top is low, also that of a child who stands.
+
+    Parameters
+    ----------
+    targets, floor_z
+        As for `estimate_height`.
+
+    Returns
+    -------
+    tuple of float
+        One or two, metres, the likelier first.
+    """
     tops = [np.quantile(t.surface[:, 2], 0.995) - floor_z for t in targets if t is not None and len(t.surface) >= LEAST_START_SURFACE]
     # Arms held up, hats and stray voxels reach above the crown: the median of the frames resists all that does not last.
     top = float(np.median(tops)) if tops else 0.0
-    return min(top, 2.0) if top > 1.45 else 1.7
+    if top > ADULT_M:
+        return (min(top, 2.0),)
+    return (ADULT_MEAN_M, top) if top > CHILD_M else (ADULT_MEAN_M,)
 
 
 def start_person(
@@ -173,15 +199,17 @@ def _decide(frame_rng, preset, fps, targets, height_m, velocities, room, setting
     if not usable:
         return None
     floor_z = 0.0 if room is None else float(room[0, 2])
-    height = height_m or estimate_height(targets, floor_z)
-    body = canton_body(height) if preset.body == "canton" else default_body(height)
+    heights = (height_m,) if height_m else possible_heights(targets, floor_z)
+    bodies = [canton_body(height) if preset.body == "canton" else default_body(height) for height in heights]
     earliest = targets[usable[0]]
-    filt = make_filter(body, preset, fps, earliest.voxel_size_m, room)
+    filters = [make_filter(body, preset, fps, earliest.voxel_size_m, room) for body in bodies]
     if preset.start == "neutral":
-        anchor, costs = usable[0], np.array([np.nan])
-        state = _neutral_start(body, earliest, velocities[: max(2, int(0.5 * fps))].mean(0), floor_z)
+        filt, anchor, costs = filters[0], usable[0], np.array([np.nan])
+        state = _neutral_start(bodies[0], earliest, velocities[: max(2, int(0.5 * fps))].mean(0), floor_z)
     else:
-        anchor, state, costs = _best_hypothesis(frame_rng, filt, fps, targets, usable, velocities, floor_z, settings)
+        starts = [_best_hypothesis(frame_rng, one, fps, targets, usable, velocities, floor_z, settings) for one in filters]
+        child = int(len(starts) > 1 and starts[1][2][0] < CHILD_GAIN * starts[0][2][0])
+        filt, (anchor, state, costs) = filters[child], starts[child]
     fit = None
     if preset.fit_body is not None:
         # What the body's dimensions are fitted to need not be the last word on the poses.
