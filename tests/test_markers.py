@@ -23,7 +23,7 @@ from hmc.pose.markers.likelihood import MarkerLikelihood, marker_cost, marker_vi
 from hmc.pose.markers.nearest import nearest_detections
 from hmc.pose.markers.points import find_points, triangulate
 from hmc.pose.markers.sequence import pose_from_markers
-from hmc.pose.markers.start import start_pose
+from hmc.pose.markers.start import start_poses
 from hmc.pose.markers.synthetic import SyntheticDetector, detect_synthetic, marker_visibility, seen_by_ideal_detector
 
 BODY = default_body(1.75)
@@ -141,10 +141,10 @@ def test_a_pose_begins_from_points_alone():
     truth = standing(3)
     truth[dof_index("root_rz")] = 2.4
     points = np.random.default_rng(0).permutation(landmarks(BODY, truth))
-    state, cost = start_pose(BODY, points)
+    state, cost = start_poses(BODY, points)[0]
     assert cost < 1e-3
     assert np.linalg.norm(landmarks(BODY, state) - landmarks(BODY, truth), axis=1).mean() < 0.02
-    assert start_pose(BODY, points[:3]) is None
+    assert start_poses(BODY, points[:3]) == []
 
 
 def test_learnt_markers_are_where_they_were_worn():

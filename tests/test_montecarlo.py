@@ -1,5 +1,7 @@
 """The Monte Carlo core against SciPy, closed forms and plain loops."""
 
+import doctest
+
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
@@ -7,6 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from scipy import integrate, optimize, stats
 
+from hmc import montecarlo
 from hmc.errors import InputError
 from hmc.montecarlo import (
     AnnealedSettings,
@@ -24,6 +27,12 @@ from hmc.montecarlo import (
     truncated_drift,
     truncated_normal,
 )
+
+
+def test_the_example_of_the_package_runs():
+    results = doctest.testmod(montecarlo)
+    assert results.attempted >= 5 and results.failed == 0
+
 
 weight_arrays = hnp.arrays(float, st.integers(1, 60), elements=st.floats(0, 1e6)).filter(lambda w: w.sum() > 1e-3)
 

@@ -15,6 +15,8 @@ __all__ = ["EXPERIMENTS", "find_experiment"]
 
 #: Every experiment's id and its module in this package.
 EXPERIMENTS = {
+    "fig-3.3": "fig_3_3",
+    "fig-3.5": "fig_3_5",
     "fig-4.2": "fig_4_2",
     "table-4.2": "table_4_2",
     "fig-4.4": "fig_4_4",
@@ -25,6 +27,11 @@ EXPERIMENTS = {
     "fig-4.12": "fig_4_12",
     "fig-4.13": "fig_4_13",
     "fig-4.14": "fig_4_14",
+    "fig-5.3": "fig_5_3",
+    "fig-5.4": "fig_5_4",
+    "fig-5.6": "fig_5_6",
+    "fig-5.7": "fig_5_7",
+    "fig-B.1": "fig_b_1",
 }
 
 

@@ -21,7 +21,7 @@ from hmc.pose.markers.detections import DetectionTable
 from hmc.pose.markers.filter import MarkerFilter, MarkerInfo, MarkerPreset, make_marker_filter, marker_step
 from hmc.pose.markers.likelihood import SeenMarkers, marker_views, observe_markers
 from hmc.pose.markers.points import find_points
-from hmc.pose.markers.start import LEAST_POINTS, start_pose
+from hmc.pose.markers.start import LEAST_POINTS, start_poses
 from hmc.pose.sequence import PosedPeople
 from hmc.results import PoseStates, PoseTable
 
@@ -29,6 +29,10 @@ __all__ = ["pose_from_markers", "seen_in_frame"]
 
 #: The pose is begun in the best of this many frames, evenly spread over this time from the first in which enough points were found.
 START_FRAMES, START_S = 4, 0.5
+#: So many first poses are tried on so many frames.
+TRIALS, TRIAL_FRAMES = 5, 12
+#: A first pose is tried only if its cost is at most so many times the least one.
+RIVAL_COST = 2.0
 #: Statures that are tried where none is given, metres.
 HEIGHTS_M = (1.55, 1.65, 1.75, 1.85, 1.95)
 #: After this many frames without a pose it is begun anew.
@@ -149,9 +153,11 @@ def _begin(seen, frames, fps, preset, height_m, skin, room) -> tuple[int, BodyMo
         for height in heights:
             body = _body(preset, height)
             markers = with_skin_markers(body) if skin else body
-            start = start_pose(markers, points)
-            if start is not None and start[1] < least:
-                best, least = (k, body, markers, start[0]), start[1]
+            starts = start_poses(markers, points)
+            if starts and starts[0][1] < least:
+                least = starts[0][1]
+                worth_trying = [state for state, cost in starts[:TRIALS] if cost <= RIVAL_COST * least]
+                best = k, body, markers, worth_trying
         tried += 1
         k += spacing
     if best is None:
@@ -159,14 +165,29 @@ def _begin(seen, frames, fps, preset, height_m, skin, room) -> tuple[int, BodyMo
             f"in no frame do {LEAST_POINTS} markers or more appear in enough views at places that agree; "
             "check the detections and the calibration"
         )
-    return best
+    k, body, markers, states = best
+    return k, body, markers, _proved(seen, frames[k : k + TRIAL_FRAMES], make_marker_filter(markers, preset, fps), states)
+
+
+def _proved(seen, frames: Sequence[int], filt: MarkerFilter, states: list[np.ndarray]) -> np.ndarray:
+    """Of several first poses the one that the next frames bear out: a body the wrong way round fits one frame, but not a motion."""
+    if len(states) == 1:
+        return states[0]
+    costs = []
+    for state in states:
+        pose, total = pose_init(state), []
+        for frame in frames:
+            pose, info = marker_step(_rng(0, frame, 2), filt, pose, seen(frame))
+            total.append(1.0 if np.isnan(info.cost) else info.cost)
+        costs.append(np.mean(total))
+    return states[int(np.argmin(costs))]
 
 
 def _begun_anew(filt: MarkerFilter, pose: PoseState, lost: int, seen: SeenMarkers, room: np.ndarray | None) -> tuple[PoseState, int]:
     if lost < LOST_FRAMES:
         return pose, lost
-    start = start_pose(filt.body, find_points(seen, room))
-    return (pose, lost) if start is None else (pose_init(start[0]), 0)
+    starts = start_poses(filt.body, find_points(seen, room))
+    return (pose_init(starts[0][0]), 0) if starts else (pose, lost)
 
 
 def _people(frames: Sequence[int], body: BodyModel, found: dict[int, tuple[PoseState, MarkerInfo]]) -> PosedPeople:

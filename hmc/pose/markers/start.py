@@ -10,7 +10,7 @@ from hmc.pose.body.joints import dof_index
 from hmc.pose.body.kinematics import landmarks
 from hmc.pose.body.model import BodyModel, neutral_state
 
-__all__ = ["LEAST_POINTS", "lay_body", "start_pose"]
+__all__ = ["LEAST_POINTS", "lay_body", "start_poses"]
 
 #: From fewer points than this no pose is begun.
 LEAST_POINTS = 6
@@ -19,10 +19,12 @@ HEADINGS = 12
 GATES_M = (0.6, 0.5, 0.4, 0.3, 0.2, 0.2)
 #: After so many rounds only so many trials are pursued.
 ROUGH_ROUNDS, PURSUED = 2, 8
+#: Poses whose markers are nearer to each other than this on the mean are alike, metres.
+ALIKE_M = 0.08
 
 
-def start_pose(body: BodyModel, points: np.ndarray) -> tuple[np.ndarray, float] | None:
-    """The pose that explains points best, from several headings, arms and knees.
+def start_poses(body: BodyModel, points: np.ndarray) -> list[tuple[np.ndarray, float]]:
+    """Poses that explain points, the best first, from several headings, arms and knees.
 
     Each trial alternates between giving every marker a point of its own (least total squared distance) and inverse kinematics.
 
@@ -35,13 +37,12 @@ def start_pose(body: BodyModel, points: np.ndarray) -> tuple[np.ndarray, float] 
 
     Returns
     -------
-    state : ndarray, shape (27,)
-    cost : float
-        Mean squared distance of the markers to their points, square metres; that of the last gate for a marker without one.
-        None instead of both, where there are too few points.
+    list of (state, cost)
+        States, shape (27,), no two alike, and the mean squared distance of the markers to their points, square metres; that of the last
+        gate for a marker without one. Empty where there are too few points.
     """
     if len(points) < LEAST_POINTS:
-        return None
+        return []
     middle = np.median(points, axis=0)
     trials = []
     for heading in np.arange(HEADINGS) * 2 * np.pi / HEADINGS:
@@ -52,8 +53,12 @@ def start_pose(body: BodyModel, points: np.ndarray) -> tuple[np.ndarray, float] 
             trials.append(lay_body(body, points, state, GATES_M[:ROUGH_ROUNDS]))
     rough = sorted((trial for trial in trials if np.isfinite(trial[1])), key=lambda trial: trial[1])[:PURSUED]
     laid = [lay_body(body, points, state, GATES_M[ROUGH_ROUNDS:]) for state, _ in rough]
-    found = [trial for trial in laid if np.isfinite(trial[1])]
-    return min(found, key=lambda trial: trial[1]) if found else None
+    found: list[tuple[np.ndarray, float]] = []
+    for state, cost in sorted((trial for trial in laid if np.isfinite(trial[1])), key=lambda trial: trial[1]):
+        places = landmarks(body, state)
+        if all(np.linalg.norm(landmarks(body, other) - places, axis=1).mean() > ALIKE_M for other, _ in found):
+            found.append((state, cost))
+    return found
 
 
 def _postures(body: BodyModel) -> list[np.ndarray]:

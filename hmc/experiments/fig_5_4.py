@@ -1,0 +1,57 @@
+"""Figure 5.4: histograms of the errors of three methods, and their quantiles against a Gaussian's.
+
+Source: Canton (2009), section 5.2.2: the errors of the markerless algorithms have a long tail, those of the marker-based one do not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import matplotlib.pyplot as plt
+import numpy as np
+from scipy.stats import norm
+
+from hmc.experiments import pose_runs as runs
+from hmc.experiments.experiment import Cell, Claim, Experiment, Plan, Report, Table
+from hmc.experiments.style import COLOURS
+from hmc.metrics.threshold import choose_threshold, lilliefors_statistic, normal_quantiles, quantile_r2
+
+__all__ = ["EXPERIMENT"]
+
+
+def report(cells: Sequence[Cell], plan: Plan) -> Report:
+    """Both plots a method, and how Gaussian the errors are."""
+    figure, panels = plt.subplots(2, len(runs.METHODS), figsize=(9, 4.8), squeeze=False)
+    rows, straight = [], {}
+    for column, (method, title) in enumerate(runs.METHODS.items()):
+        errors = runs.pooled_errors_mm(cells, method)
+        errors = np.sort(errors[np.isfinite(errors)])
+        within = errors[errors <= choose_threshold(errors).threshold]
+        upper, lower = panels[:, column]
+        edges = np.linspace(0, np.quantile(errors, 0.995), 50)
+        upper.hist(errors, edges, density=True, color="0.8")
+        for values, colour, label in ((errors, COLOURS["other"], "all errors"), (within, COLOURS["person"], "below the threshold")):
+            share = len(values) / len(errors)
+            upper.plot(edges, share * norm.pdf(edges, values.mean(), values.std()), color=colour, label=label)
+        upper.set(title=title, xlabel="error (mm)", yticks=[])
+        quantiles = normal_quantiles(len(errors))
+        lower.plot(quantiles, errors, ".", color=COLOURS["particle"], markersize=2)
+        middle = np.quantile(errors, [0.25, 0.75])
+        slope = (middle[1] - middle[0]) / (norm.ppf(0.75) - norm.ppf(0.25))
+        lower.plot(quantiles, middle.mean() + slope * quantiles, color=COLOURS["other"], linewidth=1)
+        lower.set(xlabel="quantile of a Gaussian", ylabel="error (mm)" if column == 0 else "")
+        straight[method] = quantile_r2(errors)
+        rows.append({"method": title, "errors": len(errors), "mean_mm": errors.mean(), "deviation_mm": errors.std(),
+                     "skewness": float(((errors - errors.mean()) ** 3).mean() / errors.std() ** 3),
+                     "R2_of_quantiles": straight[method], "Lilliefors": lilliefors_statistic(errors)})  # fmt: skip
+    panels[0, 0].legend()
+    claim = Claim(
+        "the marker-based errors are nearer to a Gaussian than those of the thesis's markerless filter",
+        straight["markers"] > straight["canton2009"],
+        ", ".join(f"{runs.METHODS[method]} R^2 {value:.3f}" for method, value in straight.items()),
+    )
+    caption = "Errors of all landmarks and frames. The paper: Canton, Figure 5.4, without figures."
+    return Report((Table("fig-5.4", caption, rows),), {"fig-5.4": figure}, (claim,))
+
+
+EXPERIMENT = Experiment("fig-5.4", "error histograms and quantile plots", "Canton, Figure 5.4", runs.grid, runs.cell, report, runs.FAMILY)

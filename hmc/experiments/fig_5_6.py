@@ -1,0 +1,68 @@
+"""Figure 5.6: the threshold chosen from the errors, by Lilliefors' test and by R^2 of the quantiles.
+
+Source: Canton (2009), section 5.3.1, "Parameter-free evaluation", Eq. 5.7 and 5.8: the two usually agree.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import matplotlib.pyplot as plt
+import numpy as np
+from scipy.stats import norm
+
+from hmc.experiments import pose_runs as runs
+from hmc.experiments.experiment import Cell, Claim, Experiment, Plan, Report, Table
+from hmc.experiments.style import COLOURS
+from hmc.metrics.landmarks import score
+from hmc.metrics.threshold import choose_threshold
+
+__all__ = ["EXPERIMENT"]
+
+#: Largest difference of two thresholds that agree.
+AGREE = 0.25
+
+
+def report(cells: Sequence[Cell], plan: Plan) -> Report:
+    """The histogram with what is below the threshold, both curves, and the scores at the threshold."""
+    figure, panels = plt.subplots(2, len(runs.METHODS), figsize=(9, 4.8), squeeze=False)
+    rows, ratios = [], {}
+    for column, (method, title) in enumerate(runs.METHODS.items()):
+        errors = runs.pooled_errors_mm(cells, method)
+        choices = [choose_threshold(errors, test) for test in ("lilliefors", "r2")]
+        known = errors[np.isfinite(errors)]
+        upper, lower = panels[:, column]
+        edges = np.linspace(0, np.quantile(known, 0.995), 50)
+        within = known[known <= choices[0].threshold]
+        upper.hist([within, known[known > choices[0].threshold]], edges, stacked=True, color=[COLOURS["person"], "0.8"])
+        scale = len(within) * (edges[1] - edges[0])
+        upper.plot(edges, scale * norm.pdf(edges, within.mean(), within.std()), color=COLOURS["particle"])
+        upper.set(title=title, xlabel="error (mm)", yticks=[])
+        lower.plot(choices[0].candidates, choices[0].values, color=COLOURS["particle"])
+        lower.set(xlabel="threshold (mm)", xlim=(0, edges[-1]), ylim=(0, 0.4))
+        twin = lower.twinx()
+        twin.plot(choices[1].candidates, choices[1].values, color=COLOURS["sparse"])
+        twin.set(ylim=(0.6, 1))
+        twin.grid(False)
+        for axes, choice, colour in ((lower, choices[0], COLOURS["particle"]), (lower, choices[1], COLOURS["sparse"])):
+            axes.axvline(choice.threshold, color=colour, linestyle="--", linewidth=1)
+        if column == 0:
+            lower.set_ylabel("Lilliefors", color=COLOURS["particle"])
+        if column == len(runs.METHODS) - 1:
+            twin.set_ylabel("R^2", color=COLOURS["sparse"])
+        at = score(errors, choices[0].threshold)
+        ratios[title] = abs(np.log(choices[0].threshold / choices[1].threshold))
+        rows.append({"method": title, "threshold_lilliefors_mm": choices[0].threshold, "threshold_R2_mm": choices[1].threshold,
+                     "MMTP_mm": float(at.mmtp), "sigma_MMTP_mm": float(at.sigma_mmtp), "MMTA": float(at.mmta)})  # fmt: skip
+    claim = Claim(
+        "both tests choose about the same threshold for most methods",
+        sum(ratio < np.log1p(AGREE) for ratio in ratios.values()) > len(ratios) / 2,
+        ", ".join(f"{row['method']} {row['threshold_lilliefors_mm']:.0f} and {row['threshold_R2_mm']:.0f} mm" for row in rows),
+    )
+    caption = "Thresholds chosen from the errors, and the scores at Lilliefors' one. The paper: Canton, Figure 5.6, without figures."
+    return Report((Table("fig-5.6", caption, rows),), {"fig-5.6": figure}, (claim,))
+
+
+EXPERIMENT = Experiment(
+    "fig-5.6", "choice of the threshold, by both tests", "Canton, Figure 5.6", runs.grid, runs.cell, report, runs.FAMILY
+)
