@@ -21,7 +21,7 @@ from hmc.recording import open_recording
 from hmc.results import PoseStates, PoseTable, TrackTable, write_joints, write_pose, write_run, write_tracks
 from hmc.view.mosaic import make_layout, people_in, read_result, stream_mosaics
 from hmc.view.overlay import LEFT, RIGHT, draw_outline, draw_paths, draw_sticks, draw_track, person_colour
-from hmc.view.scene import BACKGROUND, draw_floor, draw_rig, draw_voxels, viewpoint
+from hmc.view.scene import BACKGROUND, draw_floor, draw_rig, draw_voxels, from_above, viewpoint
 from hmc.voxels.grid import VoxelGrid
 
 FRAMES = 3
@@ -221,7 +221,50 @@ def test_people_come_from_whichever_table_has_them(result, tmp_path):
     assert people_in(read_result(tmp_path), 0) == []
 
 
-def test_a_person_who_could_not_be_fitted_is_a_mark_on_the_floor(result, tmp_path):
+@pytest.mark.parametrize("place", [[2.5, -2.5, 2.3], [0.4, 0.1, 2.8], [-3.0, 0.2, 0.8]])
+def test_a_track_is_the_outline_of_its_ellipsoid(place):
+    camera = look_at("view", (640, 480), place, [0.1, 0.2, 0.7], 75)
+    position = np.array([0.2, 0.1, 0.85])
+    image = np.zeros((480, 640, 3), np.uint8)
+    draw_track(image, camera, position, 2, 3.0)
+    rows, columns = np.nonzero((image == person_colour(2)).all(axis=2))
+    # The image of a quadric is a conic: its dual is P Q* P^T (Hartley and Zisserman, section 8.3).
+    to_world = np.eye(4)
+    to_world[:3, 3] = position
+    dual = camera.projection @ (to_world @ np.diag([0.3**2, 0.3**2, 0.85**2, -1]) @ to_world.T) @ camera.projection.T
+    conic = np.linalg.inv(dual)
+    pixels = np.stack([columns, rows, np.ones(len(rows))], axis=1)
+    value, slope = np.einsum("ni,ij,nj->n", pixels, conic, pixels), 2 * pixels @ conic[:, :2]
+    assert len(rows) > 60 and (np.abs(value) / np.linalg.norm(slope, axis=1)).max() < 3
+    centre = dual[:2, 2] / dual[2, 2]
+    angles = np.sort(np.arctan2(rows - centre[1], columns - centre[0]))
+    assert np.diff(angles, append=angles[0] + 2 * np.pi).max() < 0.5  # it goes all around
+
+
+def test_the_view_from_above_is_a_plan(ring):
+    room = np.array([[-2.0, -1.0, 0.0], [3.0, 2.0, 2.6]])
+    camera = from_above(room, (500, 400))
+    low, high, right, up = cv2_pixels(camera, np.array([[1, 1, 0], [1, 1, 1.8], [2, 1, 0], [1, 2, 0.0]]))
+    a_metre = np.linalg.norm(right - low)
+    assert right[0] - low[0] == pytest.approx(a_metre) and low[1] - up[1] == pytest.approx(a_metre)
+    assert np.linalg.norm(high - low) < 0.1 * a_metre
+    corners = cv2_pixels(camera, np.array([[x, y, z] for x in room[:, 0] for y in room[:, 1] for z in room[:, 2]]))
+    assert (corners > 0).all() and (corners < (500, 400)).all()
+
+
+def test_tracks_alone_are_shown_from_above(recording, tmp_path):
+    write_tracks(tmp_path / "tracks.csv", TrackTable(np.array([0]), np.array([4]), np.array([[0.4, -0.3, 0.9]])))
+    opened = open_recording(recording)
+    ((_, picture),) = stream_mosaics(opened, read_result(tmp_path), first=0, last=1, voxel_size_m=None)
+    left, top, width, height = make_layout(camera.size for camera in opened.rig).panel
+    camera = from_above(opened.room, (width, height))
+    for turn in np.radians([0, 90, 180, 270]):
+        ((u, v),) = cv2_pixels(camera, np.array([0.4 + 0.3 * np.cos(turn), -0.3 + 0.3 * np.sin(turn), 0.9]))
+        around = picture[top + round(v) - 3 : top + round(v) + 4, left + round(u) - 3 : left + round(u) + 4]
+        assert (around == person_colour(4)).all(axis=2).any()
+
+
+def test_a_person_who_could_not_be_fitted_is_an_ellipsoid(result, tmp_path):
     for name in ("tracks.csv", "pose.npz"):
         (tmp_path / name).write_bytes((result / name).read_bytes())
     write_joints(tmp_path / "joints.csv", PoseTable(np.arange(FRAMES), np.zeros(FRAMES, int), np.full((FRAMES, 15, 3), np.nan)))

@@ -1,4 +1,4 @@
-"""One picture a frame: every camera's image with the people drawn in, and the room in 3-D, side by side."""
+"""One picture a frame: every camera's image with the people drawn in, and the room in 3-D, or from above where there are tracks alone."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from hmc.pose.body.proportions import make_body
 from hmc.recording import Frame, Recording, iterate_frames
 from hmc.results import PoseStates, PoseTable, TrackTable, read_joints, read_pose, read_tracks
 from hmc.view.overlay import LEFT, RIGHT, draw_label, draw_outline, draw_paths, draw_sticks, draw_track, person_colour
-from hmc.view.scene import BACKGROUND, draw_floor, draw_rig, draw_voxels, viewpoint
+from hmc.view.scene import BACKGROUND, draw_floor, draw_rig, draw_voxels, from_above, viewpoint
 from hmc.voxels.grid import VoxelGrid
 
 __all__ = ["Layout", "Person", "Result", "make_layout", "people_in", "read_result", "render", "stream_mosaics"]
@@ -205,7 +205,7 @@ def render(
 
 
 def draw_people(image: np.ndarray, camera: Camera, people: list[Person], outlines: bool) -> None:
-    """Draw everybody: outlines first, sticks over them; who has no pose as a mark on the floor."""
+    """Draw everybody: outlines first, sticks over them; who has no pose as an ellipsoid."""
     width = float(np.clip(min(camera.size) / 160, 1.5, 3.0))
     for person in people:
         if outlines and person.body is not None and person.state is not None:
@@ -257,9 +257,9 @@ def stream_mosaics(
     else:
         grid = VoxelGrid.from_room(recording.room, voxel_size_m, len(recording.rig))
         frames = stream_hulls(recording, grid, first=first, last=last, on_problem=on_problem)
-    bounds_of = follow(result, recording.room)
+    view_of = panel_views(result, recording.room, layout.panel[2:])
     for frame in frames:
-        camera = viewpoint(bounds_of(frame.index), layout.panel[2:])
+        camera = view_of(frame.index)
         panel = np.full((*camera.size[::-1], 3), BACKGROUND, np.uint8)
         draw_floor(panel, camera, recording.room)
         draw_rig(panel, camera, recording.rig)
@@ -267,6 +267,15 @@ def stream_mosaics(
         if grid is not None and isinstance(frame, HullStep):
             draw_voxels(panel, camera, grid, frame.strict)
         yield frame.index, render(layout, recording, frame, people_in(result, frame.index), panel, camera, outlines)
+
+
+def panel_views(result: Result, room: np.ndarray, size: tuple[int, int]) -> Callable[[int], Camera]:
+    """The panel's viewpoint in a frame: near the people where there are poses, else from above the whole room."""
+    if result.poses is None:
+        above = from_above(room, size)
+        return lambda frame: above
+    bounds_of = follow(result, room)
+    return lambda frame: viewpoint(bounds_of(frame), size)
 
 
 def follow(result: Result, room: np.ndarray) -> Callable[[int], np.ndarray]:
@@ -317,7 +326,7 @@ def _draw_number(image: np.ndarray, camera: Camera, person: Person) -> None:
     if person.landmarks is not None and not np.isnan(person.landmarks[landmark_index("head_top")]).any():
         top = person.landmarks[landmark_index("head_top")] + np.array([0, 0, 0.08])
     elif person.position is not None:
-        top = np.array([person.position[0], person.position[1], 1.8])
+        top = person.position * np.array([1, 1, 2]) + np.array([0, 0, 0.05])
     else:
         return
     uv, valid = project(camera, top)

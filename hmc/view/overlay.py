@@ -31,8 +31,9 @@ SHIFT = 4
 PIECES = 8
 #: Points around each end of a cone.
 RING = 16
-#: Height and radius of the mark of a person of whom only the position is known, metres.
-TRACK_HEIGHT_M, TRACK_RADIUS_M = 1.7, 0.3
+#: Points along and around the ellipsoid of a person of whom only the position is known, and the ellipsoid's radius across, metres.
+TRACK_POINTS = 24
+TRACK_RADIUS_M = 0.3
 
 
 def person_colour(person: int) -> Colour:
@@ -106,7 +107,9 @@ def cone_rings(body: BodyModel, state: np.ndarray) -> np.ndarray:
 
 
 def draw_track(image: np.ndarray, camera: Camera, position: np.ndarray, person: int, width: float = 2.0) -> None:
-    """Mark a person of whom only the position is known: a ring on the floor and an upright line.
+    """Mark a person of whom only the position is known: the outline of an upright ellipsoid that stands on the floor.
+
+    Its half axes are .3 m, .3 m and the centroid's height (Canton 2009, section 4.2.3).
 
     Parameters
     ----------
@@ -115,15 +118,20 @@ def draw_track(image: np.ndarray, camera: Camera, position: np.ndarray, person: 
     position : ndarray, shape (3,)
         Centroid, world, metres.
     """
-    if np.isnan(position).any():
+    uv, valid = project(camera, track_ellipsoid(position))
+    seen = uv[valid & _near_image(uv, camera)]
+    if len(seen) < 3:
         return
-    foot = np.array([position[0], position[1], 0.0])
-    turn = np.linspace(0, 2 * np.pi, 33)
-    ring = foot + TRACK_RADIUS_M * np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
-    line = foot + np.linspace(0, TRACK_HEIGHT_M, 9)[:, None] * np.array([0, 0, 1.0])
+    outline = cv2.convexHull(np.round(seen * 2**SHIFT).astype(np.int32))
     for colour, extra in ((DARK, 2.0), (person_colour(person), 0.0)):
-        for path in (ring, line):
-            draw_paths(image, camera, path, colour, width + extra)
+        cv2.polylines(image, [outline], True, colour, max(1, round(width + extra)), cv2.LINE_AA, SHIFT)
+
+
+def track_ellipsoid(position: np.ndarray) -> np.ndarray:
+    """Points on the ellipsoid of `draw_track`, shape (n, 3), metres."""
+    along, around = np.meshgrid(np.linspace(0, np.pi, TRACK_POINTS), np.arange(TRACK_POINTS) * 2 * np.pi / TRACK_POINTS)
+    sphere = np.stack([np.sin(along) * np.cos(around), np.sin(along) * np.sin(around), np.cos(along)], axis=-1).reshape(-1, 3)
+    return position + sphere * np.array([TRACK_RADIUS_M, TRACK_RADIUS_M, position[2]])
 
 
 def draw_paths(image: np.ndarray, camera: Camera, paths: np.ndarray, colours: Colour | list[Colour], width: float) -> None:

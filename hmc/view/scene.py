@@ -9,7 +9,7 @@ from hmc.view.overlay import draw_label, draw_paths
 from hmc.voxels.grid import VoxelGrid
 from hmc.voxels.surface import surface
 
-__all__ = ["BACKGROUND", "draw_floor", "draw_rig", "draw_voxels", "viewpoint"]
+__all__ = ["BACKGROUND", "draw_floor", "draw_rig", "draw_voxels", "from_above", "viewpoint"]
 
 BACKGROUND = (46, 40, 36)
 FLOOR = (84, 76, 70)
@@ -19,11 +19,19 @@ VOXELS = np.array([214, 200, 188.0])
 #: Where the viewer stands: degrees from the world's x axis, and above the floor.
 AZIMUTH_DEG, ELEVATION_DEG = -55.0, 24.0
 FIELD_OF_VIEW_DEG = 40.0
+#: From above the viewer stands so far off that people appear where they are, and do not lean outwards.
+ABOVE_FIELD_OF_VIEW_DEG = 6.0
 #: Light comes from above the viewer's left shoulder.
 LIGHT_AZIMUTH_DEG, LIGHT_ELEVATION_DEG = -100.0, 50.0
 
 
-def viewpoint(bounds: np.ndarray, size: tuple[int, int], margin: float = 0.94) -> Camera:
+def viewpoint(
+    bounds: np.ndarray,
+    size: tuple[int, int],
+    margin: float = 0.94,
+    away: np.ndarray | None = None,
+    field_of_view_deg: float = FIELD_OF_VIEW_DEG,
+) -> Camera:
     """A virtual camera that has a box in view.
 
     Parameters
@@ -34,19 +42,27 @@ def viewpoint(bounds: np.ndarray, size: tuple[int, int], margin: float = 0.94) -
         Of the picture, pixels.
     margin : float
         Share of the picture that the box may fill.
+    away : ndarray, shape (3,), optional
+        Unit vector from the middle of the box to the viewer; by default aside and a little above.
+    field_of_view_deg : float
 
     Returns
     -------
     Camera
     """
     corners = np.array([[bounds[i, 0], bounds[j, 1], bounds[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
-    middle, away = bounds.mean(axis=0), _direction(AZIMUTH_DEG, ELEVATION_DEG)
-    near = look_at("view", size, middle + away, middle, FIELD_OF_VIEW_DEG)
+    middle, away = bounds.mean(axis=0), _direction(AZIMUTH_DEG, ELEVATION_DEG) if away is None else away
+    near = look_at("view", size, middle + away, middle, field_of_view_deg)
     offsets = (corners - middle) @ near.rotation.T
     # A corner is in the picture from the distance on at which focal * |x| / (distance + z) falls to half its width, and so for y.
     reach = near.matrix[0, 0] * np.abs(offsets[:, :2]) / (margin * np.array(size) / 2)
     distance = (reach - offsets[:, 2:]).max()
-    return look_at("view", size, middle + distance * away, middle, FIELD_OF_VIEW_DEG)
+    return look_at("view", size, middle + distance * away, middle, field_of_view_deg)
+
+
+def from_above(bounds: np.ndarray, size: tuple[int, int]) -> Camera:
+    """A viewpoint straight above a box, x to the right and y upwards: a plan of the room; arguments as for `viewpoint`."""
+    return viewpoint(bounds, size, away=np.array([0, 0, 1.0]), field_of_view_deg=ABOVE_FIELD_OF_VIEW_DEG)
 
 
 def draw_floor(image: np.ndarray, camera: Camera, room: np.ndarray) -> None:
