@@ -13,10 +13,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
+from itertools import chain, islice
 
 import cv2
 import numpy as np
 
+from hmc.camera.noise import blur_for, blurred, is_grey, noise_floor
 from hmc.camera.silhouettes import cut_halo, evidence, fill_gaps, in_planes
 from hmc.errors import InputError
 
@@ -30,6 +32,10 @@ LEAST_DEVIATION = (1.5, 0.8)
 #: The same where too few frames were learnt from to know any.
 ASSUMED_DEVIATION = (3.0, 1.2)
 FEWEST_FRAMES = 5
+#: Frames that tell how rough the noise is.
+NOISE_FRAMES = 8
+#: Most variance of a pixel in the mixture: OpenCV's, and in terms of the least.
+MOST_VARIANCE, VARIANCE_RANGE = 75.0, 4.0
 #: What OpenCV's mixture answers a pixel.
 SHADOW, FOREGROUND = 127, 255
 #: Near people, differences beyond this many standard deviations are doubtful. Of points on pale people before pale walls that have no
@@ -37,8 +43,12 @@ SHADOW, FOREGROUND = 127, 255
 DOUBT = 3.0
 #: Share of the image that people's shadows may fill.
 MOST_SHADOW = 0.2
-#: Where people are, the foreground holds squares of this side, pixels.
-SOLID_PX = 4
+#: Where people are, the foreground holds squares of this side, pixels; in small images of the least.
+SOLID_PX, LEAST_SOLID_PX = 4, 2
+#: Silhouettes are completed in images about this wide at least: smaller ones are enlarged, for there limbs are as thin as specks.
+COMPLETION_PX = 640
+#: What was found holds a piece of a person where this many standard deviations of the evidence say so too.
+SURE = 6.0
 #: How far around those squares the image is looked at, pixels of a 640 x 480 image.
 MARGIN_PX = 24
 #: From this share of the image in the foreground on, all of it may have become brighter or darker; by less than that factor is none.
@@ -69,6 +79,9 @@ class SegmentationSettings:
         clothes (measured).
     gap_threshold, gap_shadow_factor : float
         Standard deviations, and shadow factor, of the weaker evidence that fills gaps and bays of what the mixture found (measured).
+    grey_shadow_factor, grey_gap_shadow_factor : float
+        Shadow factors for images without colour. There a shadow looks like anything darker: most shadows are lighter than .7, and
+        with the factors for colour a third of the people goes with them (measured).
     reach_threshold : float
         Standard deviations of the evidence that lets a silhouette grow outwards a little (measured).
     halo_share : float
@@ -88,6 +101,8 @@ class SegmentationSettings:
     shadow_factor: float = 0.6
     gap_threshold: float = 4.0
     gap_shadow_factor: float = 0.7
+    grey_shadow_factor: float = 0.7
+    grey_gap_shadow_factor: float = 0.85
     reach_threshold: float = 5.0
     halo_share: float = 0.4
     least_blob_px: int = 40
@@ -97,7 +112,8 @@ class SegmentationSettings:
     max_foreground: float = 0.5
 
     def __post_init__(self) -> None:
-        for name in ("shadow_factor", "gap_shadow_factor", "halo_share", "learning_rate", "max_foreground"):
+        factors = ("shadow_factor", "gap_shadow_factor", "grey_shadow_factor", "grey_gap_shadow_factor")
+        for name in (*factors, "halo_share", "learning_rate", "max_foreground"):
             if not 0 <= getattr(self, name) <= 1:
                 raise InputError(f"segmentation: `{name}` must lie between 0 and 1; got {getattr(self, name)}")
         for name in ("variance_threshold", "gap_threshold", "reach_threshold", "learn_every"):
@@ -130,6 +146,8 @@ class BackgroundModel:
         other cameras see decides there (`hmc.voxels.completion`). None before the first image.
     unseen : ndarray of bool, shape (height, width), or None
         Where the empty scene was never seen (`hmc.camera.empty_scene`): nothing is learnt there, and what is found there tells nothing.
+    blur : int
+        Images are smoothed first by a Gaussian of this side, pixels, since this camera is noisy; 0: they are not.
     """
 
     mixture: cv2.BackgroundSubtractorMOG2
@@ -141,6 +159,7 @@ class BackgroundModel:
     before: np.ndarray | None = None
     doubtful: np.ndarray | None = None
     unseen: np.ndarray | None = None
+    blur: int = 0
 
 
 def train_background(
@@ -167,11 +186,14 @@ def train_background(
     """
     settings = settings or SegmentationSettings()
     mixture = cv2.createBackgroundSubtractorMOG2(varThreshold=settings.variance_threshold, detectShadows=True)
-    mixture.setShadowThreshold(settings.shadow_factor)
     mixture.setNMixtures(MIXTURES)
+    frames = iter(frames)
+    first = list(islice(frames, NOISE_FRAMES))
+    blur = blur_for(first)
     mean = square = None
     count = 0
-    for count, frame in enumerate(frames, start=1):
+    for count, frame in enumerate(chain(first, frames), start=1):
+        frame = blurred(frame, blur)
         mixture.apply(frame, learningRate=1.0 / count)
         colour = cv2.cvtColor(frame, cv2.COLOR_BGR2YCrCb).astype(np.float32)
         if mean is None or square is None:
@@ -190,9 +212,14 @@ def train_background(
         # A pixel's own few samples say little of its noise; its neighbours' do.
         variance = cv2.blur(square / (count - 1), (9, 9))
         variance = np.stack([variance[..., 0], variance[..., 1:].mean(axis=2)], axis=-1)
-        deviation = np.maximum(np.sqrt(variance), np.array(LEAST_DEVIATION, np.float32))
+        deviation = np.sqrt(variance)
+        floor = noise_floor(deviation)
+        deviation = np.maximum(np.maximum(deviation, floor.deviation), np.array(LEAST_DEVIATION, np.float32))
+        mixture.setVarMin(floor.variance)
+        mixture.setVarMax(max(MOST_VARIANCE, VARIANCE_RANGE * floor.variance))
+        mixture.apply(_as_image(mean), learningRate=0)  # raises the variances that are smaller, and changes nothing else
     mean[..., 0] = np.maximum(mean[..., 0], 1)
-    return BackgroundModel(mixture, in_planes(mean), in_planes(deviation), np.zeros(mean.shape[:2], bool), unseen=unseen)
+    return BackgroundModel(mixture, in_planes(mean), in_planes(deviation), np.zeros(mean.shape[:2], bool), unseen=unseen, blur=blur)
 
 
 def segment(
@@ -229,6 +256,10 @@ def segment(
         raise InputError(
             f"the image is {image.shape[1]} x {image.shape[0]} pixels, the background {model.mean.shape[1]} x {model.mean.shape[0]}"
         )
+    image = blurred(image, model.blur)
+    if is_grey(image):
+        settings = replace(settings, shadow_factor=settings.grey_shadow_factor, gap_shadow_factor=settings.grey_gap_shadow_factor)
+    model.mixture.setShadowThreshold(settings.shadow_factor)
     if model.before is not None and _nearer(image, model.before, model.mean):  # it was a flash
         model.mean[...] = model.before
         model = replace(model, before=None)
@@ -316,14 +347,17 @@ def _complete(
     scale = max(image.shape[:2]) / 640
     mask = np.zeros_like(found)
     # Specks are all over the image; a person has some solid part.
-    left, top, width, height = cv2.boundingRect(cv2.erode(found, np.ones((SOLID_PX, SOLID_PX), np.uint8)))
+    solid = min(SOLID_PX, max(LEAST_SOLID_PX, round(SOLID_PX * scale)))
+    left, top, width, height = cv2.boundingRect(cv2.erode(found, np.ones((solid, solid), np.uint8)))
     if width == 0:
         return mask, mask.copy()
     margin = round(MARGIN_PX * scale)
     rows = slice(max(0, top - margin), top + height + margin)
     columns = slice(max(0, left - margin), left + width + margin)
-    seeds = cv2.morphologyEx(found[rows, columns], cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
-    seen = evidence(image[rows, columns], model.mean[rows, columns], model.deviation[rows, columns])
+    zoom = max(1, round(COMPLETION_PX / max(image.shape[:2])))
+    seeds = cv2.morphologyEx(_enlarged_mask(found[rows, columns], zoom), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+    mean = _enlarged(model.mean[rows, columns], zoom)
+    seen = evidence(_enlarged(image[rows, columns], zoom), mean, _enlarged(model.deviation[rows, columns], zoom))
     part = fill_gaps(
         seeds,
         seen,
@@ -332,11 +366,30 @@ def _complete(
         shadow=settings.shadow_factor,
         gap_shadow=settings.gap_shadow_factor,
         least=settings.least_blob_px,
-        scale=scale,
+        scale=scale * zoom,
+        sure=SURE,
     )
-    mask[rows, columns] = cut_halo(part, seen, settings.halo_share, scale)
-    doubtful[rows, columns] |= (seen.chroma2 > DOUBT**2) | (np.abs(seen.luma) > DOUBT)
+    mask[rows, columns] = _reduced_mask(cut_halo(part, seen, settings.halo_share, scale * zoom), zoom)
+    doubtful[rows, columns] |= _reduced_mask(((seen.chroma2 > DOUBT**2) | (np.abs(seen.luma) > DOUBT)).view(np.uint8), zoom)
     return mask, cv2.morphologyEx(doubtful, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+
+
+def _enlarged(array: np.ndarray, zoom: int) -> np.ndarray:
+    """An image or a map of the same values, so many times as wide and high."""
+    if zoom == 1:
+        return array
+    large = cv2.resize(array, None, fx=zoom, fy=zoom, interpolation=cv2.INTER_CUBIC)
+    return np.maximum(large, array.min())  # cubic curves swing beyond what they join
+
+
+def _enlarged_mask(mask: np.ndarray, zoom: int) -> np.ndarray:
+    """A mask of 0 and 1 with smooth outlines, so many times as wide and high."""
+    return mask if zoom == 1 else cv2.resize(mask * 255, None, fx=zoom, fy=zoom, interpolation=cv2.INTER_LINEAR) // 128
+
+
+def _reduced_mask(mask: np.ndarray, zoom: int) -> np.ndarray:
+    """The mask as it was before it was enlarged: 1 where half of a pixel is."""
+    return mask if zoom == 1 else cv2.resize(mask * 255, None, fx=1 / zoom, fy=1 / zoom, interpolation=cv2.INTER_AREA) // 128
 
 
 def _hidden(mask: np.ndarray, answer: np.ndarray, settings: SegmentationSettings) -> np.ndarray:

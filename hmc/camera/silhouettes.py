@@ -90,6 +90,7 @@ def fill_gaps(
     gap_shadow: float,
     least: float,
     scale: float,
+    sure: float = 0.0,
 ) -> np.ndarray:
     """Grow a foreground mask by weaker evidence: inside its gaps, and outwards over a short reach.
 
@@ -108,6 +109,8 @@ def fill_gaps(
         Pixels of the seeds that a piece must hold, in a 640 x 480 image; others are specks.
     scale : float
         Size of the image against 640 x 480.
+    sure : float
+        Only those pixels of the seeds count for `least` that the evidence puts so many standard deviations off, in luma or in chroma.
 
     Returns
     -------
@@ -126,7 +129,10 @@ def fill_gaps(
     mask = cv2.morphologyEx(mask, cv2.MORPH_OPEN, _square(3, scale))
     mask = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, _disc(CLOSE_PX, scale))
     n, labels = cv2.connectedComponents(mask, connectivity=8)
-    counts = np.bincount(labels[seeds.view(bool)], minlength=n)
+    told = seeds.view(bool)
+    if sure > 0:
+        told = told & ((seen.chroma2 > sure**2) | (np.abs(seen.luma) > sure))
+    counts = np.bincount(labels[told], minlength=n)
     kept = (counts >= least * scale**2).view(np.uint8)
     if kept[1:].all():
         return mask
