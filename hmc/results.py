@@ -6,7 +6,6 @@ Nothing here is pickled, so loading a result never runs code; every file appears
 
 from __future__ import annotations
 
-import csv
 import platform
 import tomllib
 import zipfile
@@ -22,6 +21,7 @@ import numpy as np
 from hmc.errors import InputError
 from hmc.files import atomic_write, write_toml
 from hmc.landmarks import LANDMARKS
+from hmc.tables import integer_column, read_columns
 
 __all__ = [
     "PoseStates", "PoseTable", "TrackTable", "library_versions", "read_centroids", "read_joints", "read_pose", "read_run",
@@ -175,8 +175,8 @@ def read_joints(path: str | Path) -> PoseTable:
         When the file is missing, a column is missing, a value is no number, a joint is unknown or given twice.
     """
     path = Path(path)
-    columns, lines = _read_columns(path, JOINT_COLUMNS)
-    frames, persons = (_integers(path, name, columns[name], lines) for name in ("frame", "person"))
+    columns, lines = read_columns(path, JOINT_COLUMNS)
+    frames, persons = (integer_column(path, name, columns[name], lines) for name in ("frame", "person"))
     places = {name: place for place, name in enumerate(LANDMARKS)}
     joints = np.array([places.get(name.strip(), -1) for name in columns["joint"]], int)
     if (joints < 0).any():
@@ -225,8 +225,8 @@ def read_centroids(path: str | Path) -> TrackTable:
 
 
 def _read_positions(path: Path, heads_needed: bool) -> TrackTable:
-    columns, lines = _read_columns(path, TRACK_COLUMNS + (HEAD_COLUMNS if heads_needed else ()))
-    frames, persons = (_integers(path, name, columns[name], lines) for name in ("frame", "person"))
+    columns, lines = read_columns(path, TRACK_COLUMNS + (HEAD_COLUMNS if heads_needed else ()))
+    frames, persons = (integer_column(path, name, columns[name], lines) for name in ("frame", "person"))
     positions = _points(path, ("x", "y", "z"), columns, lines)
     heads = _points(path, HEAD_COLUMNS, columns, lines) if set(HEAD_COLUMNS) <= set(columns) else None
     _, cells = np.unique(np.stack([frames, persons], axis=1), axis=0, return_inverse=True)
@@ -243,39 +243,6 @@ def write_tracks(path: str | Path, table: TrackTable) -> None:
         file.write(",".join(TRACK_COLUMNS + (() if table.heads is None else HEAD_COLUMNS)) + "\n")
         for row in order:
             file.write(f"{table.frames[row]},{table.persons[row]}," + ",".join(f"{value:.6f}" for value in values[row]) + "\n")
-
-
-def _read_columns(path: Path, needed: Sequence[str]) -> tuple[dict[str, tuple[str, ...]], np.ndarray]:
-    """Columns of a CSV file by name, as text, and the line in the file of every row."""
-    try:
-        with open(path, encoding="utf-8-sig", newline="") as file:
-            reader = csv.reader(file)
-            header = [name.strip() for name in next(reader, [])]
-            missing = [name for name in needed if name not in header]
-            if missing:
-                raise InputError(f"{path}: the header line has no column {missing[0]!r}; it must be {','.join(needed)}")
-            rows, lines = [], []
-            for row in reader:
-                if not row:
-                    continue
-                if len(row) != len(header):
-                    raise InputError(f"{path}, line {reader.line_num}: {len(row)} values where the header names {len(header)} columns")
-                rows.append(row)
-                lines.append(reader.line_num)
-    except OSError as error:
-        raise InputError(f"{path}: cannot read the table ({error.strerror})") from error
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"{path}: not a table of comma-separated text ({error})") from error
-    cells = list(zip(*rows, strict=True)) if rows else [()] * len(header)
-    return dict(zip(header, cells, strict=True)), np.array(lines, int)
-
-
-def _integers(path: Path, name: str, cells: Sequence[str], lines: np.ndarray) -> np.ndarray:
-    try:
-        return np.array([int(cell) for cell in cells], np.int64)
-    except (ValueError, OverflowError):
-        row = next(row for row, cell in enumerate(cells) if not cell.strip().lstrip("+-").isdigit() or len(cell) > 18)
-        raise InputError(f"{path}, line {lines[row]}: `{name}` must be a whole number; got {cells[row]!r}") from None
 
 
 def _points(path: Path, names: Sequence[str], columns: Mapping[str, Sequence[str]], lines: np.ndarray) -> np.ndarray:

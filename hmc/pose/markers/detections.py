@@ -10,7 +10,7 @@ import numpy as np
 
 from hmc.errors import InputError
 from hmc.files import atomic_write
-from hmc.results import _integers, _read_columns
+from hmc.tables import integer_column, read_columns
 
 __all__ = ["DetectionTable", "read_detections", "write_detections"]
 
@@ -61,8 +61,8 @@ def read_detections(path: str | Path, cameras: Sequence[str]) -> DetectionTable:
         When the file is missing, a column is missing, a value is no number, or a camera is unknown.
     """
     path = Path(path)
-    columns, lines = _read_columns(path, COLUMNS)
-    frames = _integers(path, "frame", columns["frame"], lines)
+    columns, lines = read_columns(path, COLUMNS)
+    frames = integer_column(path, "frame", columns["frame"], lines)
     names = np.array([name.strip() for name in columns["camera"]], dtype=str)
     unknown = np.flatnonzero(~np.isin(names, list(cameras)))
     if len(unknown):
