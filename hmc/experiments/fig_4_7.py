@@ -50,14 +50,16 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
         part = [row for row in rows if row["voxels"] == name]
         means[name] = np.array([row["mean_mm"] for row in part])
         spread = np.array([row["sd_mm"] for row in part])
+        shown = means[name] > 0.01  # with all voxels there is no error, and no place for it on these axes
         for axes, key in ((left, "fraction"), (right, "n_voxels")):
-            at = [row[key] for row in part]
-            axes.plot(at, means[name], "o-", color=colour, label=name)
-            axes.fill_between(at, np.maximum(means[name] - spread, 0.01), means[name] + spread, color=colour, alpha=0.15, linewidth=0)
+            at = np.array([row[key] for row in part])[shown]
+            low, high = means[name] - spread, means[name] + spread
+            axes.plot(at, means[name][shown], "o-", color=colour, label=name)
+            axes.fill_between(at, np.maximum(low, 0.01)[shown], high[shown], color=colour, alpha=0.15, linewidth=0)
             axes.set(xscale="log", yscale="log")
     left.set(xlabel="fraction of the voxels", ylabel="error of the centroid (mm)", ylim=(0.1, None))
     right.set(xlabel="number of voxels")
-    left.legend()
+    left.legend(title="mean; shaded: deviation")
     at_tenth = FRACTIONS.index(0.1)
     claims = (
         Claim(

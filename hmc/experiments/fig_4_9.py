@@ -99,11 +99,12 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
         for axes, step in zip(shown[row], SHOWN, strict=True):
             points = np.array(own[0]["shown_m"][str(step)])
             axes.plot(points[:, 0], points[:, 2], ".", color=colour, markersize=1.5)
-            axes.set(aspect="equal", title=f"step {step}" if row == 0 else "", xlim=(-0.4, 0.4), ylim=(-1.1, 1.1), xticks=(-0.3, 0, 0.3))
+            axes.set_xlabel("x (m)" if row else "")
+            axes.set(aspect="equal", title=f"step {step}" if row == 0 else "", xlim=(-0.4, 0.4), ylim=(-1.1, 1.1), xticks=(-0.3, 0.3))
         shown[row][0].set_ylabel(f"{name}\nz (m)")
         upper.plot(spread, color=colour, label=name)
         lower.plot(error, color=colour)
-    upper.set(ylabel="spread, of uniform samples'", ylim=(0, 1.1))
+    upper.set(ylabel="spread / that of uniform samples", ylim=(0, 1.1))
     upper.legend()
     lower.set(xlabel="step", ylabel="error of the centroid (mm)", ylim=(0, None))
     claim = Claim(
