@@ -60,7 +60,7 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
         axes.text(x, y, text, ha="center", va="center", fontsize=6.5, bbox=box, zorder=2)
     axes.set(xlim=(-0.6, leaves - 0.4), ylim=(-deepest - 0.5, 0.5))
     axes.axis("off")
-    axes.set_title("left: at most the threshold; in a leaf: the share of people among the components of the training")
+    axes.set_title("left: at most the threshold; leaves: share of people", fontsize=8)
     asked = list(dict.fromkeys(row["feature"] for row in rows if row["feature"]))
     upper = {FEATURES[tree["feature"][k]] for k, (_, y) in places.items() if tree["feature"][k] != LEAF and y >= -2}
     claim = Claim(

@@ -104,7 +104,7 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
         shown[row][0].set_ylabel(f"{name}\nz (m)")
         upper.plot(spread, color=colour, label=name)
         lower.plot(error, color=colour)
-    upper.set(ylabel="spread / that of uniform samples", ylim=(0, 1.1))
+    upper.set(ylabel="spread\n(of uniform samples: 1)", ylim=(0, 1.1))
     upper.legend()
     lower.set(xlabel="step", ylabel="error of the centroid (mm)", ylim=(0, None))
     claim = Claim(
