@@ -25,7 +25,7 @@ COMMON, FLOOR_SHARE = 0.95, 0.8
 USUAL_DEVIATION, FLOOR_RISE = 2.0, 2.0
 #: Least variance of the mixture, all three channels together: OpenCV's, and where a typical pixel shows less noise than any sensor has, so
 #: that a codec or an averaging hides it. In between, of typical deviations between these, a mixture of both.
-LEAST_VARIANCE, LEAST_HIDDEN_VARIANCE = 4.0, 8.0
+LEAST_VARIANCE, LEAST_HIDDEN_VARIANCE = 4.0, 12.0
 HIDDEN_BELOW, SEEN_ABOVE = 1.6, 1.9
 #: Variance of blue, green and red together for one of luma, and for one of chroma (both axes alike).
 OF_LUMA, OF_CHROMA = 3.0, 5.7
