@@ -22,6 +22,8 @@ __all__ = ["EXPERIMENT"]
 PRESETS = ("default", "canton2009")
 SAMPLES = 400
 VOXEL_M = 0.05
+#: Least extent of the picture along y, metres.
+LEAST_HEIGHT_M = 1.4
 
 
 def grid(plan: Plan) -> list[dict]:
@@ -57,7 +59,7 @@ def _table(plain: dict) -> TrackTable:
 def report(cells: Sequence[Cell], plan: Plan) -> Report:
     """Tracks from above, and how often identities change."""
     first = cells[0].parameters["recording"]
-    figure, axes = plt.subplots(len(PRESETS), 2, figsize=(8, 3.6 * len(PRESETS)), sharex=True, sharey=True)
+    figure, axes = plt.subplots(len(PRESETS), 2, figsize=(8, 2.2 * len(PRESETS)), sharex=True, sharey=True)
     rows, means = [], {}
     for row, preset in zip(axes, PRESETS, strict=True):
         for ax, color in zip(row, (False, True), strict=True):
@@ -75,6 +77,11 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
             shown = next(one.results for one in own if one.parameters["recording"] == first and one.parameters["repeat"] == 0)
             draw_tracks(_table(shown["tracks"]), truth=_table(shown["truth"]), ax=ax)
             ax.set_title(f"{preset}, {'color' if color else 'raw'}")
+            ax.get_legend().remove()
+            middle, half = np.mean(ax.get_ylim()), max(np.ptp(ax.get_ylim()) / 2, LEAST_HEIGHT_M / 2)
+            ax.set_ylim(middle - half, middle + half)
+    handles = {label: handle for ax in axes.flat for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)}
+    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=len(handles))
     claims = tuple(
         Claim(
             f"{preset}: no identity changes with colour, some without",
