@@ -101,5 +101,5 @@ def noise_floor(deviation: np.ndarray) -> Floor:
 def is_grey(image: np.ndarray) -> bool:
     """Whether a BGR image has no colour, as from a monochrome camera."""
     few = image[::STEP, ::STEP].astype(np.int16)
-    coloured = np.abs(few - few[..., [1, 2, 0]]).max(axis=-1) > LEAST_COLOUR
+    coloured = np.ptp(few, axis=-1) > LEAST_COLOUR
     return bool(coloured.mean() <= MOST_COLOURED)

@@ -148,6 +148,8 @@ class BackgroundModel:
         Where the empty scene was never seen (`hmc.camera.empty_scene`): nothing is learnt there, and what is found there tells nothing.
     blur : int
         Images are smoothed first by a Gaussian of this side, pixels, since this camera is noisy; 0: they are not.
+    grey : bool
+        The empty scene has no colour: images without any may come from a monochrome camera.
     """
 
     mixture: cv2.BackgroundSubtractorMOG2
@@ -160,6 +162,7 @@ class BackgroundModel:
     doubtful: np.ndarray | None = None
     unseen: np.ndarray | None = None
     blur: int = 0
+    grey: bool = False
 
 
 def train_background(
@@ -219,7 +222,9 @@ def train_background(
         mixture.setVarMax(max(MOST_VARIANCE, VARIANCE_RANGE * floor.variance))
         mixture.apply(_as_image(mean), learningRate=0)  # raises the variances that are smaller, and changes nothing else
     mean[..., 0] = np.maximum(mean[..., 0], 1)
-    return BackgroundModel(mixture, in_planes(mean), in_planes(deviation), np.zeros(mean.shape[:2], bool), unseen=unseen, blur=blur)
+    people = np.zeros(mean.shape[:2], bool)
+    grey = is_grey(_as_image(mean))
+    return BackgroundModel(mixture, in_planes(mean), in_planes(deviation), people, unseen=unseen, blur=blur, grey=grey)
 
 
 def segment(
@@ -257,7 +262,7 @@ def segment(
             f"the image is {image.shape[1]} x {image.shape[0]} pixels, the background {model.mean.shape[1]} x {model.mean.shape[0]}"
         )
     image = blurred(image, model.blur)
-    if is_grey(image):
+    if model.grey and is_grey(image):
         settings = replace(settings, shadow_factor=settings.grey_shadow_factor, gap_shadow_factor=settings.grey_gap_shadow_factor)
     model.mixture.setShadowThreshold(settings.shadow_factor)
     if model.before is not None and _nearer(image, model.before, model.mean):  # it was a flash

@@ -129,10 +129,10 @@ def fill_gaps(
     mask = cv2.morphologyEx(mask, cv2.MORPH_OPEN, _square(3, scale))
     mask = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, _disc(CLOSE_PX, scale))
     n, labels = cv2.connectedComponents(mask, connectivity=8)
-    told = seeds.view(bool)
+    told = np.flatnonzero(seeds)
     if sure > 0:
-        told = told & ((seen.chroma2 > sure**2) | (np.abs(seen.luma) > sure))
-    counts = np.bincount(labels[told], minlength=n)
+        told = told[(seen.chroma2.ravel()[told] > sure**2) | (np.abs(seen.luma.ravel()[told]) > sure)]
+    counts = np.bincount(np.asarray(labels).ravel()[told], minlength=n)
     kept = (counts >= least * scale**2).view(np.uint8)
     if kept[1:].all():
         return mask
