@@ -114,6 +114,18 @@ def test_a_killed_run_goes_on_and_ends_the_same(toy, tmp_path, workers):
     assert (killed / "made.log").read_text() == "made\n"
 
 
+def test_workers_end_with_a_parent_that_is_killed(toy, tmp_path):
+    out = tmp_path / "out"
+    process = start(toy, out, "--workers", "2", pause_s=60)
+    deadline = time.monotonic() + 90
+    while not list(out.glob("inputs/.shared.txt.lock")) and time.monotonic() < deadline:
+        time.sleep(0.02)
+    os.kill(process.pid, signal.SIGKILL)
+    process.communicate(timeout=40)  # ends when nobody holds the other end any more: the input alone would take a minute
+    assert not (out / "inputs" / "shared.txt").exists()
+    finish(start(toy, out, "--workers", "2"))
+
+
 def test_a_kill_while_an_input_is_made_leaves_no_half_of_it(toy, tmp_path):
     out = tmp_path / "out"
     process = start(toy, out, "--workers", "2", pause_s=5)

@@ -8,6 +8,9 @@ cells are computed changes a result, because random numbers follow from a cell's
 from __future__ import annotations
 
 import functools
+import os
+import threading
+import time
 import traceback
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -23,6 +26,9 @@ from hmc.experiments.store import cell_key, cell_path, cell_rng, read_cell, writ
 __all__ = ["Outcome", "compute_cells", "plan_of", "run_experiment", "stored_cells"]
 
 Progress = Callable[[int, int], None]
+
+#: How often a worker looks whether its parent is still there, seconds.
+LOOK_S = 1.0
 
 
 @dataclass(frozen=True)
@@ -124,11 +130,32 @@ def compute_cells(name: str, out: Path, missing: list[dict[str, Any]], folders: 
     if workers <= 1 or len(missing) <= 1:
         yield from map(task, missing)
         return
+    task = functools.partial(_work, os.getpid(), task)
     from joblib import Parallel, delayed
 
     yield from Parallel(n_jobs=workers, batch_size=1, pre_dispatch="2*n_jobs", return_as="generator_unordered")(
         delayed(task)(parameters) for parameters in missing
     )
+
+
+def _work(parent: int, task: Callable[[dict[str, Any]], str], parameters: dict[str, Any]) -> str:
+    """A task in a worker."""
+    _end_with(parent)
+    return task(parameters)
+
+
+@functools.cache
+def _end_with(parent: int) -> None:
+    """Let this process end when its parent does: a parent that is killed cannot end its workers, and they would compute on."""
+    if os.getppid() != parent:
+        return  # the parent is another, or is not told
+
+    def look() -> None:
+        while os.getppid() == parent:
+            time.sleep(LOOK_S)
+        os._exit(1)
+
+    threading.Thread(target=look, daemon=True).start()
 
 
 def _compute_cell(name: str, out: Path, folders: dict[str, Path], parameters: dict[str, Any]) -> str:
