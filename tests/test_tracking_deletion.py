@@ -10,8 +10,10 @@ from hmc.tracking.association import FollowingSettings
 from hmc.tracking.blobs import observe
 from hmc.tracking.cloud import Cloud
 from hmc.tracking.following import Filtered, advance, init
+from hmc.tracking.furniture import Furniture, learn_furniture, without_furniture
 from hmc.tracking.lifecycle import LifecycleSettings
 from hmc.tracking.trackers import make_tracker, tracker_of
+from hmc.tracking.tracks import run
 
 CHAIR = box((-0.3, -0.25, 0), (0.25, 0.25, 0.8))
 
@@ -80,11 +82,79 @@ def test_where_a_thing_was_taken_for_a_person_nothing_begins_while_it_stands_the
     """The whole of the thing does not look like a person, but its strict hull does, so that it would begin a track again and again."""
     settings = FollowingSettings()
     thing, sure = box((-0.75, -0.7, 0), (0.75, 0.7, 1.05)), box((-0.2, -0.2, 0), (0.2, 0.2, 1.05))
-    seen = [observe(GRID, person(0, 0))] * 20 + [observe(GRID, thing, sure)] * 150 + [observe(GRID, person(0, 0))] * 20
+    seen = [observe(GRID, person(0, 0))] * 20 + [observe(GRID, thing, sure)] * 150
+    seen += [observe(GRID, nothing())] * 5 + [observe(GRID, person(0, 0))] * 20
     state, persons = init(FPS), []
     for frame, observation in enumerate(seen):
         state, info = advance(state, frame, observation, settings)
         persons.append([row.person for row in info.rows if row.frame == frame])
     assert persons[10:20] == [[0]] * 10
     assert persons[20:170] == [[]] * 150
-    assert [person for [person] in persons[175:]] == [1] * 15
+    assert [person for [person] in persons[180:]] == [1] * 15
+
+
+LYING = box((-0.9, -0.25, 0), (0.9, 0.25, 0.35))
+
+
+@pytest.mark.parametrize("name", ["naive", "particle", "sparse"])
+def test_a_person_who_lies_down_and_gets_up_again_keeps_the_number(name):
+    tracker = make_tracker(name, color=False if name != "naive" else None)
+    path = [person(*place) for place in line((-0.8, 0), (0, 0), 80)]
+    down = round(10 * FPS)
+    volumes = path + [LYING] * down + [person(*place) for place in line((0, 0), (0.8, 0), 60)]
+    table = run(((frame, observe(GRID, volume)) for frame, volume in enumerate(volumes)), FPS, tracker)
+    assert set(table.persons) == {0}
+    assert list(table.frames) == list(range(len(volumes)))
+
+
+def test_where_an_established_person_lies_is_told_before_they_get_up():
+    tracker = make_tracker("naive")
+    volumes = [person(0, 0)] * 80 + [LYING] * 100
+    state, last = init(FPS), []
+    for frame, volume in enumerate(volumes):
+        state, info = tracker.step(np.random.default_rng(0), state, frame, observe(GRID, volume))
+        last += [row.frame for row in info.rows]
+    assert max(last) >= 180 - round(tracker.following.lifecycle.unlike_s * FPS) - 1
+
+
+@pytest.mark.parametrize("name", ["naive", "particle", "sparse"])
+def test_who_gets_up_from_a_chair_that_stays_keeps_the_number_and_the_chair_is_nobody(name):
+    tracker = make_tracker(name, color=False if name != "naive" else None)
+    chair = box((-0.35, -0.25, 0), (0.15, 0.25, 0.8))
+    walk_in = [person(*place) for place in line((1.8, 0), (0.25, 0), 80)]
+    seated = [box((-0.2, -0.2, 0.4), (0.2, 0.2, 1.3)) | box((0.1, -0.2, 0), (0.5, 0.2, 0.55)) | chair] * 80
+    up = [person(*place) | chair for place in line((0.3, 0), (1.8, 0.5), 60)] + [person(1.8, 0.5) | chair] * 60
+    volumes = [*walk_in, *seated, *up]
+    table = run(((frame, observe(GRID, volume)) for frame, volume in enumerate(volumes)), FPS, tracker)
+    assert set(table.persons) == {0}
+    late = table.frames >= len(volumes) - 80
+    assert late.sum() == 80
+    assert np.abs(table.positions[late, :2] - (1.8, 0.5)).max() < 0.7
+
+
+def test_a_chair_that_was_pushed_and_left_takes_nobody_over():
+    """It stands where nobody is, and then somebody who was there before walks past it, touching it."""
+    chair = box((0.3, -0.5, 0), (1.1, 0.3, 1.05))
+    path = line((-1.8, 0.6), (1.8, 0.6), 60) + line((1.8, 0.6), (-1.8, 0.6), 60)
+    volumes = [person(-1.8, 0.6)] * 40 + [person(-1.8, 0.6) | chair] * 40 + [person(*place) | chair for place in path]
+    table = follow(volumes)
+    assert set(table.persons) == {0}
+    truth = [np.array([-1.8, 0.6])] * 80 + path
+    assert max(np.hypot(*(position[:2] - truth[frame])) for frame, position in zip(table.frames, table.positions, strict=True)) < 0.1
+
+
+def test_standing_furniture_is_nobody_s_and_is_forgotten_when_it_goes():
+    chair, fps = observe(GRID, CHAIR), 10.0
+    furniture = Furniture()
+    for _ in range(6):
+        furniture = learn_furniture(furniture, chair, np.array([[1.5, 0, 0.9]]), np.zeros(len(chair.points), bool), fps)
+    both = observe(GRID, CHAIR | person(1.5, 0))
+    rest, kept = without_furniture(both, furniture, fps)
+    assert np.array_equal(rest.points, both.points[kept]) and np.array_equal(kept, both.points[:, 0] > 0.5)
+    for _ in range(3):
+        furniture = learn_furniture(furniture, observe(GRID, nothing()), np.zeros((0, 3)), np.zeros(0, bool), fps)
+    assert without_furniture(both, furniture, fps)[1].all()
+    near = Furniture()
+    for _ in range(20):
+        near = learn_furniture(near, chair, np.zeros((1, 3)), np.zeros(len(chair.points), bool), fps)
+    assert len(near.voxels) == 0

@@ -163,6 +163,14 @@ def test_everything_foreground_does_not_end_or_start_anybody():
     assert set(table.persons) == {0} and list(table.frames) == list(range(60))
 
 
+def test_a_light_switch_that_fills_a_third_of_the_room_tells_nothing():
+    path = line((-1, 0), (1, 0), 60)
+    third = CENTRES[..., 0] > 2.5 - 5 * 0.35
+    table = follow([person(*p) | third if 25 <= i < 33 else person(*p) for i, p in enumerate(path)])
+    assert set(table.persons) == {0} and list(table.frames) == list(range(60))
+    assert errors(table, 0, path).max() < 0.6
+
+
 def test_standing_still_for_long():
     table = follow([person(0.3, 0.4)] * 200)
     assert list(table.frames) == list(range(200)) and set(table.persons) == {0}

@@ -17,6 +17,7 @@ from hmc.errors import InputError
 from hmc.tracking.association import FollowingSettings, assign_voxels, find_again, head_centre, let_go, locating_voxels, predict
 from hmc.tracking.blobs import Observation, blob_features
 from hmc.tracking.cloud import Cloud, Departed
+from hmc.tracking.furniture import Furniture, learn_furniture, part_of_furniture, without_furniture
 from hmc.tracking.ghosts import real_people
 from hmc.tracking.identity import exchange_mistaken, learn_looks, recognise
 from hmc.tracking.lifecycle import (
@@ -26,18 +27,19 @@ from hmc.tracking.lifecycle import (
     Track,
     confirm,
     delete,
+    is_established,
     looks_like_person,
     newcomers,
     one_or_two,
     propose,
     still_a_person,
 )
-from hmc.tracking.things import left_behind, not_things
+from hmc.tracking.things import came_out, left_behind, not_things
 
 __all__ = ["Filter", "Filtered", "StepInfo", "TrackerState", "advance", "finish", "init", "original_number"]
 
 #: Share of the room beyond which what is occupied cannot be people.
-MOST_FILLED = 0.5
+MOST_FILLED = 0.25
 #: Someone who came is compared with those who left after this time, when their colours are known.
 RECOGNISE_AFTER_S = 1.0
 
@@ -61,6 +63,8 @@ class TrackerState:
         Numbers of persons who came back, and the numbers that they had before.
     things : tuple of Row
         What was taken for people and still stands there.
+    furniture : Furniture
+        Voxels that were filled while nobody was near.
     """
 
     fps: float
@@ -71,6 +75,7 @@ class TrackerState:
     departed: tuple[Departed, ...] = ()
     same: tuple[tuple[int, int], ...] = ()
     things: tuple[Row, ...] = ()
+    furniture: Furniture = field(default_factory=Furniture)
 
 
 @dataclass(frozen=True)
@@ -173,6 +178,8 @@ def advance(
     if observation is None or len(observation.points) * observation.voxel_size_m**3 > MOST_FILLED * np.ptp(observation.room, axis=0).prod():
         waiting = tuple(replace(track, last_frame=track.last_frame + 1, velocity=track.velocity * 0.5) for track in state.tracks)
         return replace(state, tracks=waiting), StepInfo((), np.full(0 if observation is None else len(observation.points), -1))
+    whole = observation
+    observation, kept_voxels = without_furniture(whole, state.furniture, state.fps)
     n, size = len(state.tracks), observation.voxel_size_m
     begun = thread_time()
     predicted = predict(state.tracks, state.fps)
@@ -188,7 +195,7 @@ def advance(
     if filter is None:
         filter_s = thread_time() - begun
     certain = blob_features(observation.points, np.where(observation.certain, owners, -1), n, size)
-    supported = still_a_person(owned, certain, state.tracks, settings.lifecycle)
+    supported = still_a_person(owned, certain, state.tracks, state.fps, settings.lifecycle)
     # Of a person who was found again elsewhere, the filter knows nothing; of one who held another it stands between the two.
     known = filtered.seen & ~np.isin(np.arange(n), [*freed, *owners[kept != owners]])
     measured = np.where(known[:, None], positions, located.centroid)
@@ -202,7 +209,9 @@ def advance(
             now = _update(track, frame, moved, gain[k], owned.volume_m3[k], head, bool(shared[k]), state.fps, settings)
             row = Row(frame, track.person, measured[k] if gain[k] == 1 or not known[k] else moved, head)
             held = (*track.doubtful, row)
-            told = like[k] and track.unlike <= FORGIVEN
+            told = (like[k] and track.unlike <= FORGIVEN) or (
+                is_established(track, state.fps, settings.lifecycle) and len(held) >= settings.lifecycle.unlike_s * state.fps
+            )
             tracks.append(replace(now, doubtful=() if told else held))
             rows += [replace(one, person=track.person) for one in held] if told else []
         else:
@@ -213,17 +222,31 @@ def advance(
     if filtered.looks:
         followed, clouds, looks = exchange_mistaken(followed, clouds, filtered.looks)
         clouds = learn_looks(followed, clouds, looks, filtered.keep_histogram)
-    strangers, parted = _newcomers(observation, owners, tuple(freed.values()), frame, settings)
+    strangers, parted, like_people = _newcomers(observation, owners, tuple(freed.values()), frame, state, settings)
     candidates = propose(state.candidates, not_things(strangers, state.things, settings.lifecycle), followed, settings.lifecycle, parted)
     candidates, fresh, earlier = confirm(candidates, state.next_person, state.fps, settings.lifecycle)
+    next_person = state.next_person + len(fresh)
+    goes_on, earlier = came_out(followed, fresh, earlier, state.fps, observation.room, settings.lifecycle)
+    up = {track.person: track for track in goes_on.values()}
+    left = tuple(Row(frame, track.person, track.position, track.head) for track in followed if track.person in up)
+    followed = tuple(up.get(track.person, track) for track in followed)
+    clouds = tuple(Cloud(cloud.person, histogram=cloud.histogram) if cloud.person in up else cloud for cloud in clouds)
+    fresh = tuple(track for track in fresh if track.person not in goes_on)
     # Where nothing is seen there is nothing to judge.
-    verdicts = _by_person(state.tracks, like, supported)
+    verdicts = _by_person(state.tracks, like, supported & ~np.isin([track.person for track in state.tracks], list(up)))
     working = _by_person(state.tracks, filtered.efficiency, np.ones(len(filtered.efficiency), bool))
     staying = delete((*followed, *fresh), frame, state.fps, observation.room, settings.lifecycle, like_person=verdicts, efficiency=working)
-    things = left_behind(state.things, followed, staying, observation.points[owners < 0], state.fps, settings.lifecycle)
+    things = left_behind(state.things + left, followed, staying, observation.points[owners < 0], state.fps, settings.lifecycle)
     numbers = np.array([*(track.person for track in state.tracks), -1])
-    info = StepInfo((*rows, *earlier), numbers[owners], tuple(int(number) for number in numbers[:-1][shared]), filtered.color_s, filter_s)
-    after = TrackerState(state.fps, staying, candidates, state.next_person + len(fresh), (), state.departed, state.same, things)
+    whose = np.full(len(whole.points), -1)
+    whose[kept_voxels] = numbers[owners]
+    info = StepInfo((*rows, *earlier), whose, tuple(int(number) for number in numbers[:-1][shared]), filtered.color_s, filter_s)
+    places = [track.position for track in staying] + [candidate.rows[-1].position for candidate in candidates]
+    people = np.array(places).reshape(-1, 3)
+    strange = np.zeros(len(whole.points), bool)
+    strange[kept_voxels] = like_people
+    furniture = learn_furniture(state.furniture, whole, people, strange, state.fps)
+    after = TrackerState(state.fps, staying, candidates, next_person, (), state.departed, state.same, things, furniture)
     return (_with_clouds(after, followed, clouds, frame) if filter else after), info
 
 
@@ -287,12 +310,21 @@ def finish(state: TrackerState, n_frames: int, settings: FollowingSettings | Non
 
 
 def _newcomers(
-    observation: Observation, owners: np.ndarray, freed: tuple[np.ndarray, ...], frame: int, settings: FollowingSettings
-) -> tuple[list[Row], list[Row]]:
-    """Where person-like sets of voxels are that no track owns and that are no ghosts, and where people are whom a track let go."""
+    observation: Observation,
+    owners: np.ndarray,
+    freed: tuple[np.ndarray, ...],
+    frame: int,
+    state: TrackerState,
+    settings: FollowingSettings,
+) -> tuple[list[Row], list[Row], np.ndarray]:
+    """Where person-like sets of voxels are that no track owns and that are no ghosts, where people are whom a track let go, and whether
+    each voxel is of a person-like set or ghost.
+    """
     held = owners.copy()
     held[np.concatenate([np.zeros(0, int), *freed])] = 0
     sets = newcomers(observation, held, settings.lifecycle)
+    sets = [rows for rows in sets if not part_of_furniture(observation.points[rows], observation, state.furniture, state.fps)]
+    like_people = np.isin(np.arange(len(owners)), np.concatenate([np.zeros(0, int), *sets]))
     if sets and observation.views is not None:
         points = [observation.points[rows] for rows in sets]
         real = real_people(observation.views, observation.points[held >= 0], points, observation.voxel_size_m)
@@ -306,7 +338,7 @@ def _newcomers(
     best = locating_voxels(observation, person, n, settings)
     located = [observation.points[best & (person == j)] for j in range(n)]
     seen = [Row(frame, -1, points.mean(axis=0), head_centre(points)) for points in located]
-    return seen[: len(sets)], seen[len(sets) :]
+    return seen[: len(sets)], seen[len(sets) :], like_people
 
 
 def _update(

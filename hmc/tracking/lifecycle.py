@@ -29,6 +29,7 @@ __all__ = [
     "Track",
     "confirm",
     "delete",
+    "is_established",
     "looks_like_person",
     "newcomers",
     "one_or_two",
@@ -39,6 +40,8 @@ __all__ = [
 
 #: A verdict for a person makes up for so many against.
 FORGIVEN = 2
+#: Somebody who lies flat has at least this share of their usual volume; less, so low, is what is left where somebody went.
+LYING_SHARE = 0.5
 
 
 @dataclass(frozen=True)
@@ -76,6 +79,9 @@ class LifecycleSettings:
     unlike_s : float
         A track is deleted when its voxels have not looked like a person for so long, however many they are: furniture that somebody left
         behind (Canton, section 4.2.3, third criterion of deletion). A frame in which they do makes up for two in which they do not.
+    established_s : float
+        A track whose voxels have looked like a person for so long altogether is one, whatever they look like now: people sit on the floor,
+        lie and crouch. Verdicts do not end it (beyond the thesis).
     least_efficiency, efficiency_s : float
         A track is deleted when the survival rate of its filter's particles (Canton, Eq. 3.11) has been below this share for so long
         (section 4.2.3, second criterion). Of Sparse Sampling, the share of the samples that found a voxel of their own.
@@ -108,6 +114,7 @@ class LifecycleSettings:
     edge_patience_s: float = 0.3
     edge_m: float = 0.3
     unlike_s: float = 2.0
+    established_s: float = 3.0
     least_efficiency: float = 0.05
     efficiency_s: float = 0.5
     least_distance_m: float = 0.45
@@ -173,10 +180,13 @@ class Track:
         Frames in a row in which another, older track stood in the same place.
     unlike : int
         Frames in which its voxels did not look like a person, less twice those since in which they did.
+    liked : int
+        Frames in which they did.
     inefficient : int
         Frames in a row in which hardly any of its filter's particles survived.
     doubtful : tuple of Row
-        Where it was in the last frames, as long as its voxels do not look like a person: told only when they do again.
+        Where it was in the last frames, as long as its voxels do not look like a person: told only when they do again, or when the
+        track outlives the doubt.
     """
 
     person: int
@@ -188,6 +198,7 @@ class Track:
     last_frame: int
     crowded: int = 0
     unlike: int = 0
+    liked: int = 0
     inefficient: int = 0
     doubtful: tuple[Row, ...] = ()
 
@@ -213,7 +224,7 @@ def looks_like_person(blobs: Blobs, settings: LifecycleSettings) -> np.ndarray:
     return possible if settings.tree is None else possible & predict_person(settings.tree, feature_matrix(blobs))
 
 
-def still_a_person(owned: Blobs, certain: Blobs, tracks: tuple[Track, ...], settings: LifecycleSettings) -> np.ndarray:
+def still_a_person(owned: Blobs, certain: Blobs, tracks: tuple[Track, ...], fps: float, settings: LifecycleSettings) -> np.ndarray:
     """Which tracks the voxels that they own keep alive.
 
     Enough of the strict hull does, or a set that looks like a person as a whole (whom one camera cannot see), but not a remnant of what
@@ -224,14 +235,17 @@ def still_a_person(owned: Blobs, certain: Blobs, tracks: tuple[Track, ...], sett
     owned, certain : Blobs
         Features of each track's voxels, and of those in the strict hull.
     tracks : tuple of Track
+    fps : float
     settings : LifecycleSettings
 
     Returns
     -------
     ndarray of bool, shape (n_tracks,)
     """
-    solid = (certain.volume_m3 >= settings.keep_volume_m3) & (certain.top_m >= settings.keep_top_m)
     usual = np.array([track.volume_m3 for track in tracks])
+    established = np.array([is_established(track, fps, settings) for track in tracks], bool)
+    low = established & (owned.volume_m3 >= LYING_SHARE * usual)
+    solid = (certain.volume_m3 >= settings.keep_volume_m3) & ((certain.top_m >= settings.keep_top_m) | low)
     return (solid | looks_like_person(owned, settings)) & (owned.volume_m3 >= settings.keep_share * usual)
 
 
@@ -456,14 +470,22 @@ def delete(
             continue
         near = any(_gap(track.position, older.position) < settings.same_place_m for older in kept)
         crowded = track.crowded + 1 if near else 0
-        unlike, inefficient = track.unlike, track.inefficient
+        unlike, liked, inefficient = track.unlike, track.liked, track.inefficient
         if like_person is not None and track.person in like_person:
-            unlike = max(unlike - FORGIVEN, 0) if like_person[track.person] else unlike + 1
+            like = like_person[track.person]
+            unlike, liked = max(unlike - FORGIVEN, 0) if like else unlike + 1, liked + like
+        if is_established(track, fps, settings):
+            unlike = min(unlike, int(settings.unlike_s * fps))
         if efficiency is not None and track.person in efficiency:
             inefficient = inefficient + 1 if efficiency[track.person] < settings.least_efficiency else 0
         if crowded <= settings.same_place_s * fps and unlike <= settings.unlike_s * fps and inefficient <= settings.efficiency_s * fps:
-            kept.append(replace(track, crowded=crowded, unlike=unlike, inefficient=inefficient))
+            kept.append(replace(track, crowded=crowded, unlike=unlike, liked=liked, inefficient=inefficient))
     return tuple(kept)
+
+
+def is_established(track: Track, fps: float, settings: LifecycleSettings) -> bool:
+    """Whether a track has looked like a person for so long that it is one."""
+    return track.liked >= settings.established_s * fps
 
 
 def _expected(candidate: Candidate, frame: int) -> np.ndarray:

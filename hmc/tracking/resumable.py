@@ -27,6 +27,7 @@ from hmc.results import TrackTable
 from hmc.tracking.blobs import Observation, observe
 from hmc.tracking.cloud import Cloud, Departed
 from hmc.tracking.following import TrackerState, finish, init
+from hmc.tracking.furniture import Furniture
 from hmc.tracking.ghosts import Views
 from hmc.tracking.lifecycle import Candidate, Row, Track
 from hmc.tracking.trackers import Tracker, make_tracker
@@ -230,7 +231,8 @@ def _state_of(plain: dict[str, Any]) -> TrackerState:
     departed = tuple(Departed(one["person"], _histogram_of(one["histogram"]), one["last_frame"]) for one in plain["departed"])
     same = tuple((now, before) for now, before in plain["same"])
     things = tuple(_row_of(row) for row in plain["things"])
-    return TrackerState(plain["fps"], tracks, candidates, plain["next_person"], clouds, departed, same, things)
+    furniture = Furniture(**{name: np.array(value, np.int64) for name, value in plain["furniture"].items()})
+    return TrackerState(plain["fps"], tracks, candidates, plain["next_person"], clouds, departed, same, things, furniture)
 
 
 def _row_of(plain: dict[str, Any]) -> Row:
