@@ -164,7 +164,7 @@ def advance(
     frame : int
         Absolute number; frames come in order.
     observation : Observation or None
-        None where the frame tells nothing: every track waits. So it does when most of the room is occupied (a light switch). An
+        None where the frame tells nothing: every track waits. So it does when a quarter of the room is occupied (a light switch). An
         observation without voxels means that nobody is there.
     settings : FollowingSettings
     filter : callable, optional
