@@ -21,9 +21,10 @@ from hmc.tracking.features import FEATURES
 
 __all__ = ["EXPERIMENT"]
 
-#: Ranges of the histograms, in the features' own units.
-RANGES = ((0.0, 150.0), (0.0, 1.6), (0.0, 2.4), (0.0, 2.4), (0.0, 2.4), (0.0, 1.6))
-BINS = 24
+#: Ranges of the histograms, in the features' own units. People weigh more than people do: a hull is wider than who is in it.
+RANGES = ((0.0, 600.0), (0.0, 1.6), (0.0, 2.4), (0.0, 2.4), (0.0, 2.4), (0.0, 2.4))
+#: Heights and sides are whole numbers of voxels: bins that are narrower than the coarsest voxels would stay empty at random.
+BINS = 12
 CLASSES = {"person": True, "other": False}
 SITTING_M, STANDING_M = 1.2, 1.7
 
@@ -90,7 +91,9 @@ def _histograms(data: dict[float, tuple[np.ndarray, np.ndarray]]) -> Figure:
             for size, (features, is_person) in data.items():
                 style = {"label": label, "alpha": 1.0} if size == min(data) else {"alpha": 0.35}
                 ax.stairs(_shares(features[is_person == wanted], k), edges, color=COLOURS[label], **style)
-        ax.set(xlabel=name)
+        ax.set(xlabel=name, xlim=RANGES[k])
+    for ax in axes[:, 0]:
+        ax.set_ylabel("share of the components")
     axes[0, 0].legend(title="faint: coarser voxels")
     return figure
 
@@ -112,6 +115,7 @@ def _scatter(features: np.ndarray, is_person: np.ndarray) -> Figure:
                 ax.set_xlabel(FEATURES[column])
             if column == 0:
                 ax.set_ylabel(FEATURES[row])
+    figure.legend(axes[0, 0].lines[:2], CLASSES, loc="upper right", markerscale=4)
     return figure
 
 
