@@ -31,6 +31,15 @@ EXPERIMENTS = {
     "fig-5.4": "fig_5_4",
     "fig-5.6": "fig_5_6",
     "fig-5.7": "fig_5_7",
+    "fig-6.11": "fig_6_11",
+    "fig-6.13": "fig_6_13",
+    "table-6.3": "table_6_3",
+    "fig-6.16": "fig_6_16",
+    "fig-6.17": "fig_6_17",
+    "fig-6.18": "fig_6_18",
+    "table-6.4": "table_6_4",
+    "fig-6.19": "fig_6_19",
+    "what-each-adds": "what_each_adds",
     "fig-B.1": "fig_b_1",
 }
 

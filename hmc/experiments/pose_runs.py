@@ -18,7 +18,7 @@ from hmc.landmarks import LANDMARKS
 from hmc.metrics.landmarks import landmark_errors
 from hmc.metrics.persons import match_persons
 from hmc.pose.annealed.presets import pose_preset
-from hmc.pose.body.model import neutral_state
+from hmc.pose.body.model import BodyModel, neutral_state
 from hmc.pose.body.proportions import default_body
 from hmc.pose.markers.detections import DetectionTable
 from hmc.pose.markers.filter import marker_preset
@@ -29,7 +29,10 @@ from hmc.recording import Recording
 from hmc.results import PoseTable, read_joints
 from hmc.tracking.resumable import track_recording
 
-__all__ = ["FAMILY", "METHODS", "PAPER_THRESHOLD_MM", "cell", "estimates", "grid", "pooled_errors_mm", "synthetic_detections"]
+__all__ = [
+    "FAMILY", "METHODS", "PAPER_THRESHOLD_MM", "cell", "estimate_of", "estimates", "first_truth", "grid", "pooled_errors_mm",
+    "standing_state", "synthetic_detections",
+]  # fmt: skip
 
 FAMILY = "pose"
 #: Methods and what figures call them.
@@ -52,11 +55,7 @@ def grid(plan: Plan) -> list[dict]:
 def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Results:
     """Estimate the first person's poses; landmarks and truth, metres."""
     recording = inputs.recording(parameters["recording"])
-    path = recording.path / "truth" / "joints.csv"
-    if not path.is_file():
-        raise InputError(f"{recording.path}: has no truth/joints.csv; this experiment scores poses against it")
-    truth = read_joints(path)
-    truth = truth.of(int(truth.persons[0]))
+    truth = first_truth(recording)
     seed = int(rng.integers(2**31))
     height = float(recording.subject_height_m[0]) if recording.subject_height_m else None
     if parameters["method"] == "markers":
@@ -69,13 +68,42 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
         tracks = track_recording(recording, TRACK_VOXEL_M, seed=seed, on_problem=lambda line: None)
         preset = pose_preset(parameters["method"])
         poses = pose_recording(recording, tracks, VOXEL_M, preset, seed, height_m=height, on_problem=lambda line: None).poses
+    return {"frames": truth.frames, "fps": recording.fps, "estimate_m": estimate_of(truth, poses), "truth_m": truth.positions}
+
+
+def first_truth(recording: Recording) -> PoseTable:
+    """True joints of a recording's first person.
+
+    Raises
+    ------
+    InputError
+        When the recording has none.
+    """
+    path = recording.path / "truth" / "joints.csv"
+    if not path.is_file():
+        raise InputError(f"{recording.path}: has no truth/joints.csv; this experiment scores poses against it")
+    truth = read_joints(path)
+    return truth.of(int(truth.persons[0]))
+
+
+def estimate_of(truth: PoseTable, poses: PoseTable) -> np.ndarray:
+    """Where the estimated poses have one true person's landmarks, (n, 15, 3), metres; NaN in frames without a pose."""
     names = match_persons(truth.frames, truth.persons, truth.positions, poses.frames, poses.persons, poses.positions)
     estimate = np.full(truth.positions.shape, np.nan)
     for name in names:
         own = poses.of(name)
         _, a, b = np.intersect1d(truth.frames, own.frames, return_indices=True)
         estimate[a] = own.positions[b]
-    return {"frames": truth.frames, "fps": recording.fps, "estimate_m": estimate, "truth_m": truth.positions}
+    return estimate
+
+
+def standing_state(body: BodyModel, points: np.ndarray) -> np.ndarray:
+    """The neutral pose where a person's hips are and as they face, from landmarks (15, 3), metres: a start for inverse kinematics."""
+    state = neutral_state("down", body.limits)
+    state[:3] = points[LANDMARKS.index("pelvis")]
+    across = points[LANDMARKS.index("l_hip")] - points[LANDMARKS.index("r_hip")]
+    state[3] = np.arctan2(-across[0], across[1])
+    return state
 
 
 def synthetic_detections(recording: Recording, truth: PoseTable, detector: SyntheticDetector, rng: np.random.Generator) -> DetectionTable:
@@ -90,10 +118,7 @@ def synthetic_detections(recording: Recording, truth: PoseTable, detector: Synth
     rng : numpy.random.Generator
     """
     body = default_body(float(recording.subject_height_m[0]) if recording.subject_height_m else 1.75)
-    state = neutral_state("down", body.limits)
-    state[:3] = truth.positions[0, LANDMARKS.index("pelvis")]
-    across = truth.positions[0, LANDMARKS.index("l_hip")] - truth.positions[0, LANDMARKS.index("r_hip")]
-    state[3] = np.arctan2(-across[0], across[1])
+    state = standing_state(body, truth.positions[0])
     frames, cameras, uv = [], [], []
     for frame, points in zip(truth.frames, truth.positions, strict=True):
         ideal, state = seen_by_ideal_detector(body, recording.rig, points, state)

@@ -1,0 +1,167 @@
+"""Figure 6.11: the likelihood over two angles of a hip, score by score.
+
+Source: Canton (2009), section 6.5.1.2: out and occupancy, then double occupancy, the surface by itself, and all together; here in the
+factorised likelihood (Table 6.2). Every other angle is that of the true pose, read as a pose of the thesis's body.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from scipy import ndimage
+
+from hmc.experiments.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
+from hmc.experiments.filter_runs import HEIGHT_M
+from hmc.experiments.inputs import Inputs
+from hmc.experiments.markerless_runs import FRONTEND, MASKS_KEY, action_sources, tracked
+from hmc.experiments.pose_runs import first_truth, standing_state
+from hmc.experiments.style import COLOURS
+from hmc.frontend import stream_hulls
+from hmc.mask_store import kept_masks
+from hmc.pose.annealed.scores import SCORES, ScoreVariances, log_likelihood_factorised, make_score_table, observe, scores
+from hmc.pose.body.flesh import flesh_points
+from hmc.pose.body.inverse import fit_landmarks
+from hmc.pose.body.joints import DOF_NAMES
+from hmc.pose.body.proportions import canton_body
+from hmc.pose.sequence import targets_of
+from hmc.results import TrackTable
+from hmc.tracking.resumable import person_grid
+from hmc.voxels.grid import VoxelGrid
+
+__all__ = ["EXPERIMENT", "count_modes"]
+
+#: Panels, and the scores that each takes.
+PANELS = {
+    "out and occupancy": ("out", "empty"),
+    "and double occupancy": ("out", "empty", "double_occupancy"),
+    "surface": ("surface",),
+    "all": SCORES,
+}
+ANGLES = ("r_hip_x", "r_hip_y")
+#: Points a side of the map, and the voxel size, metres.
+SIDE, VOXEL_M = 61, 0.02
+#: A mode is a highest point within this many points each way, at least this likely against the best.
+REACH, LEAST = 3, 0.05
+#: Depth of the picture, in units of the log-likelihood.
+DEPTH = 30.0
+
+
+def grid(plan: Plan) -> list[dict]:
+    """Some frames of walks (quick: of one), as shares of their length."""
+    sources = action_sources(plan, ("walk",))[: 1 if plan.quick else None]
+    shares = (0.2, 0.5, 0.8) if plan.quick else tuple(k / 20 for k in range(1, 20, 2))
+    return [{"recording": source.label, "at": at} for source in sources for at in shares]
+
+
+def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Results:
+    """The four scores of every part over the map, as log-likelihoods by panel; degrees."""
+    recording, _, masks = tracked(inputs, parameters["recording"], 0)
+    truth = first_truth(recording)
+    k = int(parameters["at"] * len(truth.frames))
+    frame, points = int(truth.frames[k]), truth.positions[k]
+    room_grid = person_grid(recording, VOXEL_M)
+    kept = kept_masks(masks, MASKS_KEY, frame, frame + 1)
+    hull = next(iter(stream_hulls(recording, room_grid, FRONTEND, first=frame, last=frame + 1, masks=kept, on_problem=lambda line: None)))
+    where = TrackTable(np.array([frame]), np.array([0]), points.mean(axis=0)[None])
+    target = targets_of(recording, room_grid, where, hull)[0]
+    if target is None:
+        return {"degrees": [], "log_likelihood": [], "true_degrees": []}
+    body = canton_body(float(recording.subject_height_m[0]) if recording.subject_height_m else HEIGHT_M)
+    state, _ = fit_landmarks(body, points, standing_state(body, points))
+    places = [DOF_NAMES.index(name) for name in ANGLES]
+    axes = [np.linspace(body.limits.low[place], body.limits.high[place], SIDE) for place in places]
+    states = np.tile(state, (SIDE * SIDE, 1))
+    states[:, places] = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+    around = VoxelGrid(target.origin - 0.5 * target.voxel_size_m, target.voxel_size_m, target.distance.shape)
+    values = scores(make_score_table(body, flesh_points(body, VOXEL_M)), states, observe(target.tolerant, around, recording.room))
+    variances = ScoreVariances().by_part()
+    maps = []
+    for names in PANELS.values():
+        columns = [SCORES.index(name) for name in names]
+        maps.append(log_likelihood_factorised(values[..., columns], variances[:, columns]).reshape(SIDE, SIDE))
+    return {"degrees": np.degrees(axes), "log_likelihood": maps, "true_degrees": np.degrees(state[places])}
+
+
+def count_modes(log_likelihood: np.ndarray) -> int:
+    """Modes of a map: highest points of their surroundings that are not much less likely than the best; a plateau is one."""
+    return _modes(log_likelihood)[1]
+
+
+def _modes(log_likelihood: np.ndarray) -> tuple[np.ndarray, int]:
+    """The points of a map that are modes, and how many modes they make."""
+    highest = log_likelihood >= ndimage.maximum_filter(log_likelihood, 2 * REACH + 1)
+    likely = log_likelihood >= log_likelihood.max() + np.log(LEAST)
+    return highest & likely, int(ndimage.label(highest & likely, np.ones((3, 3)))[1])
+
+
+def report(cells: Sequence[Cell], plan: Plan) -> Report:
+    """The maps of one frame; modes, sharpness and distance from the truth over all."""
+    whole = [one for one in cells if len(one.results["log_likelihood"])]
+    rows: list[dict[str, Any]] = []
+    for k, panel in enumerate(PANELS):
+        maps = [np.array(one.results["log_likelihood"][k]) for one in whole]
+        off = [_off_degrees(one, values) for one, values in zip(whole, maps, strict=True)]
+        rows.append(
+            {
+                "scores": panel,
+                "frames": len(maps),
+                "modes": float(np.mean([count_modes(values) for values in maps])),
+                "width_percent": float(100 * np.mean([np.exp(values - values.max()).mean() for values in maps])),
+                "best_off_truth_deg": float(np.mean(off)),
+            }
+        )
+    by_panel = {row["scores"]: row for row in rows}
+    modes = [by_panel[panel]["modes"] for panel in ("out and occupancy", "and double occupancy", "all")]
+    areas = [by_panel[panel]["width_percent"] for panel in ("and double occupancy", "all")]
+    claims = (
+        Claim(
+            "fewer modes with each score", modes[0] >= modes[1] >= modes[2] and modes[0] > modes[2], ", ".join(f"{m:.2f}" for m in modes)
+        ),
+        Claim(
+            "the surface sharpens",
+            areas[1] < areas[0],
+            f"width {areas[0]:.3f} % without, {areas[1]:.3f} % with",
+        ),
+    )
+    caption = (
+        f"Likelihood over {ANGLES[0]} and {ANGLES[1]}; its width is its mean against its best. The paper: Canton, Figure 6.11, surfaces "
+        "without numbers."
+    )
+    return Report((Table("fig-6.11", caption, rows),), {"fig-6.11": _draw(whole[len(whole) // 2])}, claims)
+
+
+def _off_degrees(one: Cell, values: np.ndarray) -> float:
+    best = np.unravel_index(values.argmax(), values.shape)
+    degrees = np.array(one.results["degrees"])
+    return float(np.hypot(*(degrees[axis][best[axis]] - one.results["true_degrees"][axis] for axis in (0, 1))))
+
+
+def _draw(one: Cell) -> plt.Figure:
+    """Log-likelihood below the best, with modes and the truth: on a plain scale all but the best point would look the same."""
+    figure, panels = plt.subplots(2, 2, figsize=(7.4, 6), sharex=True, sharey=True)
+    first, second = np.array(one.results["degrees"])
+    colours = ScalarMappable(Normalize(-DEPTH, 0), "viridis")
+    for k, (axes, panel) in enumerate(zip(panels.flat, PANELS, strict=True)):
+        values = np.array(one.results["log_likelihood"][k])
+        axes.pcolormesh(first, second, (values - values.max()).T, norm=colours.norm, cmap="viridis", shading="nearest")
+        i, j = np.nonzero(_modes(values)[0])
+        axes.plot(first[i], second[j], "o", color=COLOURS["other"], fillstyle="none", label="mode")
+        axes.plot(*one.results["true_degrees"], "+", color="white", markersize=9, markeredgewidth=1.5, label="truth")
+        axes.grid(False)
+        n = count_modes(values)
+        axes.set_title(f"{panel}: {n} mode{'s' if n > 1 else ''}")
+    for axes in panels[-1]:
+        axes.set_xlabel(f"{ANGLES[0]} (degrees)")
+    for axes in panels[:, 0]:
+        axes.set_ylabel(f"{ANGLES[1]} (degrees)")
+    panels[0, 0].legend(facecolor="0.6", frameon=True)
+    figure.colorbar(colours, ax=panels, label="log-likelihood below the best")
+    return figure
+
+
+EXPERIMENT = Experiment("fig-6.11", "likelihood over two hip angles, score by score", "Canton, Figure 6.11", grid, cell, report)

@@ -1,0 +1,92 @@
+"""The markerless filter of Canton (2009) by itself: one cell is one recording, some cameras and voxels, and one setting of the filter.
+
+Source: sections 6.5 and 6.7.1. The filter starts from the first frame's true pose, read as a pose of the thesis's body, and the hull is
+that around the true person, so that what is measured is neither the tracker's nor the start's. Two ways of annealing: ``printed``, a
+survival rate of .5 with the spread following it, and ``strong``, that of the preset `default`, which concentrates 27 dimensions in a few
+layers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from time import thread_time
+
+import numpy as np
+
+from hmc.experiments.experiment import Parameters, Results
+from hmc.experiments.inputs import Inputs
+from hmc.experiments.markerless_runs import FRONTEND, MASKS_KEY, tracked
+from hmc.experiments.pose_runs import first_truth, standing_state
+from hmc.frontend import stream_hulls
+from hmc.mask_store import kept_masks
+from hmc.pose.annealed.apf import make_filter, pose_init, pose_step
+from hmc.pose.annealed.presets import PosePreset, pose_preset
+from hmc.pose.body.inverse import fit_landmarks
+from hmc.pose.body.kinematics import landmarks
+from hmc.pose.body.proportions import canton_body
+from hmc.pose.sequence import targets_of
+from hmc.results import TrackTable
+from hmc.tracking.resumable import person_grid
+
+__all__ = ["ANNEALING", "FAMILY", "cell", "filter_preset"]
+
+FAMILY = "markerless-filter"
+#: Ways of annealing, and the presets that they are taken from.
+ANNEALING = {"printed": "canton2009", "strong": "default"}
+#: Stature where a recording does not say it, metres.
+HEIGHT_M = 1.75
+
+
+def filter_preset(parameters: Parameters) -> PosePreset:
+    """The thesis's preset with a cell's likelihood, layers, particles, density and way of annealing."""
+    base, annealing = pose_preset("canton2009"), pose_preset(ANNEALING[parameters["annealing"]])
+    return replace(
+        base,
+        likelihood=parameters["likelihood"],
+        density=parameters["density"],
+        drift_scale=annealing.drift_scale,
+        annealed=replace(annealing.annealed, layers=parameters["layers"], particles=parameters["particles"]),
+    )
+
+
+def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Results:
+    """Follow the first person from the true first pose; landmarks and truth of the frames after it, metres, and the filter's seconds.
+
+    Parameters
+    ----------
+    parameters : mapping
+        ``recording``, ``cameras`` (0: all), ``frames`` (0: all), ``voxel_mm``, ``likelihood``, ``annealing``, ``layers``, ``particles``,
+        ``density``, ``repeat``.
+    inputs : Inputs
+    rng : numpy.random.Generator
+    """
+    recording, _, masks = tracked(inputs, parameters["recording"], parameters["cameras"])
+    truth = first_truth(recording)
+    if parameters["frames"]:
+        truth = truth.where(truth.frames < truth.frames[0] + parameters["frames"])
+    voxel_m = parameters["voxel_mm"] / 1000
+    grid = person_grid(recording, voxel_m)
+    body = canton_body(float(recording.subject_height_m[0]) if recording.subject_height_m else HEIGHT_M)
+    filt = make_filter(body, filter_preset(parameters), recording.fps, voxel_m, recording.room)
+    state, _ = fit_landmarks(body, truth.positions[0], standing_state(body, truth.positions[0]))
+    pose = pose_init(state)
+    where = TrackTable(truth.frames, np.zeros(len(truth.frames), int), truth.positions.mean(axis=1))
+    first, last = int(truth.frames[0]), int(truth.frames[-1]) + 1
+    kept = kept_masks(masks, MASKS_KEY, first, last)
+    estimates, seconds = {}, 0.0
+    for hull in stream_hulls(recording, grid, FRONTEND, first=first, last=last, masks=kept, on_problem=lambda line: None):
+        target = targets_of(recording, grid, where, hull).get(0)
+        before = thread_time()
+        if hull.index > first:
+            pose, _ = pose_step(rng, filt, pose, target)
+        seconds += thread_time() - before
+        estimates[hull.index] = landmarks(body, pose.state)
+    missing = np.full_like(truth.positions[0], np.nan)
+    estimate = np.array([estimates.get(frame, missing) for frame in truth.frames.tolist()])
+    return {
+        "frames": truth.frames[1:],
+        "fps": recording.fps,
+        "estimate_m": estimate[1:],
+        "truth_m": truth.positions[1:],
+        "filter_s_per_frame": seconds / max(1, len(truth.frames) - 1),
+    }

@@ -1,0 +1,71 @@
+"""The five actions of HumanEva-I, each by two actors of different build, as recipes: what chapter 6 of Canton (2009) is measured on.
+
+HumanEva-I is not public. The rooms, lamps and motions are those of the shipped recipes; the cameras are seven in a ring, as there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from hmc.synthetic.recipe import ActorRecipe, Recipe, RigRecipe, load_recipe
+
+__all__ = ["ACTIONS", "ACTORS", "action_name", "action_recipes", "action_title"]
+
+#: Actions, what the thesis calls them, and the shipped recipes that they come from.
+ACTIONS = {
+    "walk": ("Walking", "demo"),
+    "jog": ("Jog", "jog"),
+    "throw_catch": ("Throw/Catch", "throw_catch"),
+    "gesture": ("Gesture", "gesture"),
+    "box": ("Box", "box"),
+}
+#: The actors.
+ACTORS = {
+    "man": ActorRecipe(
+        height_m=1.86, build="sturdy", sex="man", shirt=(0.55, 0.20, 0.16), trousers=(0.16, 0.18, 0.26), pattern="stripes",
+        pattern_colour=(0.30, 0.10, 0.10),
+    ),
+    "woman": ActorRecipe(
+        height_m=1.60, build="slim", sex="woman", shirt=(0.16, 0.40, 0.46), trousers=(0.20, 0.20, 0.22), hair=(0.30, 0.20, 0.10),
+        long_hair=True, sleeves="long",
+    ),
+}  # fmt: skip
+#: Length and rate in full; HumanEva-I has 30 frames a second.
+SECONDS, FPS = 6.0, 30.0
+#: The quick mode's recordings: smaller images and fewer of them.
+QUICK_SUFFIX, QUICK_SECONDS, QUICK_FPS, QUICK_SIZE_PX = "_quick", 1.6, 20.0, (320, 240)
+
+
+def action_name(action: str, actor: str, quick: bool) -> str:
+    """The name of a recipe."""
+    return f"{action}_{actor}{QUICK_SUFFIX if quick else ''}"
+
+
+def action_title(source: str) -> str:
+    """What the thesis calls the action of a recording; the recording's own name where it is none of these."""
+    name = source.rpartition("@")[0].removesuffix(QUICK_SUFFIX)
+    action, _, actor = name.rpartition("_")
+    return ACTIONS[action][0] if actor in ACTORS and action in ACTIONS else name
+
+
+def action_recipes() -> list[Recipe]:
+    """Every action by every actor, in full and quick."""
+    recipes = []
+    for action, (_, shipped) in ACTIONS.items():
+        base = load_recipe(shipped)
+        moving = base.actors[0]
+        for number, (actor, look) in enumerate(ACTORS.items()):
+            who = replace(
+                look, motion=moving.motion, start_m=moving.start_m, heading_deg=moving.heading_deg, speed_m_s=moving.speed_m_s,
+                turn_radius_m=moving.turn_radius_m,
+            )  # fmt: skip
+            recipe = replace(
+                base, name=action_name(action, actor, False), seed=base.seed + 100 * number, actors=(who,), rig=RigRecipe("ring7"),
+                seconds=SECONDS, fps=FPS,
+            )  # fmt: skip
+            quick = replace(
+                recipe, name=action_name(action, actor, True), seconds=QUICK_SECONDS, fps=QUICK_FPS, background_frames=10, cell_m=0.025,
+                rig=RigRecipe("ring7", size_px=QUICK_SIZE_PX),
+            )  # fmt: skip
+            recipes += [recipe, quick]
+    return recipes

@@ -1,0 +1,100 @@
+"""Poses from what a marker detector of a given quality would see of true joints: one cell is one recording, one detector, one filter.
+
+Source: Canton (2009), section 6.6.1. Only the recording's calibration and true joints are used, as the thesis has its markers from the
+motion capture of HumanEva-I. Its variance of the detector's error is taken in square pixels, as the error is added to places in images.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from hmc.camera.model import Rig
+from hmc.errors import InputError
+from hmc.experiments.experiment import Parameters, Results
+from hmc.experiments.filter_runs import HEIGHT_M
+from hmc.experiments.inputs import Inputs
+from hmc.experiments.pose_runs import estimate_of, first_truth, standing_state, synthetic_detections
+from hmc.pose.annealed.apf import pose_init
+from hmc.pose.body.inverse import fit_landmarks
+from hmc.pose.body.kinematics import landmarks
+from hmc.pose.body.proportions import canton_body, default_body
+from hmc.pose.markers.detections import DetectionTable
+from hmc.pose.markers.filter import MarkerPreset, make_marker_filter, marker_preset, marker_step
+from hmc.pose.markers.likelihood import marker_views
+from hmc.pose.markers.sequence import pose_from_markers, seen_in_frame
+from hmc.pose.markers.synthetic import SyntheticDetector
+from hmc.recording import Recording
+from hmc.results import PoseTable
+
+__all__ = ["FAMILY", "QUICK_FRAMES", "cell"]
+
+FAMILY = "markers"
+#: Detections are in images of this width, about that of HumanEva-I's, whatever the recording's; pixels.
+WIDTH_PX = 640
+#: Frames of the quick mode.
+QUICK_FRAMES = 30
+
+
+def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Results:
+    """Estimate the first person's poses; landmarks and truth, metres.
+
+    Parameters
+    ----------
+    parameters : mapping
+        ``recording``, ``frames`` (0: all), ``start`` (``found`` from the markers, or ``true``), ``detection_rate``, ``false_positives``,
+        ``variance_px2``, ``preset``, ``layers``, ``particles``, ``repeat``.
+    inputs : Inputs
+    rng : numpy.random.Generator
+    """
+    recording = inputs.recording(parameters["recording"])
+    # Errors are in pixels, so what one is worth must not depend on the recording's.
+    cameras = tuple(camera.scaled(WIDTH_PX / camera.size[0]) for camera in recording.rig)
+    recording = replace(recording, rig=Rig(cameras))
+    truth = first_truth(recording)
+    if parameters["frames"]:
+        truth = truth.where(truth.frames < truth.frames[0] + parameters["frames"])
+    detector = SyntheticDetector(parameters["detection_rate"], parameters["false_positives"], parameters["variance_px2"])
+    table = synthetic_detections(recording, truth, detector, rng)
+    seed, preset, problem = int(rng.integers(2**31)), _preset(parameters), ""
+    if parameters["start"] == "true":
+        estimate = _from_the_truth(recording, truth, table, preset, rng)
+        # The first frame is given.
+        truth, estimate = truth.where(np.arange(1, len(truth.frames))), estimate[1:]
+    else:
+        estimate = np.full(truth.positions.shape, np.nan)
+        try:
+            frames, height = truth.frames.tolist(), _height_m(recording)
+            poses = pose_from_markers(
+                recording.rig, table, frames, recording.fps, preset, seed, height_m=height, skin=False, room=recording.room
+            ).poses
+            estimate = estimate_of(truth, poses)
+        except InputError as error:  # nothing to begin with: no pose at all, which is what such a detector is worth
+            problem = str(error)
+    return {"frames": truth.frames, "fps": recording.fps, "estimate_m": estimate, "truth_m": truth.positions, "problem": problem}
+
+
+def _from_the_truth(
+    recording: Recording, truth: PoseTable, table: DetectionTable, preset: MarkerPreset, rng: np.random.Generator
+) -> np.ndarray:
+    """Landmarks of every frame, by the filter alone from the true pose of the first; (n, 15, 3), metres."""
+    height = _height_m(recording) or HEIGHT_M
+    body = canton_body(height) if preset.body == "canton" else default_body(height)
+    filt, views = make_marker_filter(body, preset, recording.fps), marker_views(recording.rig)
+    state, _ = fit_landmarks(body, truth.positions[0], standing_state(body, truth.positions[0]))
+    pose, estimate = pose_init(state), [landmarks(body, state)]
+    for frame in truth.frames[1:].tolist():
+        seen = seen_in_frame(recording.rig, views, table.in_frame(frame, recording.rig.names), preset.likelihood.gate_px)
+        pose, _ = marker_step(rng, filt, pose, seen)
+        estimate.append(landmarks(body, pose.state))
+    return np.array(estimate)
+
+
+def _height_m(recording: Recording) -> float | None:
+    return float(recording.subject_height_m[0]) if recording.subject_height_m else None
+
+
+def _preset(parameters: Parameters) -> MarkerPreset:
+    preset = marker_preset(parameters["preset"])
+    return replace(preset, annealed=replace(preset.annealed, layers=parameters["layers"], particles=parameters["particles"]))
