@@ -44,7 +44,8 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
     ----------
     parameters : mapping
         ``recording``, ``frames`` (0: all), ``start`` (``found`` from the markers, or ``true``), ``detection_rate``, ``false_positives``,
-        ``variance_px2``, ``preset``, ``layers``, ``particles``, ``repeat``.
+        ``variance_px2``, ``preset``, ``reprojection`` (share of that score; 0 is the thesis's likelihood), ``layers``, ``particles``,
+        ``repeat``.
     inputs : Inputs
     rng : numpy.random.Generator
     """
@@ -97,4 +98,8 @@ def _height_m(recording: Recording) -> float | None:
 
 def _preset(parameters: Parameters) -> MarkerPreset:
     preset = marker_preset(parameters["preset"])
-    return replace(preset, annealed=replace(preset.annealed, layers=parameters["layers"], particles=parameters["particles"]))
+    return replace(
+        preset,
+        likelihood=replace(preset.likelihood, reprojection=parameters["reprojection"]),
+        annealed=replace(preset.annealed, layers=parameters["layers"], particles=parameters["particles"]),
+    )

@@ -27,7 +27,7 @@ PAPER = {
     AVERAGE: (121.18, 45.92, 90.17, 71.36, 10.12, 3.33),
 }
 PRESETS = ("default", "canton2009")
-_COLOURS = (COLOURS["particle"], COLOURS["sparse"], COLOURS["person"])
+_COLOURS = (COLOURS["particle"], COLOURS["sparse"], COLOURS["person"], COLOURS["other"])
 
 
 def grid(plan: Plan) -> list[dict]:
