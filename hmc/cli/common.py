@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -16,6 +16,7 @@ __all__ = [
     "print_problems",
     "progress",
     "recording_source",
+    "was_finished",
     "whole_number",
 ]
 
@@ -89,3 +90,28 @@ def recording_source(recording) -> dict[str, Any]:
     times = [file.stat().st_mtime for pattern in SOURCES for file in recording.path.glob(pattern)]
     changed = datetime.fromtimestamp(max(times, default=0.0), UTC).isoformat()
     return {"recording": recording.path.resolve(), "recording_changed": changed}
+
+
+def was_finished(written: Sequence[Path], run_path: Path, depends_on: Mapping[str, Any]) -> bool:
+    """Whether a run wrote all of its files before, with the same parameters; says so, or that they were others.
+
+    Parameters
+    ----------
+    written : sequence of Path
+        Its results, the one that is told first.
+    run_path : Path
+        Its `run.toml`.
+    depends_on : mapping
+        Method, seed, recording and parameters.
+    """
+    from hmc.files import to_toml
+    from hmc.results import read_run
+
+    if not all(path.exists() for path in (*written, run_path)):
+        return False
+    before = read_run(run_path)
+    if to_toml({name: before.get(name) for name in depends_on}) != to_toml(depends_on):
+        print(f"{run_path.parent}: its result has other parameters or another recording; starting anew")
+        return False
+    print(f"{written[0]} was finished before, with the same parameters; delete it to compute it again")
+    return True

@@ -6,7 +6,16 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from hmc.cli.common import add_selection_options, open_selected, positive_float, print_problems, progress, recording_source, whole_number
+from hmc.cli.common import (
+    add_selection_options,
+    open_selected,
+    positive_float,
+    print_problems,
+    progress,
+    recording_source,
+    was_finished,
+    whole_number,
+)
 from hmc.cli.pose_markers import add_marker_options, run_markers
 from hmc.cli.track import JOURNAL, add_tracker_options, selected_tracker
 
@@ -58,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
     from hmc.pose.body.proportions import stature
     from hmc.pose.person import FollowSettings
     from hmc.pose.sequence import pose_recording
-    from hmc.results import read_run, write_joints, write_pose, write_run, write_tracks
+    from hmc.results import write_joints, write_pose, write_run, write_tracks
     from hmc.tracking.resumable import person_grid, track_recording
 
     recording = open_selected(args)
@@ -85,14 +94,11 @@ def run(args: argparse.Namespace) -> int:
         "frontend": frontend,
     }
     source = recording_source(recording)
-    key = to_toml({"method": args.method, "seed": args.seed, **source, "parameters": parameters})
+    depends_on = {"method": args.method, "seed": args.seed, **source, "parameters": parameters}
+    key = to_toml(depends_on)
     paths = {name: args.out / name for name in ("tracks.csv", "joints.csv", "pose.npz", "run.toml")}
-    if all(path.exists() for path in paths.values()):
-        before = read_run(paths["run.toml"])
-        if to_toml({name: before.get(name) for name in ("method", "seed", *source, "parameters")}) == key:
-            print(f"{paths['joints.csv']} was finished before, with the same parameters; delete it to compute it again")
-            return 0
-        print(f"{args.out}: its result has other parameters or another recording; starting anew")
+    if was_finished([paths["joints.csv"], paths["tracks.csv"], paths["pose.npz"]], paths["run.toml"], depends_on):
+        return 0
 
     problems: list[str] = [*recording.problems]
     track_journal, pose_journal, masks = args.out / JOURNAL, args.out / POSE_JOURNAL, args.out / MASKS

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from hmc.cli.common import print_problems, progress, recording_source
+from hmc.cli.common import print_problems, progress, recording_source, was_finished
 
 __all__ = ["add_marker_options", "run_markers"]
 
@@ -59,7 +59,7 @@ def run_markers(args: argparse.Namespace, height_m: float | None, recording) -> 
     from hmc.pose.markers.detections import write_detections
     from hmc.pose.markers.filter import marker_preset
     from hmc.pose.markers.sequence import pose_from_markers
-    from hmc.results import TrackTable, read_run, write_joints, write_pose, write_run, write_tracks
+    from hmc.results import TrackTable, write_joints, write_pose, write_run, write_tracks
 
     preset, colour = marker_preset(args.preset), ColourSettings()
     used, ready = _source(args, recording)
@@ -71,14 +71,11 @@ def run_markers(args: argparse.Namespace, height_m: float | None, recording) -> 
     }  # fmt: skip
     parameters |= {"detections": used.resolve()} if ready else {"labels": used.resolve(), "colour": colour}
     source = recording_source(recording) | {"markers_changed": str(used.stat().st_mtime_ns)}
-    key = to_toml({"method": args.method, "seed": args.seed, **source, "parameters": parameters})
+    depends_on = {"method": args.method, "seed": args.seed, **source, "parameters": parameters}
+    key = to_toml(depends_on)
     paths = {name: args.out / name for name in ("tracks.csv", "joints.csv", "pose.npz", "run.toml")}
-    if all(path.exists() for path in paths.values()):
-        before = read_run(paths["run.toml"])
-        if to_toml({name: before.get(name) for name in ("method", "seed", *source, "parameters")}) == key:
-            print(f"{paths['joints.csv']} was finished before, with the same parameters; delete it to compute it again")
-            return 0
-        print(f"{args.out}: its result has other parameters or another recording; starting anew")
+    if was_finished([paths["joints.csv"], paths["tracks.csv"], paths["pose.npz"]], paths["run.toml"], depends_on):
+        return 0
 
     problems = [*recording.problems]
     frames = list(range(recording.start, recording.start + recording.n_frames))

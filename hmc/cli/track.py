@@ -6,7 +6,16 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from hmc.cli.common import add_selection_options, open_selected, positive_float, print_problems, progress, recording_source, whole_number
+from hmc.cli.common import (
+    add_selection_options,
+    open_selected,
+    positive_float,
+    print_problems,
+    progress,
+    recording_source,
+    was_finished,
+    whole_number,
+)
 
 __all__ = ["add_parser", "add_tracker_options", "run", "selected_tracker"]
 
@@ -60,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
     from hmc.errors import InputError
     from hmc.files import to_toml
     from hmc.frontend import FrontendSettings
-    from hmc.results import read_run, read_tracks, write_run, write_tracks
+    from hmc.results import read_tracks, write_run, write_tracks
     from hmc.tracking.resumable import Timing, track_recording
 
     recording = open_selected(args)
@@ -81,14 +90,11 @@ def run(args: argparse.Namespace) -> int:
         "frontend": frontend,
     }
     source = recording_source(recording)
-    key = to_toml({"method": args.tracker, "seed": args.seed, **source, "parameters": parameters})
-    if run_path.exists() and tracks_path.exists():
-        before = read_run(run_path)
-        if to_toml({name: before.get(name) for name in ("method", "seed", *source, "parameters")}) == key:
-            print(_summary(read_tracks(tracks_path), recording.n_frames))
-            print(f"{tracks_path} was finished before, with the same parameters; delete it to compute it again")
-            return 0
-        print(f"{args.out}: its result has other parameters or another recording; starting anew")
+    depends_on = {"method": args.tracker, "seed": args.seed, **source, "parameters": parameters}
+    key = to_toml(depends_on)
+    if was_finished([tracks_path], run_path, depends_on):
+        print(_summary(read_tracks(tracks_path), recording.n_frames))
+        return 0
 
     problems: list[str] = [*recording.problems]
     timings: list[Timing] = []

@@ -8,6 +8,7 @@ import numpy as np
 from scipy import ndimage
 
 from hmc.voxels.grid import VoxelGrid
+from hmc.voxels.surface import surface
 
 __all__ = ["HullTarget", "distance_at", "distance_gradient", "make_target", "sample_points"]
 
@@ -104,9 +105,9 @@ def make_target(
     maybe = np.zeros(shape, bool) if loose is None else _crop(loose, low, shape)
     if loose is not None:
         distance = np.minimum(distance, _distance_to(maybe, grid.voxel_size_m) + LOOSE_M)
-    surface = grid.centres(np.argwhere(core & ~ndimage.binary_erosion(core)) + low)
+    shell = grid.centres(surface(core) + low)
     volume_m3 = len(strict) * grid.voxel_size_m**3
-    return HullTarget(distance, occupied, maybe, grid.centres(low), grid.voxel_size_m, surface, volume_m3, floor_z)
+    return HullTarget(distance, occupied, maybe, grid.centres(low), grid.voxel_size_m, shell, volume_m3, floor_z)
 
 
 def _crop(volume: np.ndarray, low: np.ndarray, shape: np.ndarray) -> np.ndarray:

@@ -13,10 +13,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy import ndimage
 
 from hmc.camera.model import Camera, Rig, project
 from hmc.pose.annealed.hull_target import HullTarget, sample_points
+from hmc.voxels.surface import surface
 
 __all__ = ["places_and_directions", "points_to_explain", "silhouette_rays", "slide_to_axis", "with_rays"]
 
@@ -39,8 +39,7 @@ def with_rays(target: HullTarget, rig: Rig, masks: Sequence[np.ndarray | None], 
     """
     # The loose hull too: a leg that furniture hides from all cameras but one or two is in no other, and plain to see in these.
     possible = target.tolerant | target.loose
-    shell = possible & ~ndimage.binary_erosion(possible)
-    points = np.concatenate([target.surface, target.origin + target.voxel_size_m * np.argwhere(shell)])
+    points = np.concatenate([target.surface, target.origin + target.voxel_size_m * surface(possible)])
     return replace(target, rays=silhouette_rays(rig, masks, points, target.voxel_size_m, others))
 
 
@@ -118,9 +117,9 @@ def points_to_explain(rng: np.random.Generator, target: HullTarget, n: int, ray_
     if target.rays is None or not len(target.rays):
         return sample_points(rng, target.surface, n)
     n_rays = round(ray_share * n)
-    chosen = sample_points(rng, target.surface, n - n_rays) if n_rays < n else np.zeros((0, 3))
+    chosen = sample_points(rng, target.surface, n - n_rays)
     fixed = np.concatenate([chosen, np.zeros_like(chosen)], axis=1)
-    return np.concatenate([sample_points(rng, target.rays, n_rays), fixed]) if n_rays else fixed
+    return np.concatenate([sample_points(rng, target.rays, n_rays), fixed])
 
 
 def places_and_directions(points: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
