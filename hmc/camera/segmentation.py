@@ -275,7 +275,7 @@ def segment(
         return None, _adapt_to_switch(model, image, settings)
     mask, doubtful = _complete(found, cv2.threshold(answer, SHADOW - 1, 1, cv2.THRESH_BINARY)[1], image, model, settings)
     mask = mask.view(bool)
-    doubtful = doubtful.view(bool) | mask
+    doubtful = np.bitwise_or(doubtful.view(bool), mask, out=doubtful.view(bool))
     if model.unseen is not None:
         doubtful &= ~model.unseen
     after = replace(model, people=mask, frame=model.frame + 1, settling=max(0, model.settling - 1), doubtful=doubtful)

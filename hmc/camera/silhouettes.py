@@ -129,7 +129,7 @@ def fill_gaps(
     mask = cv2.morphologyEx(mask, cv2.MORPH_OPEN, _square(3, scale))
     mask = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, _disc(CLOSE_PX, scale))
     n, labels = cv2.connectedComponents(mask, connectivity=8)
-    told = np.flatnonzero(seeds)
+    told = np.flatnonzero(seeds.view(bool))
     if sure > 0:
         told = told[(seen.chroma2.ravel()[told] > sure**2) | (np.abs(seen.luma.ravel()[told]) > sure)]
     counts = np.bincount(np.asarray(labels).ravel()[told], minlength=n)
