@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -12,12 +13,20 @@ from hmc.landmarks import LANDMARKS, landmark_index
 from hmc.metrics.landmarks import landmark_errors, score
 from hmc.metrics.mot import MotScores, clear_mot
 from hmc.metrics.persons import LIMB_PAIRS, exchange_sides, match_persons, runs, swapped_frames
+from hmc.metrics.threshold import choose_threshold
 from hmc.results import PoseTable, TrackTable
 
-__all__ = ["PersonErrors", "PoseEvaluation", "evaluate_pose", "evaluate_tracks", "pelvis_tracks"]
+__all__ = [
+    "AUTO", "THRESHOLDS_M", "PersonErrors", "PoseEvaluation", "evaluate_pose", "evaluate_tracks", "known_thresholds", "pelvis_tracks",
+    "score_rows",
+]  # fmt: skip
 
 #: Largest errors at which a landmark counts as matched: the thesis's, and a stricter one, as the first saturates.
 THRESHOLDS_M = (0.1, 0.05)
+#: In place of a threshold: those that the errors themselves suggest.
+AUTO: Literal["auto"] = "auto"
+#: Units of scores in columns, a metre's worth of them, and the step to which a threshold that was chosen is rounded.
+UNITS = {"mm": (1000.0, 1e-4), "px": (1.0, 0.1)}
 #: A frame whose mean error is above this has lost the pose.
 LOST_M = 0.15
 #: Fewer swapped frames than this are a moment of doubt, not worth a line.
@@ -66,15 +75,18 @@ class PoseEvaluation:
         Plain numbers: coverage, overall scores, initialisation and the rest.
     notes : tuple of str
         What a reader should know before trusting the figures, one line each.
+    thresholds_m : tuple of float
+        Of MMTP and MMTA, metres.
     """
 
     persons: tuple[PersonErrors, ...]
     rows: tuple[dict, ...]
     summary: dict
     notes: tuple[str, ...]
+    thresholds_m: tuple[float, ...]
 
 
-def evaluate_pose(estimate: PoseTable, truth: PoseTable, thresholds_m: Sequence[float] = THRESHOLDS_M) -> PoseEvaluation:
+def evaluate_pose(estimate: PoseTable, truth: PoseTable, thresholds_m: Sequence[float | Literal["auto"]] = THRESHOLDS_M) -> PoseEvaluation:
     """Score estimated landmarks against true ones.
 
     Estimated persons are matched with true ones once for the recording (`match_persons`). A true landmark without an estimate counts
@@ -83,8 +95,8 @@ def evaluate_pose(estimate: PoseTable, truth: PoseTable, thresholds_m: Sequence[
     Parameters
     ----------
     estimate, truth : PoseTable
-    thresholds_m : sequence of float
-        Thresholds of MMTP and MMTA, metres.
+    thresholds_m : sequence of float or "auto"
+        Thresholds of MMTP and MMTA, metres; ``"auto"`` for those that the errors suggest (`known_thresholds`).
 
     Returns
     -------
@@ -93,7 +105,7 @@ def evaluate_pose(estimate: PoseTable, truth: PoseTable, thresholds_m: Sequence[
     Raises
     ------
     InputError
-        When the truth is empty.
+        When the truth is empty, or a threshold cannot be chosen.
     """
     if not len(truth.frames):
         raise InputError("the truth has no row in these frames; nothing can be scored")
@@ -101,7 +113,8 @@ def evaluate_pose(estimate: PoseTable, truth: PoseTable, thresholds_m: Sequence[
     persons = tuple(_person_errors(estimate, truth, int(person), names) for person in np.unique(truth.persons))
     groups = {"all": np.concatenate([person.errors for person in persons])}
     groups |= {str(person.person): person.errors for person in persons}
-    rows = tuple(row for label, errors in groups.items() for row in _score_rows(label, errors, thresholds_m))
+    known, chosen = known_thresholds(groups["all"], thresholds_m)
+    rows = tuple({"person": label} | row for label, errors in groups.items() for row in score_rows(errors, known))
     frame_means = {person.person: _frame_means(person.errors) for person in persons}
     first = [means[np.flatnonzero(np.isfinite(means))[0]] for means in frame_means.values() if np.isfinite(means).any()]
     later = [means[np.isfinite(means)][1:] for means in frame_means.values()]
@@ -120,7 +133,8 @@ def evaluate_pose(estimate: PoseTable, truth: PoseTable, thresholds_m: Sequence[
         "persons": {str(person.person): {"estimated_as": list(person.estimated_as)} for person in persons},
     }
     summary |= {key: value for key, value in rows[len(LANDMARKS)].items() if key not in ("person", "landmark", "frames", "true_frames")}
-    return PoseEvaluation(persons, rows, summary, tuple(_notes(persons, frame_means, estimate.persons[nobody])))
+    summary |= chosen
+    return PoseEvaluation(persons, rows, summary, tuple(_notes(persons, frame_means, estimate.persons[nobody])), known)
 
 
 def evaluate_tracks(estimate: TrackTable, truth: TrackTable) -> MotScores:
@@ -135,6 +149,81 @@ def pelvis_tracks(poses: PoseTable) -> TrackTable:
     return TrackTable(poses.frames[known], poses.persons[known], points[known])
 
 
+def known_thresholds(
+    errors: np.ndarray, thresholds: Sequence[float | Literal["auto"]], unit: Literal["mm", "px"] = "mm"
+) -> tuple[tuple[float, ...], dict[str, float]]:
+    """Thresholds as numbers: in place of ``"auto"`` those that the errors suggest by both tests (Canton 2009, Eq. 5.7 and 5.8).
+
+    Parameters
+    ----------
+    errors : ndarray, shape (n, 15)
+        From `hmc.metrics.landmarks.landmark_errors`, of everybody; metres, or pixels.
+    thresholds : sequence of float or "auto"
+        In the unit of the errors.
+    unit : {"mm", "px"}
+        Of the results.
+
+    Returns
+    -------
+    thresholds : tuple of float
+        In the unit of the errors, none twice. One that was chosen is rounded up, to a tenth of a millimetre or pixel.
+    chosen : dict
+        What the tests say, in `unit`, by name; empty where nothing was to be chosen.
+
+    Raises
+    ------
+    InputError
+        When there are too few errors to choose from.
+    """
+    factor, step = UNITS[unit]
+    known: list[float] = []
+    chosen: dict[str, float] = {}
+    for threshold in thresholds:
+        if threshold != AUTO:
+            known.append(float(threshold))
+            continue
+        for test in ("lilliefors", "r2"):
+            value = choose_threshold(errors, test).threshold
+            known.append(round(float(np.ceil(value / step) * step), 6))
+            chosen[f"threshold_{test}_{unit}"] = factor * value
+    return tuple(dict.fromkeys(known)), chosen
+
+
+def score_rows(errors: np.ndarray, thresholds: Sequence[float], unit: Literal["mm", "px"] = "mm") -> list[dict]:
+    """Scores as rows of a table: one a landmark, then ``overall``; the columns carry their units.
+
+    Parameters
+    ----------
+    errors : ndarray, shape (n, 15)
+        From `hmc.metrics.landmarks.landmark_errors`; metres, or pixels.
+    thresholds : sequence of float
+        Of MMTP and MMTA, in the unit of the errors.
+    unit : {"mm", "px"}
+        Of the columns.
+    """
+    factor, _ = UNITS[unit]
+    columns: dict[str, np.ndarray] = {}
+    for threshold in thresholds:
+        joint, overall = score(errors, threshold, by="joint"), score(errors, threshold)
+        at = f"at_{threshold * factor:g}{unit}"
+        columns[f"mean_{unit}"] = np.append(joint.mean, overall.mean) * factor
+        columns[f"deviation_{unit}"] = np.append(joint.deviation, overall.deviation) * factor
+        columns[f"mmtp_{unit}_{at}"] = np.append(joint.mmtp, overall.mmtp) * factor
+        columns[f"sigma_mmtp_{unit}_{at}"] = np.append(joint.sigma_mmtp, overall.sigma_mmtp) * factor
+        columns[f"mmta_{at}"] = np.append(joint.mmta, overall.mmta)
+    estimated, expected = np.isfinite(errors), ~np.isnan(errors)
+    counts = {
+        "frames": [*estimated.sum(axis=0), estimated.any(axis=1).sum()],
+        "true_frames": [*expected.sum(axis=0), expected.any(axis=1).sum()],
+    }
+    return [
+        {"landmark": name}
+        | {key: float(values[place]) for key, values in columns.items()}
+        | {key: int(values[place]) for key, values in counts.items()}
+        for place, name in enumerate((*LANDMARKS, "overall"))
+    ]
+
+
 def _person_errors(estimate: PoseTable, truth: PoseTable, person: int, names: Mapping[int, int]) -> PersonErrors:
     true_rows = np.flatnonzero(truth.persons == person)
     estimated_as = tuple(sorted(name for name, true_name in names.items() if true_name == person))
@@ -143,30 +232,6 @@ def _person_errors(estimate: PoseTable, truth: PoseTable, person: int, names: Ma
     _, a, b = np.intersect1d(truth.frames[true_rows], estimate.frames[rows], return_indices=True)
     positions[a] = estimate.positions[rows[b]]
     return PersonErrors(person, estimated_as, truth.frames[true_rows], positions, truth.positions[true_rows])
-
-
-def _score_rows(label: str, errors: np.ndarray, thresholds_m: Sequence[float]) -> list[dict]:
-    """A row a landmark, then the overall row."""
-    columns: dict[str, np.ndarray] = {}
-    for threshold in thresholds_m:
-        joint, overall = score(errors, threshold, by="joint"), score(errors, threshold)
-        at = f"at_{threshold * 1000:g}mm"
-        columns["mean_mm"] = np.append(joint.mean, overall.mean) * 1000
-        columns["deviation_mm"] = np.append(joint.deviation, overall.deviation) * 1000
-        columns[f"mmtp_mm_{at}"] = np.append(joint.mmtp, overall.mmtp) * 1000
-        columns[f"sigma_mmtp_mm_{at}"] = np.append(joint.sigma_mmtp, overall.sigma_mmtp) * 1000
-        columns[f"mmta_{at}"] = np.append(joint.mmta, overall.mmta)
-    estimated, expected = np.isfinite(errors), ~np.isnan(errors)
-    counts = {
-        "frames": [*estimated.sum(axis=0), estimated.any(axis=1).sum()],
-        "true_frames": [*expected.sum(axis=0), expected.any(axis=1).sum()],
-    }
-    return [
-        {"person": label, "landmark": name}
-        | {key: float(values[place]) for key, values in columns.items()}
-        | {key: int(values[place]) for key, values in counts.items()}
-        for place, name in enumerate((*LANDMARKS, "overall"))
-    ]
 
 
 def _frame_means(errors: np.ndarray) -> np.ndarray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import csv
+import math
 from pathlib import Path
 
 from hmc.cli.common import whole_number
@@ -19,35 +20,73 @@ def add_parser(subparsers) -> None:
         "evaluate",
         help="score a result against the truth",
         description="Score a result against the truth: mean error, deviation, MMTP and MMTA a landmark and overall, MOTP and MOTA of the "
-        "tracks. Prints them and writes metrics.csv and metrics.toml into DIR.",
+        "tracks; with --angles the angles of the joints, with --images the landmarks in the images. Prints them and writes metrics.csv, "
+        "angles.csv, images.csv and metrics.toml into DIR.",
     )
     parser.add_argument("directory", type=Path, metavar="DIR", help="folder of the result, with joints.csv or tracks.csv")
     parser.add_argument("recording", type=Path, nargs="?", metavar="RECORDING", help="folder of the recording, with truth/")
-    parser.add_argument("--truth", type=Path, metavar="FILE", help="table of true joints or centroids, in place of the recording's")
+    parser.add_argument(
+        "--truth",
+        type=Path,
+        metavar="FILE",
+        help="table of true joints or centroids, in place of the recording's; or of landmarks marked in images "
+        "(frame,camera,person,joint,u,v), against which the poses are projected with the recording's calibration",
+    )
     parser.add_argument("--start", type=whole_number, metavar="N", help="first frame that counts (default: as the result was made)")
     parser.add_argument("--frames", type=whole_number, metavar="N", help="how many frames count (default: as the result was made)")
+    parser.add_argument(
+        "--threshold",
+        type=_threshold,
+        nargs="+",
+        metavar="T",
+        help="largest error of a matched landmark, millimetres (against landmarks marked in images: pixels), or auto: chosen from the "
+        "errors, by Lilliefors and by R^2 (default: 100 50; in images 10 5)",
+    )
+    parser.add_argument("--angles", action="store_true", help="errors of the joints' angles, read as one reference body, where matched")
+    parser.add_argument("--images", action="store_true", help="errors in the images too, of the true joints projected into all cameras")
     parser.add_argument("--quiet", action="store_true", help="print the overall figures and the notes only")
+
+
+def _threshold(text: str) -> float | str:
+    """argparse type: ``auto``, or a number above 0."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if text != "auto" and not (0 < value < math.inf):
+        raise argparse.ArgumentTypeError(f"{text!r} is neither auto nor a number above 0")
+    return "auto" if text == "auto" else value
 
 
 def run(args: argparse.Namespace) -> int:
     """Score, print, write."""
-    from hmc.evaluation import PoseEvaluation, evaluate_pose, evaluate_tracks, pelvis_tracks
+    from hmc.evaluation import THRESHOLDS_M, PoseEvaluation, evaluate_pose, evaluate_tracks, pelvis_tracks
+    from hmc.evaluation_angles import angle_rows
     from hmc.metrics.mot import MotScores
-    from hmc.results import read_centroids, read_joints, read_tracks, run_selection
+    from hmc.results import PoseTable, read_centroids, read_joints, read_tracks, run_selection
 
     if not args.directory.is_dir():
         raise InputError(f"{args.directory}: no such folder; a result is the folder that `hmc pose` or `hmc track` wrote")
-    truth_joints, truth_centroids = find_truth(args.recording, args.truth)
+    truth_joints, truth_centroids, truth_images = find_truth(args.recording, args.truth)
     joints_file, tracks_file = args.directory / "joints.csv", args.directory / "tracks.csv"
     start, frames = run_selection(args.directory) if args.start is None and args.frames is None else (args.start or 0, args.frames)
 
     def selected(table):
         return table.where((table.frames >= start) & (table.frames < (float("inf") if frames is None else start + frames)))
 
+    estimated: PoseTable | None = selected(read_joints(joints_file)) if joints_file.exists() else None
     poses: PoseEvaluation | None = None
     true_poses = None if truth_joints is None else selected(read_joints(truth_joints))
-    if true_poses is not None and joints_file.exists():
-        poses = evaluate_pose(selected(read_joints(joints_file)), true_poses)
+    if true_poses is not None and estimated is not None:
+        # A threshold in millimetres; "auto" stays.
+        given = [one if isinstance(one, str) else one / 1000 for one in args.threshold] if args.threshold else THRESHOLDS_M
+        poses = evaluate_pose(estimated, true_poses, given)
+
+    images = None
+    if args.images or truth_images is not None:
+        if estimated is None or (true_poses is None and truth_images is None):
+            raise InputError(f"{args.directory}: scores in images need joints.csv there, and true joints or marked landmarks")
+        images = _in_images(args, estimated, true_poses, truth_images, selected)
 
     tracks: MotScores | None = None
     tracks_note = ""
@@ -56,14 +95,34 @@ def run(args: argparse.Namespace) -> int:
         true_tracks, tracks_note = pelvis_tracks(true_poses), " (against the true pelvis, as there are no true centroids)"
     if true_tracks is not None and tracks_file.exists():
         tracks = evaluate_tracks(selected(read_tracks(tracks_file)), true_tracks)
-    if poses is None and tracks is None:
+    if poses is None and tracks is None and images is None:
         raise InputError(f"{args.directory}: neither joints.csv nor tracks.csv that the truth could be compared with")
+    if args.angles and poses is None and images is None:
+        raise InputError(f"{args.directory}: --angles needs joints.csv there, and true joints")
 
     report: dict = {}
+    angles: list[dict] = []
     if poses is not None:
         print_pose(poses, args.quiet)
         write_rows(args.directory / "metrics.csv", poses.rows)
         report["pose"] = poses.summary
+        if args.angles:
+            groups = {str(person.person): (person.estimate, person.truth) for person in poses.persons}
+            angles = angle_rows("person", groups, poses.thresholds_m[0])
+    if images is not None:
+        print("in images:")
+        print_rows(images.rows, "camera", args.quiet)
+        print_thresholds(images.summary, "px")
+        write_rows(args.directory / "images.csv", images.rows)
+        report["images"] = images.summary
+        if args.angles and poses is None:
+            angles = angle_rows("camera", images.groups, images.thresholds_px[0])
+    if angles:
+        print_angles(angles, args.quiet)
+        write_rows(args.directory / "angles.csv", angles)
+        report["angles"] = {
+            name: value for name, value in next(row for row in angles if row["angle"] == "overall").items() if name != "angle"
+        }
     if tracks is not None:
         print(
             f"tracks: MOTP {tracks.motp * 1000:.1f} mm, MOTA {tracks.mota:.4f}, {tracks.misses} misses, {tracks.false_positives} false "
@@ -78,20 +137,39 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def find_truth(recording: Path | None, truth: Path | None) -> tuple[Path | None, Path | None]:
-    """The files of true joints and of true centroids; None for what there is not.
+def _in_images(args: argparse.Namespace, estimated, true_poses, truth_images: Path | None, selected):
+    """Scores in images, against marked landmarks or the projected true joints."""
+    from hmc.camera.calibration.read import read_calibration
+    from hmc.evaluation_images import THRESHOLDS_PX, evaluate_images, image_landmarks, read_image_landmarks
+
+    if args.recording is None:
+        raise InputError("scores in images need the RECORDING, for its calibration")
+    rig = read_calibration(args.recording)
+    if truth_images is not None:
+        truth = selected(read_image_landmarks(truth_images, rig.names))
+    else:
+        truth = image_landmarks(true_poses, rig, inside=True)
+    # With true joints a threshold that is given is theirs, in millimetres.
+    given = args.threshold if args.threshold and true_poses is None else THRESHOLDS_PX
+    return evaluate_images(image_landmarks(estimated, rig), truth, rig, given)
+
+
+def find_truth(recording: Path | None, truth: Path | None) -> tuple[Path | None, Path | None, Path | None]:
+    """The files of true joints, of true centroids and of landmarks marked in images; None for what there is not.
 
     Raises
     ------
     InputError
-        When there is neither.
+        When there is none.
     """
     if truth is not None:
         if not truth.is_file():
             raise InputError(f"{truth}: no such file (--truth)")
         with open(truth, encoding="utf-8-sig", errors="replace") as file:
-            has_joints = "joint" in [name.strip() for name in file.readline().split(",")]
-        return (truth, None) if has_joints else (None, truth)
+            names = [name.strip() for name in file.readline().split(",")]
+        if "joint" in names:
+            return (None, None, truth) if "u" in names else (truth, None, None)
+        return None, truth, None
     if recording is None:
         raise InputError("give the RECORDING whose truth/ is to be compared with, or --truth FILE")
     if not recording.is_dir():
@@ -99,7 +177,7 @@ def find_truth(recording: Path | None, truth: Path | None) -> tuple[Path | None,
     joints, centroids = recording / "truth" / "joints.csv", recording / "truth" / "centroids.csv"
     if not joints.exists() and not centroids.exists():
         raise InputError(f"{recording}: no truth/joints.csv and no truth/centroids.csv to compare with; give another table by --truth FILE")
-    return (joints if joints.exists() else None), (centroids if centroids.exists() else None)
+    return (joints if joints.exists() else None), (centroids if centroids.exists() else None), None
 
 
 def made_from(directory: Path, recording: Path | None) -> list[str]:
@@ -120,22 +198,47 @@ def print_pose(poses, quiet: bool) -> None:
         f"poses: {summary['true_persons']} true person{'' if len(poses.persons) == 1 else 's'}, {summary['person_frames']} person-frames, "
         f"{summary['person_frames_estimated']} with an estimate ({summary['coverage']:.1%})"
     )
-    several = len(poses.persons) > 1
-    whole = [row for row in poses.rows if row["person"] == "all" and (not quiet or row["landmark"] == "overall")]
-    parts = [row for row in poses.rows if row["person"] != "all" and row["landmark"] == "overall"] if several else []
-    columns = [name for name in poses.rows[0] if not name.startswith("sigma") and name not in ("person", "landmark")]
-    labels = [row["landmark"] for row in whole] + [f"person {row['person']}" for row in parts]
+    print_rows(poses.rows, "person", quiet)
+    print_thresholds(summary, "mm")
+    print(f"first frame of each person: {summary['initialisation_mean_mm']:.1f} mm; all others: {summary['tracking_mean_mm']:.1f} mm")
+
+
+def print_rows(rows, group: str, quiet: bool) -> None:
+    """The landmarks over all groups, then a line a group where there are several."""
+    whole = [row for row in rows if row[group] == "all" and (not quiet or row["landmark"] == "overall")]
+    parts = [row for row in rows if row[group] != "all" and row["landmark"] == "overall"]
+    columns = [name for name in rows[0] if not name.startswith("sigma") and name not in (group, "landmark")]
+    if len(parts) == 1:
+        parts = []
+    print_table([row["landmark"] for row in whole] + [f"{group} {row[group]}" for row in parts], whole + parts, columns)
+
+
+def print_angles(rows, quiet: bool) -> None:
+    """The angles' errors over all groups."""
+    whole = [row for row in rows if next(iter(row.values())) == "all" and (not quiet or row["angle"] == "overall")]
+    print("angles where both landmarks are matched:")
+    print_table([row["angle"] for row in whole], whole, ["mean_deg", "deviation_deg", "compared"])
+
+
+def print_table(labels, rows, columns) -> None:
+    """Rows under the names of their columns."""
     width = max(len(label) for label in labels)
     print(" " * width + "  " + "  ".join(columns))
-    for label, row in zip(labels, whole + parts, strict=True):
+    for label, row in zip(labels, rows, strict=True):
         cells = [f"{row[name]:>{len(name)}{number_format(name)}}" for name in columns]
         print(f"{label:<{width}}  " + "  ".join(cells))
-    print(f"first frame of each person: {summary['initialisation_mean_mm']:.1f} mm; all others: {summary['tracking_mean_mm']:.1f} mm")
+
+
+def print_thresholds(summary, unit: str) -> None:
+    """The thresholds that the errors suggest, where they were asked for."""
+    chosen = [summary.get(f"threshold_{test}_{unit}") for test in ("lilliefors", "r2")]
+    if None not in chosen:
+        print(f"threshold from the errors: {chosen[0]:.1f} {unit} by Lilliefors, {chosen[1]:.1f} {unit} by R^2")
 
 
 def number_format(column: str) -> str:
     """How a column's numbers are written."""
-    return "d" if column.endswith("frames") else ".3f" if column.startswith("mmta") else ".1f"
+    return "d" if column.endswith("frames") or column == "compared" else ".3f" if column.startswith("mmta") else ".1f"
 
 
 def track_summary(tracks) -> dict:
