@@ -1,11 +1,13 @@
 """Decided rows through a journal on disk and back, with and without a start, and the particles beside it."""
 
+from pathlib import Path
+
 import numpy as np
 from numpy.testing import assert_array_equal
 
 from hmc.journal import append_journal, open_journal
 from hmc.montecarlo.filters import ParticleState
-from hmc.pose.annealed.apf import pose_init
+from hmc.pose.annealed.apf import PoseState, pose_init
 from hmc.pose.annealed.presets import PRESETS
 from hmc.pose.body.joints import N_DOF
 from hmc.pose.body.proportions import default_body
@@ -17,7 +19,8 @@ def test_rows_come_back_to_the_last_digit(tmp_path):
     rng = np.random.default_rng(0)
     states = rng.standard_normal((3, N_DOF))
     pose = pose_init(states[-1] + 0.01, rng.standard_normal(N_DOF) / 3)
-    rows = Decided(4, (7, 8, 10), states, (1e-4, np.nan, 1 / 3e4), ("fitted", "no hull", "fitted"), pose, default_body(1.69))
+    missing = rng.random((3, N_DOF)) < 0.3
+    rows = Decided(4, (7, 8, 10), states, (1e-4, np.nan, 1 / 3e4), ("fitted", "no hull", "fitted"), pose, default_body(1.69), missing)
     journal = tmp_path / "journal"
     open_journal(journal, "run")
     append_journal(journal, to_record(rows))
@@ -27,6 +30,7 @@ def test_rows_come_back_to_the_last_digit(tmp_path):
     assert_array_equal(back.costs, rows.costs)
     assert_array_equal(back.pose.state, pose.state)
     assert_array_equal(back.pose.velocity, pose.velocity)
+    assert_array_equal(back.missing, missing)
     assert back.body.dimensions == rows.body.dimensions
     assert_array_equal(back.body.offsets, rows.body.offsets)
 
@@ -41,8 +45,16 @@ def test_rows_without_a_start_come_back_as_nothing(tmp_path):
     assert back.pose is None and back.body is None
 
 
-def particles(value: float) -> ParticleState:
-    return ParticleState(np.full((5, N_DOF), value), np.zeros(5))
+def particles(value: float) -> PoseState:
+    of = ParticleState(np.full((5, N_DOF), value), np.zeros(5))
+    return pose_init(np.zeros(N_DOF), particles=of, memory={"active": np.array([value > 0, False])})
+
+
+def kept(journal: Path, person: int, frame: int) -> np.ndarray:
+    """Numbers of the particles that are kept; their memory must be the same frame's."""
+    of, memory = kept_particles(journal, person, frame)
+    assert_array_equal(memory["active"], [of.particles[0, 0] > 0, False])
+    return of.particles
 
 
 def test_particles_of_the_last_record_outlive_the_next_ones_until_those_are_recorded(tmp_path):
@@ -50,15 +62,15 @@ def test_particles_of_the_last_record_outlive_the_next_ones_until_those_are_reco
     before = None
     for frame in (3, 4, 6, 7):
         keep_particles(journal, 2, frame, before, particles(frame))
-        for kept in (frame, before):
-            if kept is not None:
-                assert_array_equal(kept_particles(journal, 2, kept).particles, kept)
+        for number in (frame, before):
+            if number is not None:
+                assert_array_equal(kept(journal, 2, number), number)
         before = frame
     # The run died after the particles of frame 9, before its record, and goes on after frame 7.
     keep_particles(journal, 2, 9, 7, particles(9))
-    assert_array_equal(kept_particles(journal, 2, 7).particles, 7)
+    assert_array_equal(kept(journal, 2, 7), 7)
     keep_particles(journal, 2, 9, 7, particles(9.5))
-    assert_array_equal(kept_particles(journal, 2, 9).particles, 9.5)
+    assert_array_equal(kept(journal, 2, 9), 9.5)
     assert kept_particles(journal, 2, 3) is None and kept_particles(journal, 1, 9) is None
     assert len(list(tmp_path.iterdir())) == 2
 
@@ -70,5 +82,5 @@ def test_particles_of_an_earlier_run_are_not_taken_for_this_one_s(tmp_path):
     before = None
     for frame in (3, 4, 5):  # begun anew
         keep_particles(journal, 0, frame, before, particles(frame))
-        assert_array_equal(kept_particles(journal, 0, frame).particles, frame)
+        assert_array_equal(kept(journal, 0, frame), frame)
         before = frame

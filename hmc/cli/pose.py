@@ -21,7 +21,7 @@ from hmc.cli.track import JOURNAL, add_tracker_options, selected_tracker
 
 __all__ = ["add_parser", "run"]
 
-METHODS = ("apf", "marker-apf")
+METHODS = ("apf", "shbm-apf", "ddm-apf", "shbm-ddm-apf", "marker-apf")
 #: The journal of a run that is not finished.
 POSE_JOURNAL = ".pose.journal"
 #: Its silhouettes, which the tracker leaves for the poses.
@@ -39,7 +39,21 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     )
     add_selection_options(parser)
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the result")
-    parser.add_argument("--method", choices=METHODS, default="apf", help="apf: annealed particle filter (default); marker-apf: on markers")
+    parser.add_argument(
+        "--method",
+        choices=METHODS,
+        default="apf",
+        help="apf: annealed particle filter (default); shbm-apf: by models of rising "
+        "detail; ddm-apf: without the limbs that the data does not show; shbm-ddm-apf: both; marker-apf: on markers",
+    )
+    parser.add_argument(
+        "--model",
+        action="append",
+        default=[],
+        metavar="1|2|auto|FILE",
+        help="scalable body model: 1 (default; whole limbs first), 2 (upper arms and thighs first), auto (the better of both in every "
+        "frame), or a TOML file; shbm-ddm-apf takes two, one of each kind",
+    )
     parser.add_argument("--preset", default="default", metavar="NAME", help="default, or canton2009 for the thesis's printed parameters")
     parser.add_argument("--voxel", type=positive_float, default=0.03, metavar="M", help="side of a voxel, metres (default: 0.03)")
     add_tracker_options(parser)
@@ -66,6 +80,7 @@ def run(args: argparse.Namespace) -> int:
     from hmc.pose.annealed.presets import pose_preset
     from hmc.pose.body.proportions import stature
     from hmc.pose.person import FollowSettings
+    from hmc.pose.scalable.methods import method_preset
     from hmc.pose.sequence import pose_recording
     from hmc.results import write_joints, write_pose, write_run, write_tracks
     from hmc.tracking.resumable import person_grid, track_recording
@@ -73,7 +88,7 @@ def run(args: argparse.Namespace) -> int:
     recording = open_selected(args)
     if args.method == "marker-apf":
         return run_markers(args, _height(args.height, recording), recording)
-    preset = pose_preset(args.preset)
+    preset = method_preset(pose_preset(args.preset), args.method, args.model)
     if args.out.is_file():
         raise InputError(f"--out {args.out}: is a file; give a folder")
     height = _height(args.height, recording)

@@ -11,17 +11,21 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from hmc.pose.annealed.apf import PoseFilter, PoseInfo, PoseState, make_filter, pose_step
+from hmc.pose.annealed.apf import PoseFilter, PoseInfo, PoseState, make_filter
 from hmc.pose.annealed.hull_target import HullTarget
+from hmc.pose.annealed.limb_search import LIMBS
 from hmc.pose.annealed.presets import PosePreset
 from hmc.pose.body.joints import DOF_NAMES
 from hmc.pose.body.model import BodyModel
 from hmc.pose.legs import LegChoice, LegSettings, choose_legs, leg_choice, leg_points
+from hmc.pose.scalable.step import step_of
 from hmc.pose.start import StartSettings, start_person
 
 __all__ = ["Decided", "FollowSettings", "PersonState", "PersonTask", "PoseTask", "person_step", "taken_up"]
 
 NO_START = "no hull to start from"
+#: Legs can be told apart where none of these is missing.
+LEG_DOFS = np.concatenate([LIMBS["r_leg"], LIMBS["l_leg"]])
 
 
 @dataclass(frozen=True)
@@ -127,6 +131,8 @@ class Decided:
         From where the filter goes on; None where it has not started.
     body : BodyModel or None
         The person's.
+    missing : ndarray of bool, shape (n, 27), or None
+        Angles of limbs that the data does not show; None: of none.
     """
 
     person: int
@@ -136,6 +142,7 @@ class Decided:
     status: tuple[str, ...]
     pose: PoseState | None = None
     body: BodyModel | None = None
+    missing: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -202,7 +209,7 @@ def person_step(
         state = started
     else:
         rng = task.rng(person.number, frame)
-        pose, info = pose_step(rng, state.filter, state.pose, target)
+        pose, info = step_of(task.preset)(rng, state.filter, state.pose, target)
         state = replace(state, pose=pose, followed=(*state.followed, _followed(task, rng, state.filter, frame, pose, info, target)))
     return _decide(task, person, state, is_last)
 
@@ -234,7 +241,8 @@ def _followed(
 ) -> Followed:
     if task.legs is None:
         return Followed(frame, pose, info, LegChoice(pose.state[None], np.array([info.cost])))
-    choice = leg_choice(rng, filt, pose.state, target if info.status == "fitted" else None)
+    tells = info.status == "fitted" and (info.missing is None or not info.missing[LEG_DOFS].any())
+    choice = leg_choice(rng, filt, pose.state, target if tells else None)
     return Followed(frame, pose, info, choice)
 
 
@@ -262,9 +270,17 @@ def _decide(task: PoseTask, person: PersonTask, state: PersonState, is_last: boo
         tuple(row.info.status for row in rows),
         rows[-1].pose,
         body,
+        _missing(rows),
     )
     state = replace(state, followed=state.followed[len(rows) :], context=_context(task, context, decided), done_to=rows[-1].frame)
     return state, [decided]
+
+
+def _missing(rows: tuple[Followed, ...]) -> np.ndarray | None:
+    """Of every row, which angles are missing; None where none is in any."""
+    nothing = np.zeros(len(DOF_NAMES), bool)
+    missing = np.array([nothing if row.info.missing is None else row.info.missing for row in rows])
+    return missing if missing.any() else None
 
 
 def _context(task: PoseTask, context: tuple[tuple[int, np.ndarray], ...], decided: Decided) -> tuple[tuple[int, np.ndarray], ...]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from hmc.files import atomic_write
 from hmc.montecarlo.filters import ParticleState
-from hmc.pose.annealed.apf import pose_init
+from hmc.pose.annealed.apf import PoseState, pose_init
 from hmc.pose.annealed.presets import PosePreset
 from hmc.pose.body.joints import DOF_NAMES, canton_limits, default_limits
 from hmc.pose.body.model import BodyModel
@@ -17,6 +17,9 @@ from hmc.pose.body.proportions import make_body
 from hmc.pose.person import Decided
 
 __all__ = ["body_of", "from_record", "keep_particles", "kept_particles", "to_record"]
+
+#: Before the names of the memory's arrays in a file of particles.
+_MEMORY = "memory_"
 
 
 def body_of(dimensions: dict[str, float], preset: PosePreset) -> BodyModel:
@@ -34,41 +37,56 @@ def to_record(decided: Decided) -> dict[str, Any]:
         "status": list(decided.status),
     }
     if decided.pose is not None and decided.body is not None:
+        if decided.missing is not None:
+            record["missing"] = [np.flatnonzero(row).tolist() for row in decided.missing]
         record |= {"pose": decided.pose.state, "velocity": decided.pose.velocity, "body": decided.body.dimensions}
     return record
 
 
-def from_record(record: dict[str, Any], preset: PosePreset, particles: ParticleState | None = None) -> Decided:
-    """What `to_record` made into a record, with these particles."""
+def from_record(
+    record: dict[str, Any],
+    preset: PosePreset,
+    particles: ParticleState | None = None,
+    memory: dict[str, np.ndarray] | None = None,
+) -> Decided:
+    """What `to_record` made into a record, with these particles and this memory of the filter's."""
     started = "body" in record
+    missing = None
+    if "missing" in record:
+        missing = np.zeros((len(record["frames"]), len(DOF_NAMES)), bool)
+        for row, dofs in zip(missing, record["missing"], strict=True):
+            row[dofs] = True
     return Decided(
         record["person"],
         tuple(record["frames"]),
         np.array([np.full(len(DOF_NAMES), np.nan) if state is None else state for state in record["states"]], float),
         tuple(np.nan if cost is None else cost for cost in record["costs"]),
         tuple(record["status"]),
-        pose_init(np.array(record["pose"]), np.array(record["velocity"]), particles) if started else None,
+        pose_init(np.array(record["pose"]), np.array(record["velocity"]), particles, memory) if started else None,
         body_of(record["body"], preset) if started else None,
+        missing,
     )
 
 
-def keep_particles(journal: str | Path, person: int, frame: int, before: int | None, particles: ParticleState) -> None:
-    """Keep a person's particles beside the journal, to be called before the frame's record is added.
+def keep_particles(journal: str | Path, person: int, frame: int, before: int | None, pose: PoseState) -> None:
+    """Keep a person's particles and the filter's memory beside the journal, to be called before the frame's record is added.
 
     There are two files a person, and that of the frame `before`, which the last record is of, is left alone: it is needed should
     the run stop between the two writes.
     """
     first, second = _particle_files(journal, person)
     with atomic_write(second if before is not None and _frame_of(first) == before else first, "wb") as out:
-        np.savez(out, frame=frame, particles=particles.particles, log_weights=particles.log_weights)
+        arrays: dict[str, Any] = {f"{_MEMORY}{name}": values for name, values in pose.memory.items()}
+        np.savez(out, frame=frame, particles=pose.particles.particles, log_weights=pose.particles.log_weights, **arrays)
 
 
-def kept_particles(journal: str | Path, person: int, frame: int) -> ParticleState | None:
-    """The particles kept for this frame, if any."""
+def kept_particles(journal: str | Path, person: int, frame: int) -> tuple[ParticleState, dict[str, np.ndarray]] | None:
+    """The particles and the memory kept for this frame, if any."""
     for file in _particle_files(journal, person):
         if _frame_of(file) == frame:
             with np.load(file, allow_pickle=False) as data:
-                return ParticleState(data["particles"], data["log_weights"])
+                memory = {name.removeprefix(_MEMORY): data[name] for name in data.files if name.startswith(_MEMORY)}
+                return ParticleState(data["particles"], data["log_weights"]), memory
     return None
 
 

@@ -141,8 +141,8 @@ def pose_recording(
 def _keep(journal: str | Path | None, preset: PosePreset, decided: Decided, before: int | None) -> None:
     if journal is None:
         return
-    if preset.refine is None and decided.pose is not None:
-        keep_particles(journal, decided.person, decided.frames[-1], before, decided.pose.particles)
+    if decided.pose is not None and (preset.refine is None or decided.pose.memory):
+        keep_particles(journal, decided.person, decided.frames[-1], before, decided.pose)
     append_journal(journal, to_record(decided))
 
 
@@ -201,10 +201,10 @@ def _decided(records: list[dict[str, Any]], preset: PosePreset, journal: str | P
     """The rows of a journal's records; the last ones of each person with the particles that were kept."""
     last = {record["person"]: k for k, record in enumerate(records)}
     for k, record in enumerate(records):
-        particles = None
+        kept = None
         if journal is not None and last[record["person"]] == k:
-            particles = kept_particles(journal, record["person"], record["frames"][-1])
-        yield from_record(record, preset, particles)
+            kept = kept_particles(journal, record["person"], record["frames"][-1])
+        yield from_record(record, preset, *(kept or ()))
 
 
 def _assemble(rows: list[Decided]) -> PosedPeople:
@@ -218,15 +218,36 @@ def _assemble(rows: list[Decided]) -> PosedPeople:
     order = np.lexsort([persons, frames])
     frames, persons, states, costs, status = frames[order], persons[order], states[order], costs[order], status[order]
     bodies = {one.person: one.body for one in rows if one.body is not None}
+    missing = np.concatenate([none.astype(bool), *(_missing(one) for one in rows)])[order]
+    # An angle that no data shows is not a number, and so is all that hangs on it.
+    states = np.where(missing, np.nan, states)
     positions = np.full((len(frames), len(LANDMARKS), 3), np.nan)
     for person, body in bodies.items():
         fitted = (persons == person) & (status == "fitted")
         positions[fitted] = landmarks(body, states[fitted])
     unfitted = Counter((int(person), str(why)) for person, why in zip(persons, status, strict=True) if why != "fitted")
     notes = [f"person {who}: {n} frame{'s' if n > 1 else ''} without a pose: {why}" for (who, why), n in sorted(unfitted.items())]
+    notes += _limb_notes(persons, missing)
     return PosedPeople(
         PoseTable(frames, persons, positions),
         PoseStates(frames, persons, states, DOF_NAMES, {person: body.dimensions for person, body in bodies.items()}),
         costs,
         tuple(notes),
     )
+
+
+def _missing(one: Decided) -> np.ndarray:
+    return np.zeros((len(one.frames), len(DOF_NAMES)), bool) if one.missing is None else one.missing
+
+
+def _limb_notes(persons: np.ndarray, missing: np.ndarray) -> list[str]:
+    """In how many frames each person lacks which joints."""
+    notes = []
+    for person in np.unique(persons[missing.any(axis=1)]).tolist():
+        counts: dict[str, int] = {}
+        for dof, n in enumerate(missing[persons == person].sum(axis=0)):
+            joint = DOF_NAMES[dof].rpartition("_")[0]
+            counts[joint] = max(counts.get(joint, 0), int(n))
+        lacking = ", ".join(f"{joint} {n}" for joint, n in counts.items() if n)
+        notes.append(f"person {person}: frames in which the data does not show what hangs on a joint: {lacking}")
+    return notes

@@ -26,6 +26,7 @@ from hmc.pose.body.kinematics import landmarks
 from hmc.pose.body.model import BodyModel, neutral_state
 from hmc.pose.body.proportions import canton_body, default_body
 from hmc.pose.initialisation import first_poses, swapped_poses
+from hmc.pose.scalable.step import step_of
 
 __all__ = ["StartSettings", "Started", "estimate_height", "follow", "possible_heights", "start_person"]
 
@@ -184,7 +185,7 @@ def start_person(
     filt, anchor, state, costs, fit = found
     if stride > 1:
         filt = replace(filt, drift=make_filter(filt.body, preset, fps).drift)
-    states, infos = follow(frame_rng, filt, state, anchor * stride, targets)
+    states, infos = follow(frame_rng, filt, state, anchor * stride, targets, step_of(preset))
     return Started(filt, states, infos, costs, fit)
 
 

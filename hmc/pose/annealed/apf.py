@@ -6,7 +6,8 @@ Source: Canton (2009), sections 3.2 and 6.5; the symmetric cost, the local refin
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from hmc.pose.annealed.presets import PosePreset, drift
 from hmc.pose.annealed.rays import points_to_explain
 from hmc.pose.annealed.refine import refine, residual_values
 from hmc.pose.annealed.scores import (
+    ScoreMaps,
     ScoreTable,
     ScoreVariances,
     log_likelihood_factorised,
@@ -33,7 +35,18 @@ from hmc.voxels.grid import VoxelGrid
 #: Fewer surface voxels than this are noise, not a person.
 LEAST_SURFACE = 20
 
-__all__ = ["PoseFilter", "PoseInfo", "PoseState", "make_filter", "pose_init", "pose_step"]
+__all__ = [
+    "PoseFilter",
+    "PoseInfo",
+    "PoseState",
+    "make_filter",
+    "polish",
+    "pose_init",
+    "pose_step",
+    "score_maps",
+    "starting_particles",
+    "unseen",
+]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -49,7 +62,7 @@ class PoseFilter:
     drift : ndarray, shape (27,)
         P0, metres and radians.
     table : ScoreTable or None
-        The body's flesh, where the four scores are used.
+        The body's flesh, where the four scores are used, be it by scouts for missing limbs alone.
     room : ndarray, shape (2, 3), or None
         Where a body may be, metres; for the score Out.
     """
@@ -73,11 +86,14 @@ class PoseState:
     velocity : ndarray, shape (27,)
         Change of the estimate in the last frame; zero at the start.
     particles : ParticleState
+    memory : mapping of str to ndarray
+        What else a method keeps from frame to frame (`hmc.pose.scalable.step`).
     """
 
     state: np.ndarray
     velocity: np.ndarray
     particles: ParticleState
+    memory: Mapping[str, np.ndarray] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -97,6 +113,10 @@ class PoseInfo:
         None in a frame without hull.
     status : str
         ``"fitted"``, or why not.
+    missing : ndarray of bool, shape (27,), or None
+        Angles of limbs that the data does not show; None: of none.
+    levels : ndarray, shape (n_models, 27), or None
+        The estimates of a hierarchy's models, NaN where a model lacks the angle.
     """
 
     cost: float
@@ -104,6 +124,8 @@ class PoseInfo:
     evaluations: int
     annealed: AnnealedInfo | None
     status: str
+    missing: np.ndarray | None = None
+    levels: np.ndarray | None = None
 
 
 def make_filter(body: BodyModel, preset: PosePreset, fps: float, voxel_size_m: float = 0.03, room: np.ndarray | None = None) -> PoseFilter:
@@ -121,11 +143,17 @@ def make_filter(body: BodyModel, preset: PosePreset, fps: float, voxel_size_m: f
         Limits of the room, metres.
     """
     samples = body_points(body, surface_coordinates(body, preset.surface_samples))
-    table = None if preset.likelihood == "symmetric" else make_score_table(body, flesh_points(body, preset.density * voxel_size_m))
+    needs_flesh = preset.likelihood != "symmetric" or preset.limbs is not None
+    table = make_score_table(body, flesh_points(body, preset.density * voxel_size_m)) if needs_flesh else None
     return PoseFilter(body, samples, preset, preset.drift_scale * drift(fps), table, room)
 
 
-def pose_init(state: np.ndarray, velocity: np.ndarray | None = None, particles: ParticleState | None = None) -> PoseState:
+def pose_init(
+    state: np.ndarray,
+    velocity: np.ndarray | None = None,
+    particles: ParticleState | None = None,
+    memory: Mapping[str, np.ndarray] | None = None,
+) -> PoseState:
     """A filter's state on one pose.
 
     Parameters
@@ -135,10 +163,12 @@ def pose_init(state: np.ndarray, velocity: np.ndarray | None = None, particles: 
         Zero where left out.
     particles : ParticleState, optional
         All on `state` where left out.
+    memory : mapping, optional
+        As in `PoseState`.
     """
     state = np.asarray(state, float)
     velocity = np.zeros_like(state) if velocity is None else np.asarray(velocity, float)
-    return PoseState(state, velocity, particles or particle_init(state[None]))
+    return PoseState(state, velocity, particles or particle_init(state[None]), memory or {})
 
 
 def pose_step(rng: np.random.Generator, filt: PoseFilter, state: PoseState, target: HullTarget | None) -> tuple[PoseState, PoseInfo]:
@@ -158,35 +188,70 @@ def pose_step(rng: np.random.Generator, filt: PoseFilter, state: PoseState, targ
     info : PoseInfo
     """
     if target is None or len(target.surface) < LEAST_SURFACE:
-        return replace(state, velocity=np.zeros_like(state.velocity)), PoseInfo(np.nan, (), 0, None, "no hull of this person in this frame")
+        return unseen(state)
     preset = filt.preset
     low, high = filt.body.limits.low, filt.body.limits.high
-    likelihood = _by_symmetric_cost(rng, filt, target) if filt.table is None else _by_scores(filt, filt.table, target)
+    symmetric = preset.likelihood == "symmetric"
+    likelihood = _by_symmetric_cost(rng, filt, target) if symmetric or filt.table is None else _by_scores(filt, filt.table, target)
     if preset.refine is None:
         particles, annealed = annealed_step(rng, state.particles, likelihood, filt.drift, low, high, preset.annealed)
         estimate = annealed.estimate
-        cost = -annealed.best_log_likelihood if filt.table is None else np.nan
+        cost = -annealed.best_log_likelihood if symmetric else np.nan
         info = PoseInfo(cost, (), annealed.evaluations, annealed, "fitted")
         return PoseState(estimate, estimate - state.state, particles), info
-    # A refined estimate is better than any particle: the next frame's particles start from it, half by the no-motion and
-    # half by the smooth-motion assumption (Canton 2009, section 3.1.2.2).
-    predicted = np.clip(state.state + state.velocity, low, high)
-    starts = particle_init(np.stack([state.state, predicted]))
-    particles, annealed = annealed_step(rng, starts, likelihood, filt.drift, low, high, preset.annealed)
-    estimate, cost, searched, more = _polish(rng, filt, preset, [annealed.best, state.state], state.state, target)
+    particles, annealed = annealed_step(rng, starting_particles(filt, state), likelihood, filt.drift, low, high, preset.annealed)
+    estimate, cost, searched, more = polish(rng, filt, [annealed.best, state.state], state.state, target)
     info = PoseInfo(cost, tuple(searched), annealed.evaluations + more, annealed, "fitted")
     return PoseState(estimate, estimate - state.state, particles), info
 
 
-def _polish(rng, filt, preset, starts, anchor, target):
-    """Refine several starts, take the best, look for limbs that the hulls contradict."""
-    body, samples = filt.body, filt.samples
+def unseen(state: PoseState) -> tuple[PoseState, PoseInfo]:
+    """A frame without a hull of the person: the pose stays."""
+    return replace(state, velocity=np.zeros_like(state.velocity)), PoseInfo(np.nan, (), 0, None, "no hull of this person in this frame")
+
+
+def starting_particles(filt: PoseFilter, state: PoseState) -> ParticleState:
+    """Where a frame's particles start if the last estimate was refined.
+
+    It is better than any particle: half start by the no-motion and half by the smooth-motion assumption (Canton 2009, section 3.1.2.2).
+    """
+    predicted = np.clip(state.state + state.velocity, filt.body.limits.low, filt.body.limits.high)
+    return particle_init(np.stack([state.state, predicted]))
+
+
+def polish(
+    rng: np.random.Generator, filt: PoseFilter, starts: Sequence[np.ndarray], anchor: np.ndarray, target: HullTarget
+) -> tuple[np.ndarray, float, list[str], int]:
+    """Refine several starts, take the best, look for limbs that the hulls contradict.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    filt : PoseFilter
+        Of a preset with `refine`.
+    starts : sequence of ndarray, shape (27,)
+    anchor : ndarray, shape (27,)
+        Pose on which what no data speaks of is held.
+    target : HullTarget
+
+    Returns
+    -------
+    state : ndarray, shape (27,)
+    cost : float
+        Square metres.
+    searched : list of str
+    evaluations : int
+    """
+    preset, body, samples = filt.preset, filt.body, filt.samples
+    if preset.refine is None:
+        raise ValueError(f"preset '{preset.name}' has no `refine`")
     points = points_to_explain(rng, target, preset.fine_hull_points, preset.symmetric.ray_share)
     trials = [refine(body, samples, start, target, points, preset.symmetric, preset.refine, anchor=anchor) for start in starts]
     evaluations = sum(info.evaluations for _, info in trials)
     estimate, _ = min(trials, key=lambda trial: trial[1].cost_after)
     values = residual_values(body, samples, estimate, target, points, preset.symmetric)
-    cost, searched = float(values @ values), []
+    cost = float(values @ values)
+    searched: list[str] = []
     if preset.search is not None:
         searched = lost_limbs(rng, body, samples, estimate, target, points, preset.search)
         estimate, cost, more = search_limbs(
@@ -207,8 +272,7 @@ def _by_symmetric_cost(rng, filt, target):
 
 def _by_scores(filt, table, target):
     """The four scores against the tolerant hull."""
-    grid = VoxelGrid(target.origin - 0.5 * target.voxel_size_m, target.voxel_size_m, target.distance.shape)
-    maps = observe(target.tolerant, grid, filt.room)
+    maps = score_maps(target, filt.room)
     variances = ScoreVariances()
 
     def log_likelihood(states: np.ndarray) -> np.ndarray:
@@ -218,3 +282,9 @@ def _by_scores(filt, table, target):
         return log_likelihood_factorised(values, variances.by_part())
 
     return log_likelihood
+
+
+def score_maps(target: HullTarget, room: np.ndarray | None) -> ScoreMaps:
+    """The tolerant hull as the four scores read it; `room` is that of `PoseFilter`."""
+    grid = VoxelGrid(target.origin - 0.5 * target.voxel_size_m, target.voxel_size_m, target.distance.shape)
+    return observe(target.tolerant, grid, room)

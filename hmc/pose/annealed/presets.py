@@ -14,6 +14,9 @@ from hmc.pose.annealed.limb_search import SearchSettings
 from hmc.pose.annealed.refine import RefineSettings
 from hmc.pose.annealed.symmetric import SymmetricSettings
 from hmc.pose.body.joints import DOF_NAMES
+from hmc.pose.scalable.limbs import LimbSettings
+from hmc.pose.scalable.models import Inclusive
+from hmc.pose.scalable.structure import StructuralSettings
 
 __all__ = ["PRESETS", "PosePreset", "drift", "pose_preset"]
 
@@ -76,6 +79,12 @@ class PosePreset:
         Fit the person's dimensions over the first frames.
     start : {"hypotheses", "neutral"}
         Several starts with a left-right test, or the thesis's neutral pose with the heading of the walk.
+    models : tuple of Inclusive
+        Hierarchies for structural annealing in place of `annealed`; of several, each frame has the one that fits best. None by default.
+    structural : StructuralSettings
+        Where there are `models`.
+    limbs : LimbSettings or None
+        Limbs that the data does not show are left out and looked for.
     """
 
     name: str
@@ -93,6 +102,9 @@ class PosePreset:
     search: SearchSettings | None = None
     fit_body: FitBodySettings | None = None
     start: Literal["hypotheses", "neutral"] = "neutral"
+    models: tuple[Inclusive, ...] = ()
+    structural: StructuralSettings = field(default_factory=StructuralSettings)
+    limbs: LimbSettings | None = None
 
     def __post_init__(self) -> None:
         if self.refine is None and (self.search is not None or self.fit_body is not None or self.start == "hypotheses"):
@@ -118,6 +130,7 @@ PRESETS: dict[str, PosePreset] = {
         search=SearchSettings(),
         fit_body=FitBodySettings(),
         start="hypotheses",
+        structural=StructuralSettings(gamma=11.0, layers=2, inner=0.6, survival_rate=0.04),
     ),
 }
 

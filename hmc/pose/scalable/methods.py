@@ -1,0 +1,56 @@
+"""The scalable methods by name: what they add to a preset."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from hmc.errors import InputError
+from hmc.pose.annealed.presets import PosePreset
+from hmc.pose.scalable.limbs import LimbSettings
+from hmc.pose.scalable.model_file import read_hierarchy
+from hmc.pose.scalable.models import MODEL_1, MODEL_2, Inclusive, Unitive
+
+__all__ = ["SCALABLE_METHODS", "method_preset"]
+
+SCALABLE_METHODS = ("shbm-apf", "ddm-apf", "shbm-ddm-apf")
+_SHIPPED = {"1": (MODEL_1,), "2": (MODEL_2,), "auto": (MODEL_1, MODEL_2)}
+
+
+def method_preset(preset: PosePreset, method: str, models: Sequence[str] = ()) -> PosePreset:
+    """A preset with a method's scalable models.
+
+    Parameters
+    ----------
+    preset : PosePreset
+    method : {"apf", "shbm-apf", "ddm-apf", "shbm-ddm-apf"}
+    models : sequence of str
+        "1" (the default), "2", "auto" (the better of both in every frame), or files of hierarchies (`read_hierarchy`): at most one
+        inclusive one, for structural annealing, and one unitive one, for missing limbs.
+
+    Raises
+    ------
+    InputError
+        When the method has no use for a model, or two stand for the same.
+    """
+    structural: tuple[Inclusive, ...] | None = None
+    tree: Unitive | None = None
+    for text in models:
+        found = _SHIPPED[text] if text in _SHIPPED else read_hierarchy(text)
+        unitive = isinstance(found, Unitive)
+        if method not in SCALABLE_METHODS or (unitive and "ddm" not in method) or (not unitive and "shbm" not in method):
+            what = "unitive" if unitive else "inclusive"
+            uses = [name for name in SCALABLE_METHODS if ("ddm" if unitive else "shbm") in name]
+            raise InputError(f"--model {text}: method {method} has no use for an {what} model; {' and '.join(uses)} have")
+        if (unitive and tree is not None) or (not unitive and structural is not None):
+            raise InputError(f"--model {text}: there is another model of its kind already; give one")
+        if isinstance(found, Unitive):
+            tree = found
+        else:
+            structural = (found,) if isinstance(found, Inclusive) else found
+    if "shbm" in method:
+        preset = replace(preset, models=structural or _SHIPPED["1"])
+    if "ddm" in method:
+        limbs = preset.limbs or LimbSettings()
+        preset = replace(preset, limbs=limbs if tree is None else replace(limbs, tree=tree))
+    return preset

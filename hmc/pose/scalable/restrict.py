@@ -1,0 +1,147 @@
+"""The likelihood on some parts of the body only: the same functions, given a body that has no others.
+
+A model that lacks a limb neither fills voxels with it nor is asked to explain what the limb explains.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hmc.pose.annealed.apf import PoseFilter
+from hmc.pose.annealed.hull_target import HullTarget
+from hmc.pose.annealed.scores import ScoreMaps, ScoreTable, ScoreVariances, log_likelihood_factorised, log_likelihood_global, scores
+from hmc.pose.annealed.symmetric import BodyPoints, body_distance, symmetric_cost
+from hmc.pose.body.flesh import SurfaceSamples
+from hmc.pose.body.joints import SEGMENTS
+from hmc.pose.body.model import PARTS, BodyModel, Cones
+
+__all__ = ["ScoreData", "SymmetricData", "nearest_part", "part_body", "part_mask", "restrict_filter", "restrict_table", "restrict_target"]
+
+
+def part_mask(parts: Collection[str]) -> np.ndarray:
+    """Which of `hmc.pose.body.model.PARTS` these are: bool, shape (n_parts,)."""
+    return np.isin(PARTS, list(parts))
+
+
+def part_body(body: BodyModel, keep: np.ndarray) -> BodyModel:
+    """The same skeleton with the flesh of some parts only.
+
+    Parameters
+    ----------
+    body : BodyModel
+    keep : ndarray of bool, shape (n_parts,)
+    """
+    cones, rows = body.cones, keep[body.cones.part]
+    return replace(
+        body, cones=Cones(cones.segment[rows], cones.part[rows], cones.start[rows], cones.end[rows], cones.radii[rows], cones.across[rows])
+    )
+
+
+def restrict_filter(filt: PoseFilter, keep: np.ndarray) -> PoseFilter:
+    """A person's filter for a body of some parts only.
+
+    Parameters
+    ----------
+    filt : PoseFilter
+    keep : ndarray of bool, shape (n_parts,)
+    """
+    if keep.all():
+        return filt
+    surface, axes, cones = filt.samples.surface, filt.samples.axes, filt.body.cones
+    rows = keep[surface.part]
+    surface = SurfaceSamples(surface.points[rows], surface.normals[rows], surface.segment[rows], surface.part[rows])
+    # Points on the axes stay, so that overlap weighs as much as ever; those of missing parts meet nothing.
+    there = keep[[PARTS.index(SEGMENTS[segment].name) for segment in axes.segment]]
+    axes = replace(axes, against=axes.against[:, keep[cones.part]] & there[:, None])
+    table = None if filt.table is None else restrict_table(filt.table, keep)
+    return replace(filt, body=part_body(filt.body, keep), samples=BodyPoints(surface, axes), table=table)
+
+
+def restrict_table(table: ScoreTable, keep: np.ndarray) -> ScoreTable:
+    """The flesh of some parts only; scores of the others are then meaningless, and their double occupancy is 0.
+
+    Parameters
+    ----------
+    table : ScoreTable
+    keep : ndarray of bool, shape (n_parts,)
+    """
+    overlap = table.overlap
+    there = keep[overlap.pieces.part]
+    joined = there[overlap.joints.hanging] & there[overlap.joints.holding]
+    overlap = replace(overlap, pairs=overlap.pairs[there[overlap.pairs].all(axis=1)], joint_shares=overlap.joint_shares * joined)
+    return replace(table, blocks=tuple(block for block in table.blocks if keep[block[0]]), overlap=overlap)
+
+
+def nearest_part(body: BodyModel, state: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """The part of a posed body nearest to each hull point or ray.
+
+    Parameters
+    ----------
+    body : BodyModel
+    state : ndarray, shape (27,)
+    points : ndarray, shape (k, 3) or (k, 6)
+        As from `hmc.pose.annealed.rays.points_to_explain`.
+
+    Returns
+    -------
+    ndarray of int, shape (k,)
+        Places in `hmc.pose.body.model.PARTS`.
+    """
+    distances = [body_distance(part_body(body, one), state[None], points)[0] for one in np.eye(len(PARTS), dtype=bool)]
+    return np.argmin(distances, axis=0)
+
+
+def restrict_target(target: HullTarget, keep: np.ndarray) -> HullTarget:
+    """A frame's hulls for a body of some parts: without shanks nothing stands on the floor.
+
+    Parameters
+    ----------
+    target : HullTarget
+    keep : ndarray of bool, shape (n_parts,)
+    """
+    return target if keep[part_mask(["r_shank", "l_shank"])].all() else replace(target, floor_z=None)
+
+
+@dataclass(frozen=True)
+class SymmetricData:
+    """A frame as the symmetric cost reads it.
+
+    Parameters
+    ----------
+    target : HullTarget
+    points : ndarray, shape (k, 3) or (k, 6)
+        What has to be explained.
+    part : ndarray of int, shape (k,)
+        Which part is expected to explain each: the nearest one in the pose that is expected.
+    """
+
+    target: HullTarget
+    points: np.ndarray
+    part: np.ndarray
+
+    def log_likelihood(self, filt: PoseFilter, states: np.ndarray, keep: np.ndarray) -> np.ndarray:
+        """Of the kept parts of states (n, 27), shape (n,); `filt` is the whole body's."""
+        one, target = restrict_filter(filt, keep), restrict_target(self.target, keep)
+        points = self.points[keep[self.part]]
+        points = points if len(points) else self.points[:1]
+        return -symmetric_cost(one.body, one.samples, states, target, points, filt.preset.symmetric)
+
+
+@dataclass(frozen=True)
+class ScoreData:
+    """A frame as the four scores read it."""
+
+    maps: ScoreMaps
+
+    def log_likelihood(self, filt: PoseFilter, states: np.ndarray, keep: np.ndarray) -> np.ndarray:
+        """Of the kept parts of states (n, 27), shape (n,); `filt` is the whole body's, with a table of its flesh."""
+        if filt.table is None:
+            raise ValueError("`filt` has no table of its flesh")
+        values = scores(restrict_table(filt.table, keep), states, self.maps)[:, keep]
+        variances = ScoreVariances()
+        if filt.preset.likelihood == "global":
+            return log_likelihood_global(values, filt.table.counts[keep], variances.whole_body())
+        return log_likelihood_factorised(values, variances.by_part()[keep])
