@@ -1,0 +1,214 @@
+"""Voxels of a person to parts of a body. Hsiao (2008), section 3.1.4; naming, joining of pieces and doubts are ours."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from hmc.pose.spectral.eigenmap import eigenmap
+from hmc.pose.spectral.graph import GraphSettings, VoxelGraph, adjacency, build_graph, core_nodes
+from hmc.pose.spectral.growing import Branch, GrowSettings, baseline_growing, grow_branches
+from hmc.pose.spectral.parts import PART_NAMES, BranchShape, branch_shape, name_branches
+from hmc.pose.spectral.touching import touching_parts
+
+__all__ = ["Segmentation", "SegmentationSettings", "baseline_segmentation", "segment_body"]
+
+
+@dataclass(frozen=True)
+class SegmentationSettings:
+    """Parameters of the segmentation.
+
+    Parameters
+    ----------
+    graph : GraphSettings
+    grow : GrowSettings
+    dimensions : int
+        Of the eigenspace.
+    bridge_m : float
+        Pieces of the hull that are nearer than this to the largest one belong to it, metres.
+    least_voxels : int
+        Fewer voxels are no body.
+    """
+
+    graph: GraphSettings = field(default_factory=GraphSettings)
+    grow: GrowSettings = field(default_factory=GrowSettings)
+    dimensions: int = 6
+    bridge_m: float = 0.13
+    least_voxels: int = 150
+
+
+@dataclass(frozen=True)
+class Segmentation:
+    """Parts of a body.
+
+    Parameters
+    ----------
+    labels : ndarray of int, shape (n,)
+        Place in `PART_NAMES` of each voxel; -1 where it is unknown.
+    places : ndarray, shape (n, k)
+        Of the voxels in the eigenspace; NaN for voxels that are not joined to the body.
+    branches : dict of str to Branch
+        By the names of their parts; nodes are rows of the voxels.
+    shapes : dict of str to BranchShape
+    edges : ndarray of int, shape (m, 2)
+    doubts : tuple of str
+        What is missing or too many.
+    touching : tuple of str
+        Parts that touch where they should not.
+    status : str
+        ``"segmented"``, or why not.
+    """
+
+    labels: np.ndarray
+    places: np.ndarray
+    branches: dict[str, Branch]
+    shapes: dict[str, BranchShape]
+    edges: np.ndarray
+    doubts: tuple[str, ...]
+    touching: tuple[str, ...]
+    status: str
+
+    def voxels_of(self, part: str) -> np.ndarray:
+        """Rows of the voxels of a part."""
+        return np.flatnonzero(self.labels == PART_NAMES.index(part))
+
+
+def baseline_segmentation() -> SegmentationSettings:
+    """Sundaresan's method: plain weights, branches that end by outliers. Hsiao (2008), section 3.1.4.1."""
+    return SegmentationSettings(GraphSettings(shrink=0.0), baseline_growing())
+
+
+def segment_body(
+    voxels: np.ndarray,
+    points: np.ndarray,
+    voxel_size_m: float,
+    settings: SegmentationSettings | None = None,
+    votes: tuple[np.ndarray, np.ndarray] | None = None,
+) -> Segmentation:
+    """Cut a person's voxels into parts.
+
+    Parameters
+    ----------
+    voxels : ndarray of int, shape (n, 3)
+    points : ndarray, shape (n, 3)
+        Their centres, world, metres.
+    voxel_size_m : float
+    settings : SegmentationSettings, optional
+    votes : (votes, voters), optional
+        Colour votes over `face_neighbours` of the voxels (`hmc.pose.spectral.graph.color_votes`).
+
+    Returns
+    -------
+    Segmentation
+        Its status says why where there is none.
+    """
+    settings = settings or SegmentationSettings()
+    n = len(voxels)
+    if n < settings.least_voxels:
+        return _nothing(n, f"{n} voxels are too few for a body")
+    graph = bridged(build_graph(voxels, voxel_size_m, settings.graph, votes), points, voxel_size_m, settings)
+    pieces = connected_components(adjacency(graph), directed=False)[1]
+    body = pieces == np.bincount(pieces).argmax()
+    if np.count_nonzero(body) < settings.least_voxels:
+        return _nothing(n, "the voxels fall into small pieces")
+    inside, number = np.flatnonzero(body), np.cumsum(body) - 1
+    kept = body[graph.edges].all(1)
+    graph = VoxelGraph(voxels[inside], number[graph.edges[kept]], graph.weights[kept])
+    places = eigenmap(adjacency(graph), settings.dimensions).vectors
+    core = core_nodes(graph.voxels, voxel_size_m, settings.graph.core_m)
+    branches = grow_branches(places, graph.edges, core, settings.grow)
+    labels, branches = _tidy(branches, graph.edges, len(inside))
+    shapes = [branch_shape(branch, points[inside], voxel_size_m) for branch in branches]
+    rest = points[inside][labels < 0]
+    names, doubts = name_branches(shapes, rest.mean(0) if len(rest) else points[inside].mean(0))
+    along = np.zeros(len(inside))
+    for branch in branches:
+        along[branch.nodes] = (branch.sites - branch.sites.min()) / max(np.ptp(branch.sites), 1e-12)
+    known = [k for k, name in enumerate(names) if name]
+    stars = np.zeros(len(inside), int)
+    for place, k in enumerate(known):
+        stars[labels == k] = place + 1
+    touching = touching_parts(stars, graph.edges, along, ("trunk", *(names[k] for k in known)))
+    out = np.full(n, -1)
+    trunk = labels < 0
+    if settings.grow.stop == "outliers":
+        # Sundaresan's method leaves what it does not fit; what it takes for a branch and is no limb is the trunk.
+        trunk = np.isin(labels, [k for k, name in enumerate(names) if not name])
+    part = np.where(trunk, 0, -1)
+    for k in known:
+        part[labels == k] = PART_NAMES.index(names[k])
+    out[inside] = part
+    all_places = np.full((n, places.shape[1]), np.nan)
+    all_places[inside] = places
+    if n - len(inside) > 0.1 * n:
+        doubts = (*doubts, f"{n - len(inside)} of {n} voxels are apart from the body")
+    edges = inside[graph.edges]
+    moved = {names[k]: Branch(inside[branches[k].nodes], branches[k].sites) for k in known}
+    return Segmentation(out, all_places, moved, {names[k]: shapes[k] for k in known}, edges, doubts, touching, "segmented")
+
+
+def bridged(graph: VoxelGraph, points: np.ndarray, voxel_size_m: float, settings: SegmentationSettings) -> VoxelGraph:
+    """Join pieces of the hull that hardly lie apart: a silhouette that lost a wrist must not cost the hand.
+
+    Parameters
+    ----------
+    graph : VoxelGraph
+    points : ndarray, shape (n, 3)
+        Centres of the voxels, metres.
+    voxel_size_m : float
+    settings : SegmentationSettings
+    """
+    edges, weights = [graph.edges], [graph.weights]
+    while True:
+        joined = VoxelGraph(graph.voxels, np.concatenate(edges), np.concatenate(weights))
+        pieces = connected_components(adjacency(joined), directed=False)[1]
+        sizes = np.bincount(pieces)
+        body = np.flatnonzero(pieces == sizes.argmax())
+        others = np.flatnonzero(pieces != sizes.argmax())
+        if len(others) == 0:
+            return joined
+        distance, nearest = cKDTree(points[body]).query(points[others], distance_upper_bound=settings.bridge_m)
+        found = np.flatnonzero(np.isfinite(distance))
+        if len(found) == 0:
+            return joined
+        piece = pieces[others[found]]
+        # Of each piece, the pairs that are hardly farther apart than the nearest one.
+        least = np.full(len(sizes), np.inf)
+        np.minimum.at(least, piece, distance[found])
+        found = found[distance[found] < least[piece] + 0.8 * voxel_size_m]
+        edges.append(np.stack([others[found], body[nearest[found]]], axis=1).astype(graph.edges.dtype))
+        weights.append(np.full(len(found), 1.0))
+
+
+def _tidy(branches: list[Branch], edges: np.ndarray, n: int) -> tuple[np.ndarray, list[Branch]]:
+    """Number of the branch of each node, -1 for none, when scraps that a branch cuts off the trunk were given to that branch."""
+    labels = np.full(n, -1)
+    for k, branch in enumerate(branches):
+        labels[branch.nodes] = k
+    rest = labels < 0
+    a, b = edges[rest[edges].all(1)].T
+    pieces = connected_components(csr_array((np.ones(len(a), np.int8), (a, b)), shape=(n, n)), directed=False)[1]
+    if not rest.any():
+        return labels, branches
+    trunk = np.bincount(pieces[rest]).argmax()
+    scraps = rest & (pieces != trunk)
+    extra: dict[int, list[int]] = {}
+    if scraps.any():
+        both = np.concatenate([edges, edges[:, ::-1]])
+        both = both[scraps[both[:, 0]] & (labels[both[:, 1]] >= 0)]
+        for piece in np.unique(pieces[scraps]):
+            neighbours = labels[both[pieces[both[:, 0]] == piece, 1]]
+            if len(neighbours):
+                owner = int(np.bincount(neighbours).argmax())
+                members = np.flatnonzero(scraps & (pieces == piece))
+                labels[members] = owner
+                extra.setdefault(owner, []).extend(members.tolist())
+    return labels, branches
+
+
+def _nothing(n: int, why: str) -> Segmentation:
+    return Segmentation(np.full(n, -1), np.full((n, 0), np.nan), {}, {}, np.zeros((0, 2), int), (), (), why)

@@ -1,0 +1,137 @@
+"""How far a skeleton model is from skeleton curves. Hsiao (2008), section 3.2.2.1 and Eq. 3-27."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import permutations
+
+import numpy as np
+
+from hmc.pose.swarm.model import SkeletonModel, joint_shares, part_chains, part_lengths, segment_ends
+
+__all__ = ["MODEL_PARTS", "Observed", "best_assignments", "observe_curves", "pair_errors", "skeleton_error"]
+
+#: Parts of the model.
+MODEL_PARTS: tuple[str, ...] = ("torso", "head", "l_arm", "r_arm", "l_leg", "r_leg")
+#: What each part of a segmentation may be.
+KINDS: dict[str, tuple[int, ...]] = {"trunk": (0,), "head": (1,), "arm_1": (2, 3), "arm_2": (2, 3), "leg_1": (4, 5), "leg_2": (4, 5)}
+#: A curve covers at least this share of its part, however short it is.
+LEAST_SHARE = 0.3
+
+
+@dataclass(frozen=True)
+class Observed:
+    """Curves to which a model is fitted.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Parts that were found.
+    nodes : ndarray, shape (m, n, 3)
+        n equally spaced nodes of each curve, metres.
+    pairs : ndarray of int, shape (q, 2)
+        Curve and part of the model that may belong together.
+    blends : ndarray, shape (q, n, 3)
+        The model's node that corresponds to each of the curve's, as shares of the start, the joint and the end of the part.
+    choices : ndarray of int, shape (k, m)
+        Every one-to-one assignment that is allowed: the pair of each curve.
+    """
+
+    names: tuple[str, ...]
+    nodes: np.ndarray
+    pairs: np.ndarray
+    blends: np.ndarray
+    choices: np.ndarray
+
+    def only(self, names: tuple[str, ...]) -> Observed:
+        """Some of the curves."""
+        rows = [k for k, name in enumerate(self.names) if name in names]
+        kept = np.flatnonzero(np.isin(self.pairs[:, 0], rows))
+        pairs = np.stack([np.searchsorted(rows, self.pairs[kept, 0]), self.pairs[kept, 1]], axis=1)
+        choices = np.unique(np.searchsorted(kept, self.choices[:, rows]), axis=0)
+        return Observed(tuple(self.names[k] for k in rows), self.nodes[rows], pairs, self.blends[kept], choices)
+
+    def parts_of(self, choice: int) -> dict[str, str]:
+        """The part of the model that each curve is in an assignment."""
+        return {name: MODEL_PARTS[self.pairs[pair, 1]] for name, pair in zip(self.names, self.choices[choice], strict=True)}
+
+
+def observe_curves(
+    model: SkeletonModel, curves: Mapping[str, np.ndarray], n: int = 6, named: bool = True, from_tip: bool = True
+) -> Observed:
+    """Sample the curves, and say which nodes of the model theirs correspond to.
+
+    Parameters
+    ----------
+    model : SkeletonModel
+    curves : mapping of str to ndarray, shape (any, 3)
+        By part, as from `hmc.pose.spectral.skeleton.extract_skeletons`; nodes equally spaced, the end at the trunk first.
+    n : int
+        Nodes of each that count.
+    named : bool
+        Whether a curve's name says what it may be: arms stay arms. Else every one-to-one assignment is allowed.
+    from_tip : bool
+        Whether the curve of a limb is that of its outer end and as much of the rest as it is long: a limb's curve begins where it leaves
+        the trunk. Else curve and part correspond from end to end, as in the thesis.
+    """
+    names = tuple(curves)
+    nodes = np.array([curve[np.rint(np.linspace(0, len(curve) - 1, n)).astype(int)] for curve in curves.values()]).reshape(-1, n, 3)
+    allowed = tuple(KINDS[name] for name in names) if named else (tuple(range(6)),) * len(names)
+    pairs = np.array([(k, part) for k, parts in enumerate(allowed) for part in parts], int).reshape(-1, 2)
+    lengths, joints = part_lengths(model), joint_shares(model)
+    blends = np.zeros((len(pairs), n, 3))
+    for q, (k, part) in enumerate(pairs):
+        length = float(np.linalg.norm(np.diff(nodes[k], axis=0), axis=1).sum())
+        share = np.clip(length / lengths[part], LEAST_SHARE, 1.0) if from_tip and part >= 2 else 1.0
+        at = np.linspace(1 - share, 1, n)
+        lower = np.clip((at - joints[part]) / (1 - joints[part]), 0, 1)
+        upper = np.clip(at / joints[part], 0, 1)
+        blends[q] = np.stack([1 - upper, upper - lower, lower], axis=1)
+    return Observed(names, nodes, pairs, blends, best_assignments(pairs, allowed))
+
+
+def best_assignments(pairs: np.ndarray, allowed: tuple[tuple[int, ...], ...]) -> np.ndarray:
+    """Every one-to-one assignment of curves to allowed parts, as rows of `pairs`: (k, m)."""
+    row = {(int(k), int(part)): q for q, (k, part) in enumerate(pairs)}
+    found = [
+        [row[k, part] for k, part in enumerate(one)]
+        for one in permutations(range(len(MODEL_PARTS)), len(allowed))
+        if all(part in may for part, may in zip(one, allowed, strict=True))
+    ]
+    return np.array(found, int).reshape(-1, len(allowed))
+
+
+def pair_errors(model: SkeletonModel, states: np.ndarray, observed: Observed) -> np.ndarray:
+    """Eq. 3-27 for every pair, divided by the number of nodes: mean distance of corresponding nodes, metres, shape (n, q).
+
+    A curve's nodes correspond in the order in which the sum is smaller; those of limbs are known to begin at the trunk.
+    """
+    chains = part_chains(*segment_ends(model, states))
+    points = observed.blends @ chains[:, observed.pairs[:, 1]]
+    nodes = observed.nodes[observed.pairs[:, 0]]
+    same = np.sqrt(((points - nodes) ** 2).sum(-1)).mean(-1)
+    turned = np.sqrt(((points - nodes[:, ::-1]) ** 2).sum(-1)).mean(-1)
+    return np.minimum(same, turned)
+
+
+def skeleton_error(model: SkeletonModel, states: np.ndarray, observed: Observed) -> tuple[np.ndarray, np.ndarray]:
+    """Error of states under the best one-to-one assignment.
+
+    Parameters
+    ----------
+    model : SkeletonModel
+    states : ndarray, shape (n, 23)
+    observed : Observed
+
+    Returns
+    -------
+    errors : ndarray, shape (n,)
+        Mean over the curves, metres.
+    choice : ndarray of int, shape (n,)
+        Row of ``observed.choices``.
+    """
+    errors = pair_errors(model, states, observed)
+    means = errors[:, observed.choices].mean(-1)
+    best = means.argmin(1)
+    return means[np.arange(len(states)), best], best

@@ -1,0 +1,227 @@
+"""Fitting the skeleton model to one frame's curves: hierarchical swarms, then fine tuning part by part.
+
+Source: Hsiao (2008), section 3.2.2.2, Table 3-3 and section 3.2.2.4.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hmc.pose.swarm.error import Observed, skeleton_error
+from hmc.pose.swarm.model import ANGLE_INDEX, ANGLES, N_PARAMETERS, SkeletonModel
+from hmc.pose.swarm.pso import PsoSettings, pso_run
+
+__all__ = ["FitSettings", "Fitted", "Prior", "bounds_around", "fine_tune", "fit_flat", "fit_hierarchical", "rest_state"]
+
+_TORSO = tuple(range(7))
+
+
+def _of(*prefixes: str) -> tuple[int, ...]:
+    return tuple(index for name, index in ANGLE_INDEX.items() if name.startswith(prefixes))
+
+
+_ARMS, _LEGS = _of("l_shoulder", "r_shoulder", "l_elbow", "r_elbow"), _of("l_hip", "r_hip", "l_knee", "r_knee")
+#: Stages of Table 3-3: parameters that are free, and curves that count.
+STAGES: tuple[tuple[tuple[int, ...], tuple[str, ...]], ...] = (
+    ((0, 1, 2), ("trunk",)),
+    (_TORSO, ("trunk",)),
+    ((*_TORSO, *_of("neck")), ("trunk", "head")),
+    ((*_TORSO, *_of("neck"), *_ARMS), ("trunk", "head", "arm_1", "arm_2")),
+    (tuple(range(N_PARAMETERS)), ("trunk", "head", "arm_1", "arm_2", "leg_1", "leg_2")),
+)
+#: Parameters that are tuned one after the other.
+PARTS: tuple[tuple[int, ...], ...] = (
+    _TORSO, _of("neck"), _of("l_shoulder", "l_elbow"), _of("r_shoulder", "r_elbow"), _of("l_hip", "l_knee"), _of("r_hip", "r_knee"),
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Prior:
+    """What a pose is like where the curves do not say: near a known one.
+
+    Parameters
+    ----------
+    state : ndarray, shape (23,)
+    weight : float
+        Metres of error a radian of mean absolute difference over the angles.
+    """
+
+    state: np.ndarray
+    weight: float = 0.004
+
+
+@dataclass(frozen=True)
+class FitSettings:
+    """How a frame is fitted.
+
+    Parameters
+    ----------
+    stages : tuple of (int, int)
+        Particles and iterations of the five stages.
+    swarm : PsoSettings
+        What else says how the swarms move.
+    tune_particles, tune_iterations : int
+        Of each part's fine tuning.
+    tune_m, tune_rad : float
+        How far fine tuning looks for positions and angles.
+    tune_rounds : int
+    """
+
+    stages: tuple[tuple[int, int], ...] = ((12, 12), (24, 20), (24, 12), (40, 40), (50, 50))
+    swarm: PsoSettings = field(default_factory=lambda: PsoSettings(topology="global"))
+    tune_particles: int = 14
+    tune_iterations: int = 12
+    tune_m: float = 0.04
+    tune_rad: float = 0.3
+    tune_rounds: int = 1
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A fitted frame.
+
+    Parameters
+    ----------
+    state : ndarray, shape (23,)
+    error_m : float
+        Mean distance of corresponding nodes (Eq. 3-27), metres.
+    parts : dict of str to str
+        Which part of the model each curve is.
+    evaluations : int
+        Of the error.
+    """
+
+    state: np.ndarray
+    error_m: float
+    parts: dict[str, str]
+    evaluations: int
+
+
+def rest_state(model: SkeletonModel, centre: np.ndarray, up: np.ndarray, spin: float = 0.0) -> np.ndarray:
+    """A body with hanging arms, its torso's centre here and its axis along `up`, shape (23,)."""
+    state = np.zeros(N_PARAMETERS)
+    state[:3] = centre
+    state[3:6] = centre + 0.5 * model.torso * up / max(float(np.linalg.norm(up)), 1e-9)
+    state[6] = spin
+    for name, degrees in (
+        ("l_shoulder_x", -80),
+        ("r_shoulder_x", 80),
+        ("l_elbow_z", -15),
+        ("r_elbow_z", 15),
+        ("l_knee_y", 5),
+        ("r_knee_y", 5),
+    ):
+        state[ANGLE_INDEX[name]] = np.radians(degrees)
+    state[7:] = np.clip(state[7:], model.low, model.high)
+    return state
+
+
+def bounds_around(model: SkeletonModel, state: np.ndarray, metres: float, radians: float) -> tuple[np.ndarray, np.ndarray]:
+    """A box about a state, its angles within the limits of the joints (motion constraints, section 3.2.2.3)."""
+    reach = np.concatenate([np.full(6, metres), np.full(1 + len(ANGLES), radians)])
+    low, high = state - reach, state + reach
+    low[7:], high[7:] = np.clip(low[7:], model.low, model.high), np.clip(high[7:], model.low, model.high)
+    return low, high
+
+
+def fit_hierarchical(
+    rng: np.random.Generator,
+    model: SkeletonModel,
+    observed: Observed,
+    start: np.ndarray,
+    settings: FitSettings | None = None,
+    spin_range: float = np.pi,
+) -> Fitted:
+    """Fit a frame of which nothing is known but the rough place: stage by stage, each with more parameters, then fine tuning.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    model : SkeletonModel
+    observed : Observed
+    start : ndarray, shape (23,)
+        About where the torso is; the other angles are what is likely where curves are missing.
+    settings : FitSettings, optional
+    spin_range : float
+        How far from its start the spin is looked for, radians.
+
+    Returns
+    -------
+    Fitted
+    """
+    settings = settings or FitSettings()
+    state, evaluations = start.copy(), 0
+    prior = Prior(start)
+    for stage, ((free, names), (particles, iterations)) in enumerate(zip(STAGES, settings.stages, strict=True)):
+        seen = observed.only(names)
+        if not seen.names:
+            continue
+        low, high = bounds_around(model, state, 0.25 if stage == 0 else 0.12, 4 * np.pi)
+        # What earlier stages found is looked for nearby, what is new everywhere.
+        known = set(STAGES[stage - 1][0]) if stage else set()
+        near = bounds_around(model, state, 0.12, 0.6)
+        for index in known - {6}:
+            low[index], high[index] = near[0][index], near[1][index]
+        low[6], high[6] = start[6] - spin_range, start[6] + spin_range
+        swarm = _sized(settings.swarm, particles, iterations)
+        state, more = _optimise(rng, model, seen, state, np.array(free), low, high, swarm, prior)
+        evaluations += more
+    tuned = fine_tune(rng, model, observed, state, settings, prior)
+    return Fitted(tuned.state, tuned.error_m, tuned.parts, evaluations + tuned.evaluations)
+
+
+def fit_flat(
+    rng: np.random.Generator, model: SkeletonModel, observed: Observed, start: np.ndarray, swarm: PsoSettings, spin_range: float = np.pi
+) -> Fitted:
+    """All 23 parameters at once, for comparison; arguments as for `fit_hierarchical`."""
+    low, high = bounds_around(model, start, 0.25, 4 * np.pi)
+    low[6], high[6] = start[6] - spin_range, start[6] + spin_range
+    state, evaluations = _optimise(rng, model, observed, start, np.arange(N_PARAMETERS), low, high, swarm, Prior(start))
+    return _fitted(model, observed, state, evaluations)
+
+
+def fine_tune(
+    rng: np.random.Generator, model: SkeletonModel, observed: Observed, state: np.ndarray, settings: FitSettings, prior: Prior | None = None
+) -> Fitted:
+    """Section 3.2.2.4: torso, head, arms and legs one after the other, near where they are."""
+    evaluations = 0
+    swarm = _sized(settings.swarm, settings.tune_particles, settings.tune_iterations)
+    for _ in range(settings.tune_rounds):
+        for free in PARTS:
+            low, high = bounds_around(model, state, settings.tune_m, settings.tune_rad)
+            state, more = _optimise(rng, model, observed, state, np.array(free), low, high, swarm, prior)
+            evaluations += more
+    return _fitted(model, observed, state, evaluations)
+
+
+def _sized(swarm: PsoSettings, particles: int, iterations: int) -> PsoSettings:
+    return PsoSettings(
+        particles, iterations, swarm.inertia, swarm.own, swarm.shared, swarm.topology, swarm.swarms, swarm.fastest, swarm.stop_spread
+    )
+
+
+def _optimise(rng, model, observed, state, free, low, high, swarm, prior):
+    """The state with some parameters optimised, and the number of evaluations."""
+
+    def cost(values: np.ndarray) -> np.ndarray:
+        states = np.repeat(state[None], len(values), axis=0)
+        states[:, free] = values
+        errors = skeleton_error(model, states, observed)[0]
+        if prior is not None:
+            errors = errors + prior.weight * np.abs(states[:, 7:] - prior.state[7:]).mean(1)
+        return errors
+
+    found = pso_run(rng, cost, low[free], high[free], swarm, state[None, free])
+    out = state.copy()
+    out[free] = found.leader
+    # Only the direction of the neck counts: keep it on the torso.
+    axis = out[3:6] - out[:3]
+    out[3:6] = out[:3] + 0.5 * model.torso * axis / max(float(np.linalg.norm(axis)), 1e-9)
+    return out, found.evaluations
+
+
+def _fitted(model: SkeletonModel, observed: Observed, state: np.ndarray, evaluations: int) -> Fitted:
+    errors, choice = skeleton_error(model, state[None], observed)
+    return Fitted(state, float(errors[0]), observed.parts_of(int(choice[0])), evaluations)
