@@ -79,9 +79,9 @@ def spread(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def cones_near(
-    cones: Cones, maps: ConeMaps, points: np.ndarray, reach: np.ndarray | float, directions: np.ndarray | None = None
-) -> np.ndarray:
-    """Which cones may come within `reach` of which points, or of the rays through them, in some particle: bool, shape (n_cones, m).
+    cones: Cones, maps: ConeMaps, points: np.ndarray, reach: np.ndarray | float, directions: np.ndarray | None = None, sway: float = 0.0
+) -> tuple[np.ndarray, np.ndarray]:
+    """Which cones may come within `reach` of which points, or of the rays through them, in some particle, and what some cone holds in all.
 
     The axis of every particle's cone lies as near to the mean axis as its ends do.
 
@@ -94,19 +94,55 @@ def cones_near(
         Metres.
     directions : ndarray, shape (m, 3), optional
         Of the rays, of unit length; zero for points that are none.
+    sway : float
+        The ends of the axes may go this much farther, metres.
+
+    Returns
+    -------
+    near : ndarray of bool, shape (n_cones, m)
+    held : ndarray of bool, shape (m,)
+        Points in some cone, or rays that meet it, in every particle.
     """
     start, far_start = spread(maps.start)
     end, far_end = spread(maps.start + maps.axis * cones.lengths.astype(maps.axis.dtype)[:, None, None])
-    axis = end - start
-    between = points - start[:, None]
-    along, squared = np.einsum("cmi,ci->cm", between, axis), np.sum(axis**2, axis=1)[:, None]
+    far = np.maximum(far_start, far_end)[:, None] + sway + 1e-4
+    # In single precision, counted from the points' middle.
+    origin = points.mean(axis=0)
+    points, start, axis = ((points - origin).astype(np.float32), (start - origin).astype(np.float32), (end - start).astype(np.float32))
+    # Scalar products of the way from the start to the point, of the axis and of the ray: matrix products, unlike the vectors themselves.
+    along = axis @ points.T
+    along -= np.einsum("ci,ci->c", axis, start)[:, None]
+    apart = start @ points.T
+    apart *= -2
+    apart += np.einsum("mi,mi->m", points, points)
+    apart += np.einsum("ci,ci->c", start, start)[:, None]
+    squared = np.einsum("ci,ci->c", axis, axis)[:, None]
     if directions is not None:
         # Seen along the ray, both get shorter by what lies along it.
+        directions = directions.astype(np.float32)
+        shift = start @ directions.T
+        np.subtract(np.einsum("mi,mi->m", points, directions), shift, out=shift)
         axis_along = axis @ directions.T
-        along -= np.einsum("cmi,mi->cm", between, directions) * axis_along
-        squared = squared - axis_along**2
-    between -= np.clip(along / np.maximum(squared, 1e-12), 0, 1)[:, :, None] * axis[:, None]
-    if directions is not None:
-        between -= np.einsum("cmi,mi->cm", between, directions)[:, :, None] * directions
-    margin = np.maximum(far_start, far_end) + cones.radii.max(axis=(1, 2)) + 1e-4
-    return np.einsum("cmi,cmi->cm", between, between) < (margin[:, None] + reach) ** 2
+        along -= shift * axis_along
+        shift *= shift
+        apart -= shift
+        axis_along *= axis_along
+        squared = squared - axis_along
+    squared = np.maximum(squared, np.float32(1e-9))
+    at = along / squared
+    np.maximum(at, 0, out=at)
+    np.minimum(at, 1, out=at)
+    along *= 2
+    along -= at * squared
+    along *= at
+    apart -= along
+    near = apart < ((far + cones.radii.max(axis=(1, 2))[:, None] + reach) ** 2).astype(np.float32)
+    # Well inside the thinnest end, and too far from either end for any particle's axis to be passed beyond it.
+    thinnest, length = np.maximum(cones.radii.min(axis=(1, 2))[:, None] - far, 0), cones.lengths[:, None]
+    some = np.flatnonzero((thinnest > 0) & (8 * far < length))
+    held = np.zeros(len(points), bool)
+    if len(some):
+        apart, at, seen = apart[some], at[some], np.broadcast_to(np.sqrt(squared), apart.shape)[some]
+        inside = (apart < thinnest[some] ** 2) & (apart < 0.25 * seen**2)
+        held = (inside & (np.minimum(at, 1 - at) * seen > 4 * far[some])).any(axis=0)
+    return near, held

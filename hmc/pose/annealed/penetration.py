@@ -114,7 +114,7 @@ def depths_placed(body: BodyModel, axes: AxisPoints, placed: np.ndarray, maps: C
     """
     points = _place_points(axes, placed)
     middle, far = spread(points)
-    cone, point = np.nonzero(cones_near(body.cones, maps, middle, far) & axes.against.T)
+    cone, point = np.nonzero(cones_near(body.cones, maps, middle, far)[0] & axes.against.T)
     depth = np.empty((len(cone), placed.shape[-1]), placed.dtype)
     step = max(1, CHUNK // placed.shape[-1])
     for begin in range(0, len(cone), step):

@@ -12,16 +12,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hmc.pose.annealed.cone_maps import ConeMaps, cone_maps, to_cones
+from hmc.pose.annealed.cone_maps import cone_maps
 from hmc.pose.annealed.floor import floor_gap, lowest_support
 from hmc.pose.annealed.hull_target import HullTarget, distance_gradient
+from hmc.pose.annealed.nearest_cone import Candidates, candidates, nearest_cones
 from hmc.pose.annealed.penetration import penetration_depth, penetration_rows
-from hmc.pose.annealed.rays import places_and_directions, slide_to_axis
-from hmc.pose.annealed.symmetric import POSTURE, BodyPoints, SymmetricSettings, body_distance, cone_shapes, squared_distance
+from hmc.pose.annealed.symmetric import POSTURE, BodyPoints, SymmetricSettings, body_distance
 from hmc.pose.body.flesh import place_points
 from hmc.pose.body.joints import N_DOF
 from hmc.pose.body.kinematics import dof_masks, joint_twists, segment_transforms
-from hmc.pose.body.model import BodyModel, Cones
+from hmc.pose.body.model import BodyModel
 
 __all__ = ["RefineInfo", "RefineSettings", "refine", "residual_rows", "residual_values"]
 
@@ -103,8 +103,8 @@ def refine(
         deviation = np.r_[np.full(3, 0.1), np.full(N_DOF - 3, 0.5)]
     hold = settings.stay_weight / deviation**2
 
-    def evaluate(s):
-        found = _distances(body, samples, s, target, hull_points, cost_settings)
+    def evaluate(s, before=None):
+        found = _distances(body, samples, s, target, hull_points, cost_settings, before)
         return found, float(found.residuals @ found.residuals + hold @ (s - anchor) ** 2)
 
     found, cost = evaluate(state)
@@ -123,7 +123,7 @@ def refine(
         step = np.zeros(N_DOF)
         step[active] = -np.linalg.solve(matrix, gradient[active])
         trial = np.clip(state + np.clip(step, -0.5, 0.5), low, high)
-        trial_found, trial_cost = evaluate(trial)
+        trial_found, trial_cost = evaluate(trial, found.pairs)
         evaluations += 1
         improved = trial_cost < cost
         if improved:
@@ -177,32 +177,39 @@ class _Distances:
     residuals : ndarray, shape (n + 27,)
         The posture's last.
     distance, cap, weight : ndarray, shape (n,)
-    directions, places : tuple of ndarray, shape (..., 3)
+    rows : ndarray of int, shape (m,)
+        Which of these distances may change with the state.
+    directions, places : tuple of ndarray, of shape (m, 3) in all
         The way in which a point has to move to add to the distance, and where the point is.
-    movers : tuple of ndarray of int, shape (...)
+    movers : tuple of ndarray of int, of shape (m,) in all
         Rows of `_RELATIVE`.
     axes, centres : ndarray, shape (27, 3)
         The joints' twists.
+    pairs : Candidates
+        For poses near this one.
     """
 
     residuals: np.ndarray
     distance: np.ndarray
     cap: np.ndarray
     weight: np.ndarray
+    rows: np.ndarray
     directions: tuple[np.ndarray, ...]
     places: tuple[np.ndarray, ...]
     movers: tuple[np.ndarray, ...]
     axes: np.ndarray
     centres: np.ndarray
+    pairs: Candidates
 
 
-def _distances(body, samples, state, target, hull_points, settings) -> _Distances:
+def _distances(body, samples, state, target, hull_points, settings, before=None) -> _Distances:
     axes, centres, rotations, positions = joint_twists(body, state)
     maps = cone_maps(body.cones, np.concatenate([rotations, positions[..., None]], axis=-1)[..., None])
     carrier = samples.surface.segment
     points = np.einsum("nij,nj->ni", rotations[carrier], samples.surface.points) + positions[carrier]
     outside, slope = distance_gradient(target, points)
-    unexplained, towards, nearest, hull_places = _hull_to_body(body.cones, maps, hull_points)
+    pairs = candidates(body.cones, maps, hull_points, settings.cap_m, before)
+    unexplained, pulls, towards, nearest, hull_places = nearest_cones(body.cones, maps, pairs)
     depth, outward, axis_places, segment, other = penetration_rows(body, samples.axes, rotations, positions, maps)
     gap, lowest, shank = np.zeros(0), np.zeros((0, 3)), np.zeros(0, int)
     if target.floor_z is not None:
@@ -219,29 +226,33 @@ def _distances(body, samples, state, target, hull_points, settings) -> _Distance
         distance=distance,
         cap=cap,
         weight=weight,
+        rows=np.concatenate([np.arange(len(outside)), len(outside) + pulls, np.arange(len(outside) + len(unexplained), len(distance))]),
         directions=(slope, towards, -outward, np.tile([0.0, 0.0, 1.0], (len(gap), 1))),
         places=(points, hull_places, axis_places, lowest),
         # What carries both parts leaves them where they are to one another.
         movers=(_TO_WORLD + carrier, _TO_WORLD + nearest, len(_MASKS) * other + segment, _TO_WORLD + shank),
         axes=axes,
         centres=centres,
+        pairs=pairs,
     )
 
 
 def _pulls(found: _Distances, settings: SymmetricSettings) -> tuple[np.ndarray, np.ndarray]:
     """Which residuals change with the state, and how: shapes (m,) and (m, 27)."""
-    rows = np.flatnonzero((found.distance != 0) & (found.distance < found.cap))
+    distance = found.distance[found.rows]
+    chosen = np.flatnonzero((distance != 0) & (distance < found.cap[found.rows]))
+    rows = found.rows[chosen]
     wrenches = np.empty((len(rows), 6))
-    directions = np.concatenate(found.directions).take(rows, axis=0)
+    directions = np.concatenate(found.directions).take(chosen, axis=0)
     directions *= found.weight[rows, None]
     # g . (axis x (p - centre)) = (p x g) . axis - g . (axis x centre)
-    wrenches[:, :3] = _cross(np.concatenate(found.places).take(rows, axis=0), directions)
+    wrenches[:, :3] = _cross(np.concatenate(found.places).take(chosen, axis=0), directions)
     wrenches[:, 3:] = directions
     twists = np.concatenate([found.axes, -_cross(found.axes, found.centres)], axis=1)
     twists[:3] = np.eye(6)[3:]  # translations
     jacobian = np.empty((len(rows) + N_DOF, N_DOF))
     np.matmul(wrenches, twists.T, out=jacobian[:-N_DOF])
-    jacobian[:-N_DOF] *= _RELATIVE.take(np.concatenate(found.movers).take(rows), axis=0)
+    jacobian[:-N_DOF] *= _RELATIVE.take(np.concatenate(found.movers).take(chosen), axis=0)
     jacobian[-N_DOF:] = np.diag(np.sqrt(settings.posture_weight) / POSTURE[1])
     return np.concatenate([rows, len(found.distance) + np.arange(N_DOF)]), jacobian
 
@@ -282,31 +293,3 @@ def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     x, y, z = a.T
     u, v, w = b.T
     return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=1)
-
-
-def _hull_to_body(cones: Cones, maps: ConeMaps, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Distance of hull points or rays to the nearest cone; how it changes when that cone moves (minus the outward direction); its
-    segment; the point, or that of the ray which is nearest.
-
-    Which cone is nearest is found in single precision.
-    """
-    places, directions = places_and_directions(points)
-    local = to_cones(maps, places)
-    if directions is not None:
-        along = (maps.to_cone[:, :, :3, 0].reshape(-1, 3) @ directions.T).reshape(local.shape)
-        moved = slide_to_axis(local.swapaxes(0, 1), along.swapaxes(0, 1), cones.lengths[:, None])
-    squared = np.empty((len(local), len(points)), np.float32)
-    squared_distance(local.swapaxes(0, 1).astype(np.float32), *cone_shapes(cones), out=squared)
-    nearest = squared.argmin(0)
-    x, y, z = local[nearest, :, np.arange(len(points))].T
-    clipped = np.clip(z, 0, cones.lengths[nearest])
-    t = (clipped / cones.lengths[nearest])[:, None]
-    a, b = ((1 - t) * cones.radii[nearest, 0] + t * cones.radii[nearest, 1]).T
-    shrink = 1 - 1 / np.sqrt(np.maximum((x / a) ** 2 + (y / b) ** 2, 1.0))
-    outward = np.stack([x * shrink, y * shrink, z - clipped], axis=1)
-    distance = np.sqrt(np.einsum("ki,ki->k", outward, outward))
-    outward /= np.maximum(distance, 1e-9)[:, None]
-    if directions is not None:
-        # The ray's nearest point moves along with the cone, but along the ray, where the distance does not change.
-        places = places + moved[nearest, np.arange(len(points)), None] * directions
-    return distance, -np.einsum("ki,kij->kj", outward, maps.to_cone[nearest, :, :3, 0]), cones.segment[nearest], places

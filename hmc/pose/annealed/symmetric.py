@@ -8,7 +8,6 @@ strict hull (every camera agrees). The tolerant hull (one camera may miss) is wh
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
@@ -120,12 +119,37 @@ def outside_distance(body: BodyModel, samples: SurfaceSamples, states: np.ndarra
 
 def _outside(samples: SurfaceSamples, placed: np.ndarray, target: HullTarget, origin: np.ndarray) -> np.ndarray:
     """The same for segments placed around an origin, shape (n_samples, n)."""
-    points = np.empty((3, len(samples.points), placed.shape[-1]), np.float32)
+    n, shape = placed.shape[-1], target.distance.shape
+    out = np.empty((len(samples.points), n), np.float32)
     local = np.c_[samples.points, np.ones(len(samples.points))].astype(np.float32)
-    edges = np.r_[0, np.flatnonzero(np.diff(samples.segment)) + 1, len(local)]
-    for start, stop in pairwise(edges):
-        np.matmul(local[start:stop], placed[samples.segment[start]], out=points[:, start:stop])
-    return distance_at(replace(target, origin=target.origin - origin), np.moveaxis(points, 0, -1))
+    # In voxels, counted from the corner of the crop's first one.
+    columns = placed * np.float32(1 / target.voxel_size_m)
+    columns[:, :, 3] += ((origin - target.origin) / target.voxel_size_m + 0.5).astype(np.float32)[:, None]
+    edges = np.r_[0, np.flatnonzero(np.diff(samples.segment)) + 1, len(local)].tolist()
+    segments = samples.segment[edges[:-1]]
+    distance = target.distance.ravel()
+    for start, stop, segment, inside in zip(edges, edges[1:], segments, _stay_in(local, edges, columns[segments], shape), strict=False):
+        at = local[start:stop] @ columns[segment]  # (axis, point, particle)
+        if inside:
+            voxel = at.astype(np.int32)
+            flat = voxel[0]
+            for axis in (1, 2):
+                flat *= shape[axis]
+                flat += voxel[axis]
+            distance.take(flat.astype(np.intp), out=out[start:stop], mode="wrap")
+        else:
+            world = (np.moveaxis(at, 0, -1) - np.float32(0.5)) * np.float32(target.voxel_size_m)
+            out[start:stop] = distance_at(replace(target, origin=np.zeros(3)), world)
+    return out
+
+
+def _stay_in(local: np.ndarray, edges: list[int], columns: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    """Which runs of points, between edges, stay inside the crop in every particle, as seen from the sphere around each."""
+    low, high = np.minimum.reduceat(local, edges[:-1]), np.maximum.reduceat(local, edges[:-1])
+    middle = (low + high) / 2
+    radius = np.linalg.norm(high - low, axis=1) / 2 * np.linalg.norm(columns[0, :, 0, 0]) + 0.01  # the columns count voxels
+    centre = (middle[:, None, None] @ columns)[:, :, 0]
+    return np.all((centre.min(axis=2) >= radius[:, None]) & (centre.max(axis=2) < np.array(shape) - radius[:, None]), axis=1)
 
 
 def body_distance(body: BodyModel, states: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -159,30 +183,28 @@ def _to_body(
     """
     n_cones, n = len(maps.start), maps.start.shape[-1]
     cone, point = np.nonzero(np.ones((n_cones, len(points)), bool) if near is None else near)
-    edges = np.searchsorted(cone, np.arange(n_cones + 1))
-    homogeneous = np.c_[points, np.ones(len(points))].astype(np.float32)
-    local = np.empty((3, len(cone), n), np.float32)
-    for to_cone, (start, stop) in zip(maps.to_cone, pairwise(edges), strict=True):
-        np.matmul(homogeneous[point[start:stop]], to_cone, out=local[:, start:stop])
-    along = None
-    if directions is not None:
-        along = np.empty_like(local)
-        directions = directions.astype(np.float32)
-        for to_cone, (start, stop) in zip(maps.to_cone, pairwise(edges), strict=True):
-            np.matmul(directions[point[start:stop]], to_cone[:, :3], out=along[:, start:stop])
+    edges = np.searchsorted(cone, np.arange(n_cones + 1)).tolist()
+    homogeneous = np.c_[points, np.ones(len(points))].astype(np.float32)[point]
+    along = None if directions is None else directions.astype(np.float32)[point]
     length, first, slope = (values[cone] for values in cone_shapes(cones))
-    squared = np.empty((len(cone), n), np.float32)
     step = max(1, CHUNK // n)
-    for begin in range(0, len(cone), step):
-        rows = slice(begin, begin + step)
-        if along is not None:
-            slide_to_axis(local[:, rows], along[:, rows], length[rows])
-        squared_distance(local[:, rows], length[rows], first[rows], slope[rows], squared[rows])
-    if near is None:
-        return np.sqrt(squared.reshape(n_cones, -1, n).min(axis=0))
+    local_buffer, along_buffer = np.empty((2, 3, step, n), np.float32)
+    squared_buffer = np.empty((step, n), np.float32)
     out = np.full((len(points), n), np.inf, np.float32)
-    for start, stop in pairwise(edges):
-        out[point[start:stop]] = np.minimum(out[point[start:stop]], squared[start:stop])
+    for begin in range(0, len(cone), step):
+        end = min(begin + step, len(cone))
+        local, turned, squared = local_buffer[:, : end - begin], along_buffer[:, : end - begin], squared_buffer[: end - begin]
+        pieces = [(c, max(edges[c], begin), min(edges[c + 1], end)) for c in range(cone[begin], cone[end - 1] + 1)]
+        for c, start, stop in pieces:
+            np.matmul(homogeneous[start:stop], maps.to_cone[c], out=local[:, start - begin : stop - begin])
+            if along is not None:
+                np.matmul(along[start:stop], maps.to_cone[c, :, :3], out=turned[:, start - begin : stop - begin])
+        if along is not None:
+            slide_to_axis(local, turned, length[begin:end])
+        squared_distance(local, length[begin:end], first[begin:end], slope[begin:end], squared)
+        for _, start, stop in pieces:
+            members = point[start:stop]
+            out[members] = np.minimum(out[members], squared[start - begin : stop - begin])
     return np.sqrt(out, out=out)
 
 
@@ -259,8 +281,10 @@ def symmetric_cost(
     placed = place_segments(body, states, origin)
     maps = cone_maps(body.cones, placed)
     outside = np.minimum(_outside(points.surface, placed, target, origin), cap)
-    near = cones_near(body.cones, maps, places - origin, settings.cap_m, directions)
-    unexplained = np.minimum(_to_body(body.cones, maps, places - origin, directions, near), cap)
+    near, held = cones_near(body.cones, maps, places - origin, settings.cap_m, directions)
+    asking = np.flatnonzero(~held)
+    unexplained = _to_body(body.cones, maps, (places - origin)[asking], None if directions is None else directions[asking], near[:, asking])
+    unexplained = np.minimum(unexplained, cap)
     depth = depths_placed(body, points.axes, placed, maps)
     gap = np.zeros(len(states))
     if target.floor_z is not None:
@@ -269,7 +293,7 @@ def symmetric_cost(
     return (
         settings.floor_weight * gap**2
         + np.einsum("ij,ij->j", outside, outside) / len(outside)
-        + settings.explain_weight / len(unexplained) * np.einsum("ij,ij->j", unexplained, unexplained)
+        + settings.explain_weight / len(places) * np.einsum("ij,ij->j", unexplained, unexplained)
         + settings.overlap_weight / len(depth) * np.einsum("ij,ij->j", depth, depth)
         + settings.posture_weight * (((states - POSTURE[0]) / POSTURE[1]) ** 2).sum(1)
     )
