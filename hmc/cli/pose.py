@@ -21,7 +21,7 @@ from hmc.cli.track import JOURNAL, add_tracker_options, selected_tracker
 
 __all__ = ["add_parser", "run"]
 
-METHODS = ("apf", "shbm-apf", "ddm-apf", "shbm-ddm-apf", "marker-apf")
+METHODS = ("apf", "shbm-apf", "ddm-apf", "shbm-ddm-apf", "smd", "marker-apf")
 #: The journal of a run that is not finished.
 POSE_JOURNAL = ".pose.journal"
 #: Its silhouettes, which the tracker leaves for the poses.
@@ -44,7 +44,8 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
         choices=METHODS,
         default="apf",
         help="apf: annealed particle filter (default); shbm-apf: by models of rising "
-        "detail; ddm-apf: without the limbs that the data does not show; shbm-ddm-apf: both; marker-apf: on markers",
+        "detail; ddm-apf: without the limbs that the data does not show; shbm-ddm-apf: both; smd: superellipsoids by stochastic "
+        "meta descent, the quickest; marker-apf: on markers",
     )
     parser.add_argument(
         "--model",
@@ -54,7 +55,7 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
         help="scalable body model: 1 (default; whole limbs first), 2 (upper arms and thighs first), auto (the better of both in every "
         "frame), or a TOML file; shbm-ddm-apf takes two, one of each kind",
     )
-    parser.add_argument("--preset", default="default", metavar="NAME", help="default, or canton2009 for the thesis's printed parameters")
+    parser.add_argument("--preset", default="default", metavar="NAME", help="default, or canton2009 or kehl2006 (smd): as printed")
     parser.add_argument("--voxel", type=positive_float, default=0.03, metavar="M", help="side of a voxel, metres (default: 0.03)")
     add_tracker_options(parser)
     parser.add_argument("--track-voxel", type=positive_float, default=0.05, metavar="M", help="the same for the tracker (default: 0.05)")
@@ -82,13 +83,16 @@ def run(args: argparse.Namespace) -> int:
     from hmc.pose.person import FollowSettings
     from hmc.pose.scalable.methods import method_preset
     from hmc.pose.sequence import pose_recording
+    from hmc.pose.smd.presets import smd_preset
+    from hmc.pose.smd.sequence import SmdTask, pose_by_descent
     from hmc.results import write_joints, write_pose, write_run, write_tracks
     from hmc.tracking.resumable import person_grid, track_recording
 
     recording = open_selected(args)
     if args.method == "marker-apf":
         return run_markers(args, _height(args.height, recording), recording)
-    preset = method_preset(pose_preset(args.preset), args.method, args.model)
+    smd = args.method == "smd"
+    preset = smd_preset(args.preset) if smd else method_preset(pose_preset(args.preset), args.method, args.model)
     if args.out.is_file():
         raise InputError(f"--out {args.out}: is a file; give a folder")
     height = _height(args.height, recording)
@@ -129,21 +133,33 @@ def run(args: argparse.Namespace) -> int:
         on_problem=problems.append,
         progress=lambda steps, total: progress(steps, total, "track", args.quiet),
     )
-    people = pose_recording(
-        recording,
-        tracks,
-        args.voxel,
-        preset,
-        args.seed,
-        height_m=height,
-        settings=following,
-        frontend=frontend,
-        journal=pose_journal,
-        masks=masks,
-        key=key,
-        on_problem=problems.append,
-        progress=lambda steps, total: progress(steps, total, "pose", args.quiet),
-    )
+    if smd:
+        people = pose_by_descent(
+            SmdTask(recording, preset, args.seed, height),
+            tracks,
+            args.voxel,
+            frontend=frontend,
+            masks=masks,
+            key=key,
+            on_problem=problems.append,
+            progress=lambda steps, total: progress(steps, total, "pose", args.quiet),
+        )
+    else:
+        people = pose_recording(
+            recording,
+            tracks,
+            args.voxel,
+            preset,
+            args.seed,
+            height_m=height,
+            settings=following,
+            frontend=frontend,
+            journal=pose_journal,
+            masks=masks,
+            key=key,
+            on_problem=problems.append,
+            progress=lambda steps, total: progress(steps, total, "pose", args.quiet),
+        )
     problems += people.notes
     write_tracks(paths["tracks.csv"], tracks)
     write_joints(paths["joints.csv"], people.poses)

@@ -6,6 +6,8 @@ import numpy as np
 
 from hmc.synthetic.actions import box, gesture, pick_up, sit, stand, throw_catch
 from hmc.synthetic.bvh import bvh_motion, read_bvh
+from hmc.synthetic.drills import dance, kick_turn, pedal_arms, play_cube
+from hmc.synthetic.everyday import close_door, lift_and_drop, push_case, struggle, throw_item, wave
 from hmc.synthetic.gait import jog, walk
 from hmc.synthetic.motions import Motion, place
 from hmc.synthetic.recipe import ActorRecipe, FurnitureRecipe
@@ -14,7 +16,12 @@ from hmc.synthetic.skeleton import Skeleton
 
 __all__ = ["make_motion"]
 
-_ACTIONS = {"stand": stand, "box": box, "gesture": gesture, "throw_catch": throw_catch, "sit": sit, "pick_up": pick_up}
+_ACTIONS = {
+    "stand": stand, "box": box, "gesture": gesture, "throw_catch": throw_catch, "sit": sit, "pick_up": pick_up, "kick_turn": kick_turn,
+    "pedal_arms": pedal_arms, "dance": dance, "play_cube": play_cube,
+    "wave": wave, "throw_item": throw_item, "struggle": struggle, "close_door": close_door, "push_case": push_case,
+    "lift_and_drop": lift_and_drop,
+}  # fmt: skip
 
 
 def make_motion(

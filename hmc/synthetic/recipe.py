@@ -35,7 +35,10 @@ _CHECKOUT = Path(__file__).resolve().parents[2] / "data" / "synthetic"
 #: Shipped recipes: in a checkout, else where an installation puts its data (pyproject.toml).
 RECIPE_FOLDER = _CHECKOUT if _CHECKOUT.is_dir() else Path(sysconfig.get_path("data")) / "share" / "hmc" / "recipes"
 
-MOTIONS = ("walk", "jog", "stand", "box", "gesture", "throw_catch", "sit", "pick_up", "bvh", "script")
+MOTIONS = (
+    "walk", "jog", "stand", "box", "gesture", "throw_catch", "sit", "pick_up", "kick_turn", "pedal_arms", "dance", "play_cube", "wave",
+    "throw_item", "struggle", "close_door", "push_case", "lift_and_drop", "bvh", "script",
+)  # fmt: skip
 #: What a step of a script may be.
 STEPS = ("walk", "turn", "stand", "gesture", "box", "throw_catch", "pick_up", "hug", "sit")
 #: So many people can be told apart in silhouettes, by 85 or 51 x (person + 1).

@@ -1,0 +1,113 @@
+"""Levenberg-Marquardt on the same cues, for comparison: SciPy's MINPACK. Kehl (2006), section 7.3."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from hmc.pose.smd.rows import Matches, leclerc
+
+__all__ = ["LmSettings", "lm_run", "robust_residuals"]
+
+
+@dataclass(frozen=True)
+class LmSettings:
+    """When it stops.
+
+    Parameters
+    ----------
+    evaluations : int
+        Most evaluations of the residuals, of the full pose and of each chain.
+    tolerance : float
+        Relative change of cost and of parameters that counts as none.
+    """
+
+    evaluations: int = 40
+    tolerance: float = 1e-3
+
+
+def robust_residuals(matches: Matches, rows: np.ndarray, width: float) -> tuple[np.ndarray, np.ndarray]:
+    """Residuals of which half the squares sum to the objective less what is missing, and their Jacobian.
+
+    Each vector residual is scaled so that half its square is the potential of its error.
+
+    Parameters
+    ----------
+    matches : Matches
+    rows : ndarray, shape (n, 3, 24)
+    width : float
+
+    Returns
+    -------
+    residuals : ndarray, shape (3 n,)
+    jacobian : ndarray, shape (3 n, 24)
+    """
+    error = 0.5 * np.einsum("ni,ni->n", matches.residuals, matches.residuals)
+    safe = np.maximum(error, 1e-12)
+    scale = np.sqrt(matches.weight * leclerc(safe, width) / safe)
+    # d scale / d error, from scale^2 = weight * rho(e) / e
+    slope = 0.5 * scale * (np.exp(-safe / width) / (width * np.maximum(leclerc(safe, width), 1e-300)) - 1 / safe)
+    change = np.einsum("ni,nij->nj", matches.residuals, rows)
+    full = scale[:, None, None] * rows + slope[:, None, None] * matches.residuals[:, :, None] * change[:, None, :]
+    return (scale[:, None] * matches.residuals).ravel(), full.reshape(-1, rows.shape[-1])
+
+
+def lm_run(
+    matched: Callable[[np.ndarray], tuple[Matches, np.ndarray]],
+    parameters: np.ndarray,
+    low: np.ndarray,
+    high: np.ndarray,
+    groups: Sequence[np.ndarray],
+    width: float,
+    settings: LmSettings,
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Minimise group after group.
+
+    Matches are looked for anew at every evaluation. MINPACK knows no limits: parameters are put back into them before they are used, and
+    what lies beyond pulls back as a residual.
+
+    Parameters
+    ----------
+    matched : callable
+        Parameters (24,) to matches and their Jacobian.
+    parameters, low, high : ndarray, shape (24,)
+    groups : sequence of ndarray of int
+    width : float
+    settings : LmSettings
+
+    Returns
+    -------
+    parameters : ndarray, shape (24,)
+    evaluations : ndarray of int, one a group
+    value : float
+        Of the objective at the end.
+    """
+    parameters = np.array(parameters, float)
+    counts, cost = [], np.nan
+    for group in groups:
+        memory: dict[bytes, tuple[np.ndarray, np.ndarray]] = {}
+
+        def both(x: np.ndarray, group=group, memory=memory) -> tuple[np.ndarray, np.ndarray]:
+            key = x.tobytes()
+            if key not in memory:
+                memory.clear()
+                at = parameters.copy()
+                at[group] = np.clip(x, low[group], high[group])
+                matches, rows = matched(at)
+                residuals, full = robust_residuals(matches, rows, width)
+                memory[key] = residuals, full[:, group] * (x == at[group])
+            residuals, full = memory[key]
+            beyond = x - np.clip(x, low[group], high[group])
+            return np.concatenate([residuals, beyond]), np.concatenate([full, np.diag((beyond != 0).astype(float))])
+
+        found = least_squares(
+            lambda x, f=both: f(x)[0], parameters[group], jac=lambda x, f=both: f(x)[1], method="lm", max_nfev=settings.evaluations,
+            xtol=settings.tolerance, ftol=settings.tolerance, gtol=settings.tolerance,
+        )  # fmt: skip
+        parameters[group] = np.clip(found.x, low[group], high[group])
+        counts.append(found.nfev)
+        cost = float(found.cost)
+    return parameters, np.array(counts), cost
