@@ -14,8 +14,7 @@ from hmc.camera.calibration.toml import write_calibration
 from hmc.camera.model import Rig, look_at
 from hmc.cli import main
 from hmc.errors import InputError
-from hmc.evaluation import evaluate_pose
-from hmc.evaluation_images import evaluate_images, image_landmarks, read_image_landmarks
+from hmc.evaluation import evaluate_images, evaluate_pose, image_landmarks, read_image_landmarks
 from hmc.landmarks import LANDMARKS, landmark_index
 from hmc.metrics.landmarks import landmark_errors
 from hmc.metrics.threshold import choose_threshold

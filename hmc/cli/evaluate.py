@@ -60,8 +60,8 @@ def _threshold(text: str) -> float | str:
 
 def run(args: argparse.Namespace) -> int:
     """Score, print, write."""
-    from hmc.evaluation import THRESHOLDS_M, PoseEvaluation, evaluate_pose, evaluate_tracks, pelvis_tracks
-    from hmc.evaluation_angles import angle_rows
+    from hmc.evaluation import PoseEvaluation, angle_rows, evaluate_pose, evaluate_tracks, pelvis_tracks
+    from hmc.evaluation.poses import THRESHOLDS_M
     from hmc.metrics.mot import MotScores
     from hmc.results import PoseTable, read_centroids, read_joints, read_tracks, run_selection
 
@@ -140,7 +140,7 @@ def run(args: argparse.Namespace) -> int:
 def _in_images(args: argparse.Namespace, estimated, true_poses, truth_images: Path | None, selected):
     """Scores in images, against marked landmarks or the projected true joints."""
     from hmc.camera.calibration.read import read_calibration
-    from hmc.evaluation_images import THRESHOLDS_PX, evaluate_images, image_landmarks, read_image_landmarks
+    from hmc.evaluation.images import THRESHOLDS_PX, evaluate_images, image_landmarks, read_image_landmarks
 
     if args.recording is None:
         raise InputError("scores in images need the RECORDING, for its calibration")

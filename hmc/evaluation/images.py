@@ -11,7 +11,7 @@ import numpy as np
 
 from hmc.camera.model import Rig, project
 from hmc.errors import InputError
-from hmc.evaluation import known_thresholds, score_rows
+from hmc.evaluation.poses import known_thresholds, score_rows
 from hmc.landmarks import LANDMARKS
 from hmc.metrics.landmarks import landmark_errors
 from hmc.metrics.persons import match_persons
