@@ -1,4 +1,4 @@
-"""``python -m hmc.experiments list | run ID... | status``."""
+"""``python -m hmc.experiments list | run ID... | status | merge FOLDER...``."""
 
 from __future__ import annotations
 
@@ -31,21 +31,32 @@ def main(argv: list[str] | None = None) -> int:
 
 def _make_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m hmc.experiments", description="The papers' tables and figures, computed again.")
-    actions = parser.add_subparsers(required=True, metavar="{list,run,status}")
+    actions = parser.add_subparsers(required=True, metavar="{list,run,status,merge}")
     listing = actions.add_parser("list", help="all experiments")
     listing.set_defaults(act=_list)
     run = actions.add_parser("run", help="compute experiments and write their tables and figures")
     run.add_argument("ids", nargs="+", metavar="ID", help="experiments, 'all', or a Python file that holds one")
     run.add_argument("--workers", type=_count, default=os.cpu_count() or 1, metavar="N", help="processes (default: one a core)")
+    run.add_argument(
+        "--backend",
+        choices=("joblib", "dask"),
+        default="joblib",
+        help="joblib: processes here (default); dask: those of a scheduler",
+    )
+    run.add_argument("--scheduler", metavar="ADDRESS", help="of the Dask scheduler, as tcp://10.0.0.1:8786; with --backend dask")
     run.add_argument("--again", action="store_true", help="compute stored cells anew")
     run.add_argument("--quiet", action="store_true", help="no progress bar")
     run.set_defaults(act=_run)
     status = actions.add_parser("status", help="how much of each experiment is computed")
     status.add_argument("ids", nargs="*", metavar="ID", help="experiments (default: all)")
     status.set_defaults(act=_status)
+    merge = actions.add_parser("merge", help="bring the cells that several machines computed together")
+    merge.add_argument("others", type=Path, nargs="+", metavar="FOLDER", help="folders of runs, as their --out")
+    merge.set_defaults(act=_merge)
+    for action in (run, status, merge):
+        action.add_argument("--out", type=Path, default=Path("experiments"), metavar="DIR", help="folder of cells, inputs and reports")
     for action in (run, status):
         action.add_argument("--quick", action="store_true", help="a small grid that shows the shape, in minutes")
-        action.add_argument("--out", type=Path, default=Path("experiments"), metavar="DIR", help="folder of cells, inputs and reports")
         action.add_argument(
             "--recordings", type=Path, nargs="+", default=[], metavar="FOLDER", help="your recordings in place of rendered ones"
         )
@@ -60,6 +71,8 @@ def _list(args: argparse.Namespace) -> int:
 
 
 def _run(args: argparse.Namespace) -> int:
+    if (args.backend == "dask") != (args.scheduler is not None):
+        raise InputError("--backend dask and --scheduler ADDRESS go together: the address is what `dask scheduler` prints")
     plan = plan_of(args.quick, args.recordings)
     out = _folder(args.out)
     names = _names(args.ids)
@@ -78,7 +91,7 @@ def _run(args: argparse.Namespace) -> int:
                     bar.initial = bar.n = done  # found cells say nothing of the speed
                 bar.update(done - bar.n)
 
-            outcome = run_experiment(name, out, plan, args.workers, args.again, show)
+            outcome = run_experiment(name, out, plan, args.workers, args.again, show, args.scheduler)
             folder = write_report(out, experiment, plan, outcome.report) if outcome.report else None
         _tell(f"{experiment.id}: {outcome.computed} cells computed, {outcome.found} found")
         for failure in outcome.failures:
@@ -101,6 +114,27 @@ def _status(args: argparse.Namespace) -> int:
         done = sum(cell is not None for cell in cells)
         _tell(f"{experiment.id:10} {done:5} of {len(cells):5} cells")
     return 0
+
+
+def _merge(args: argparse.Namespace) -> int:
+    from hmc.experiments.merging import merge_stores
+
+    merged = merge_stores(_folder(args.out), args.others)
+    _tell(f"{args.out}: {_cells(merged.copied)} copied, {merged.same + len(merged.different)} were here")
+    for paths, what in (
+        (merged.damaged, "damaged and left"),
+        (merged.old, "of an earlier version, or altered, and left"),
+        (merged.different, "here with other results, which stay; measured times differ, anything else means that the code did"),
+    ):
+        if paths:
+            _tell(
+                f"{_cells(len(paths))} {'is' if len(paths) == 1 else 'are'} {what}: {paths[0]}{' and more' * (len(paths) > 1)}", sys.stderr
+            )
+    return EXIT_FAILED if merged.damaged else 0
+
+
+def _cells(n: int) -> str:
+    return f"{n} cell{'s' * (n != 1)}"
 
 
 def _names(ids: list[str]) -> list[str]:

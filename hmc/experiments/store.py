@@ -18,7 +18,7 @@ from hmc.errors import InputError
 from hmc.experiments.experiment import Cell, Experiment
 from hmc.files import atomic_write
 
-__all__ = ["cell_key", "cell_path", "cell_rng", "digest", "read_cell", "write_cell"]
+__all__ = ["cell_key", "cell_path", "cell_rng", "cell_text", "digest", "read_cell", "write_cell", "write_text"]
 
 
 def digest(value: Any, length: int = 24) -> str:
@@ -47,17 +47,38 @@ def cell_path(out: Path, experiment: Experiment, key: str) -> Path:
     return out / "cells" / experiment.store_name / f"{key}.json"
 
 
+def cell_text(parameters: Mapping[str, Any], results: Mapping[str, Any]) -> str:
+    """What the file of a cell holds; numbers keep their full precision.
+
+    Raises
+    ------
+    InputError
+        When a result is no plain value.
+    """
+    return _canonical({"parameters": dict(parameters), "results": dict(results)}, indent=1) + "\n"
+
+
 def write_cell(path: Path, parameters: Mapping[str, Any], results: Mapping[str, Any]) -> None:
-    """Store a cell; numbers keep their full precision.
+    """Store a cell.
 
     Raises
     ------
     InputError
         When a result is no plain value, or the file cannot be written.
     """
-    text = _canonical({"parameters": dict(parameters), "results": dict(results)}, indent=1)
+    write_text(path, cell_text(parameters, results))
+
+
+def write_text(path: Path, text: str) -> None:
+    """Store a cell's text, which appears when it is whole.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be written.
+    """
     with atomic_write(path) as file:
-        file.write(text + "\n")
+        file.write(text)
 
 
 def read_cell(path: Path) -> Cell | None:

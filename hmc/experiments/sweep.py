@@ -1,8 +1,9 @@
 """Computing the cells of experiments: what is stored is not computed again, and many processes share the rest.
 
-joblib spreads the work: it comes with scikit-learn, so it is one dependency less than any other pool that survives a dead worker. A worker
-stores each cell itself, as soon as it is done; nothing is lost with the parent. Neither the number of workers nor the order in which
-cells are computed changes a result, because random numbers follow from a cell's own parameters.
+joblib spreads the work over one machine: it comes with scikit-learn, so it is one dependency less than any other pool that survives a dead
+worker. Its workers store each cell themselves, as soon as it is done; nothing is lost with the parent. Dask spreads it over many machines
+(`hmc.experiments.cluster`). Neither the number of workers nor the order in which cells are computed changes a result, because random
+numbers follow from a cell's own parameters.
 """
 
 from __future__ import annotations
@@ -18,10 +19,11 @@ from pathlib import Path
 from typing import Any
 
 from hmc.errors import InputError
+from hmc.experiments.cluster import spread
 from hmc.experiments.experiment import Cell, Experiment, Plan, Report
 from hmc.experiments.inputs import Inputs, source_of
 from hmc.experiments.library import find_experiment
-from hmc.experiments.store import cell_key, cell_path, cell_rng, read_cell, write_cell
+from hmc.experiments.store import cell_key, cell_path, cell_rng, cell_text, read_cell, write_text
 
 __all__ = ["Outcome", "compute_cells", "plan_of", "run_experiment", "stored_cells"]
 
@@ -63,7 +65,13 @@ def plan_of(quick: bool = False, recordings: list[Path] | None = None) -> Plan:
 
 
 def run_experiment(
-    name: str, out: Path, plan: Plan | None = None, workers: int = 1, again: bool = False, on_progress: Progress | None = None
+    name: str,
+    out: Path,
+    plan: Plan | None = None,
+    workers: int = 1,
+    again: bool = False,
+    on_progress: Progress | None = None,
+    scheduler: str | None = None,
 ) -> Outcome:
     """Compute what is missing of an experiment's cells, and report on all.
 
@@ -80,6 +88,8 @@ def run_experiment(
         Compute stored cells anew.
     on_progress : callable, optional
         ``on_progress(done, total)``, once at the start and once a cell.
+    scheduler : str, optional
+        Address of a Dask scheduler whose workers compute, in place of processes of this machine.
 
     Returns
     -------
@@ -98,7 +108,7 @@ def run_experiment(
     if on_progress:
         on_progress(done, len(grid))
     folders = {source.label: source.folder for source in plan.recordings if source.folder is not None}
-    for failure in compute_cells(name, out, missing, folders, workers):
+    for failure in compute_cells(name, out, missing, folders, workers, scheduler):
         done += 1
         if failure:
             failures.append(failure)
@@ -118,15 +128,21 @@ def stored_cells(experiment: Experiment, out: Path, grid: list[dict[str, Any]]) 
     return [read_cell(cell_path(out, experiment, cell_key(experiment, parameters))) for parameters in grid]
 
 
-def compute_cells(name: str, out: Path, missing: list[dict[str, Any]], folders: Mapping[str, Path], workers: int = 1) -> Iterator[str]:
-    """Compute and store cells, in any order; yields an empty string for each, or what went wrong.
+def compute_cells(
+    name: str, out: Path, missing: list[dict[str, Any]], folders: Mapping[str, Path], workers: int = 1, scheduler: str | None = None
+) -> Iterator[str]:
+    """Compute and store cells, in any order; yields an empty string for each, or what went wrong. Arguments as `run_experiment`.
 
     Raises
     ------
     InputError
         What a cell raised that concerns the user: the rest would meet the same.
     """
-    task = functools.partial(_compute_cell, name, out, dict(folders))
+    if scheduler is not None:
+        name = str(Path(name).resolve()) if name.endswith(".py") else name  # workers have folders of their own
+        yield from spread(functools.partial(_compute_cell, name, out.resolve(), dict(folders)), missing, scheduler)
+        return
+    task = functools.partial(_compute_and_store, name, out, dict(folders))
     if workers <= 1 or len(missing) <= 1:
         yield from map(task, missing)
         return
@@ -158,7 +174,15 @@ def _end_with(parent: int) -> None:
     threading.Thread(target=look, daemon=True).start()
 
 
-def _compute_cell(name: str, out: Path, folders: dict[str, Path], parameters: dict[str, Any]) -> str:
+def _compute_and_store(name: str, out: Path, folders: dict[str, Path], parameters: dict[str, Any]) -> str:
+    path, text, failure = _compute_cell(name, out, folders, parameters)
+    if text:
+        write_text(path, text)
+    return failure
+
+
+def _compute_cell(name: str, out: Path, folders: dict[str, Path], parameters: dict[str, Any]) -> tuple[Path, str, str]:
+    """A cell's file, its text, and what went wrong; the last two exclude each other."""
     import cv2
     from threadpoolctl import threadpool_limits
 
@@ -166,13 +190,13 @@ def _compute_cell(name: str, out: Path, folders: dict[str, Path], parameters: di
     cv2.setNumThreads(1)
     experiment = find_experiment(name)
     key = cell_key(experiment, parameters)
+    path = cell_path(out, experiment, key)
     try:
         with threadpool_limits(1):
             results = experiment.cell(parameters, Inputs(out / "inputs", folders), cell_rng(key))
-        write_cell(cell_path(out, experiment, key), parameters, results)
+        return path, cell_text(parameters, results), ""
     except InputError:
         raise
     except Exception:
         # One cell that fails must not cost a night's sweep: it is told at the end and is missing until the next run.
-        return f"{experiment.id} {parameters}\n{traceback.format_exc()}"
-    return ""
+        return path, "", f"{experiment.id} {parameters}\n{traceback.format_exc()}"
