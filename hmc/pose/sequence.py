@@ -10,6 +10,7 @@ import logging
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ from hmc.mask_store import kept_masks
 from hmc.pose.annealed.hull_target import HullTarget, make_target
 from hmc.pose.annealed.presets import PosePreset
 from hmc.pose.annealed.rays import with_rays
+from hmc.pose.annealed.unexplained import explaining
 from hmc.pose.body.joints import DOF_NAMES
 from hmc.pose.body.kinematics import landmarks
 from hmc.pose.person import Decided, FollowSettings, PersonState, PersonTask, PoseTask, person_step, taken_up
@@ -169,8 +171,10 @@ def targets_of(recording: Recording, grid: VoxelGrid, tracks: TrackTable, hull: 
         spare, floor_z = hull.loose & ~hull.tolerant, float(recording.room[0, 2])
         tolerant = person_voxels(observation, tracks.positions[rows])
         strict = [voxels[hull.strict[tuple(voxels.T)]] for voxels in tolerant]
+        everybody = grid.centres(np.concatenate([np.zeros((0, 3), int), *strict]))
+        new = partial(explaining, recording.rig, hull.masks, everybody, spacing_m=grid.voxel_size_m)
         for k, person in enumerate(targets):
-            target = make_target(grid, strict[k], tolerant[k], spare, floor_z)
+            target = make_target(grid, strict[k], tolerant[k], spare, floor_z, new)
             if target is not None:
                 others = grid.centres(np.concatenate([np.zeros((0, 3), int), *strict[:k], *strict[k + 1 :]]))
                 target = with_rays(target, recording.rig, hull.masks, others)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -62,7 +63,12 @@ class HullTarget:
 
 
 def make_target(
-    grid: VoxelGrid, strict: np.ndarray, tolerant: np.ndarray, loose: np.ndarray | None = None, floor_z: float | None = None
+    grid: VoxelGrid,
+    strict: np.ndarray,
+    tolerant: np.ndarray,
+    loose: np.ndarray | None = None,
+    floor_z: float | None = None,
+    new: Callable[[np.ndarray], np.ndarray] | None = None,
 ) -> HullTarget | None:
     """Prepare one person's hulls.
 
@@ -77,6 +83,9 @@ def make_target(
         behind furniture, say. A body may be there at a small price.
     floor_z : float, optional
         Height of the floor, metres.
+    new : callable, optional
+        Which of some places, shape (n, 3), world, metres, show on silhouettes where the strict hull does not
+        (`hmc.pose.annealed.unexplained`). What else is in the tolerant and in the loose hull is no place for a body then.
 
     Returns
     -------
@@ -100,11 +109,16 @@ def make_target(
     occupied[tuple((strict - low).T)] = True
     core = np.zeros(shape, bool)
     core[tuple((strict - low).T)] = True
-    distance = _distance_to(occupied, grid.voxel_size_m)
-    distance += STRICT_SHARE * np.minimum(_distance_to(core, grid.voxel_size_m), STRICT_CAP_M)
     maybe = np.zeros(shape, bool) if loose is None else _crop(loose, low, shape)
+    needed = np.ones(shape, bool)
+    if new is not None:
+        needed[:] = core
+        beyond = np.argwhere((occupied | maybe) & ~core)
+        needed[tuple(beyond[new(grid.centres(beyond + low))].T)] = True
+    distance = _distance_to(occupied & needed, grid.voxel_size_m)
+    distance += STRICT_SHARE * np.minimum(_distance_to(core, grid.voxel_size_m), STRICT_CAP_M)
     if loose is not None:
-        distance = np.minimum(distance, _distance_to(maybe, grid.voxel_size_m) + LOOSE_M)
+        distance = np.minimum(distance, _distance_to(maybe & needed, grid.voxel_size_m) + LOOSE_M)
     shell = grid.centres(surface(core) + low)
     volume_m3 = len(strict) * grid.voxel_size_m**3
     return HullTarget(distance, occupied, maybe, grid.centres(low), grid.voxel_size_m, shell, volume_m3, floor_z)

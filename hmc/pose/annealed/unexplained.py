@@ -1,0 +1,59 @@
+"""Where a tolerant hull is needed: voxels on pixels of a silhouette that no voxel of the strict hull explains.
+
+Cameras that agree make a strict hull that projects back on whole silhouettes: a tolerant one is then the same person and fatter. Where a
+camera lost a forearm, the strict hull lacks it, and the silhouettes of the others show a forearm that nothing explains.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from hmc.camera.model import Camera, Rig, project
+
+__all__ = ["explaining"]
+
+
+def explaining(rig: Rig, masks: Sequence[np.ndarray | None], known: np.ndarray, candidates: np.ndarray, spacing_m: float) -> np.ndarray:
+    """Which voxels show on pixels of silhouettes on which no known voxel shows.
+
+    Parameters
+    ----------
+    rig : Rig
+    masks : sequence of ndarray of bool, shape (height, width), or None
+        Silhouettes, one a camera; None where a camera has none.
+    known : ndarray, shape (n, 3)
+        Voxel centres of the strict hull, world, metres.
+    candidates : ndarray, shape (m, 3)
+        Voxel centres, world, metres.
+    spacing_m : float
+        Side of a voxel, metres.
+
+    Returns
+    -------
+    ndarray of bool, shape (m,)
+    """
+    new = np.zeros(len(candidates), bool)
+    for camera, mask in zip(rig, masks, strict=True):
+        if mask is None:
+            continue
+        uv, valid = project(camera, candidates)
+        column, row = np.rint(np.where(valid[:, None], uv, -1)).astype(int).T
+        seen = np.flatnonzero((column >= 0) & (row >= 0) & (column < camera.size[0]) & (row < camera.size[1]))
+        seen = seen[mask[row[seen], column[seen]]]
+        covered, step = _covered(camera, known, spacing_m)
+        new[seen] |= ~covered[row[seen] // step, column[seen] // step]
+    return new
+
+
+def _covered(camera: Camera, known: np.ndarray, spacing_m: float) -> tuple[np.ndarray, int]:
+    """Patches of the image on which known voxels show, and their side in pixels: a voxel's at the median distance."""
+    uv, valid = project(camera, known)
+    depth = (known @ camera.rotation[2] + camera.translation[2])[valid]
+    step = max(1, round(float(camera.matrix[0, 0] * spacing_m / np.median(depth)))) if len(depth) else 1
+    covered = np.zeros((camera.size[1] // step + 1, camera.size[0] // step + 1), bool)
+    column, row = np.rint(uv[valid]).astype(int).T // step
+    inside = (column >= 0) & (row >= 0) & (column < covered.shape[1]) & (row < covered.shape[0])
+    covered[row[inside], column[inside]] = True
+    return covered, step
