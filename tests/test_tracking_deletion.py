@@ -143,18 +143,30 @@ def test_a_chair_that_was_pushed_and_left_takes_nobody_over():
     assert max(np.hypot(*(position[:2] - truth[frame])) for frame, position in zip(table.frames, table.positions, strict=True)) < 0.1
 
 
+def learnt(observation, people, n, furniture=None, fps=10.0):
+    """What is known after n frames with people [(x, y, height of the head)]."""
+    furniture = Furniture() if furniture is None else furniture
+    centroids, heads = (np.array([(x, y, z * share) for x, y, z in people]).reshape(-1, 3) for share in (0.6, 1.0))
+    for _ in range(n):
+        furniture = learn_furniture(furniture, observation, centroids, heads, np.zeros(len(observation.points), bool), fps)
+    return furniture
+
+
 def test_standing_furniture_is_nobody_s_and_is_forgotten_when_it_goes():
     chair, fps = observe(GRID, CHAIR), 10.0
-    furniture = Furniture()
-    for _ in range(6):
-        furniture = learn_furniture(furniture, chair, np.array([[1.5, 0, 0.9]]), np.zeros(len(chair.points), bool), fps)
+    furniture = learnt(chair, [(1.5, 0, 1.6)], 6)
     both = observe(GRID, CHAIR | person(1.5, 0))
     rest, kept = without_furniture(both, furniture, fps)
     assert np.array_equal(rest.points, both.points[kept]) and np.array_equal(kept, both.points[:, 0] > 0.5)
-    for _ in range(3):
-        furniture = learn_furniture(furniture, observe(GRID, nothing()), np.zeros((0, 3)), np.zeros(0, bool), fps)
+    furniture = learnt(observe(GRID, nothing()), [], 3, furniture)
     assert without_furniture(both, furniture, fps)[1].all()
-    near = Furniture()
-    for _ in range(20):
-        near = learn_furniture(near, chair, np.zeros((1, 3)), np.zeros(len(chair.points), bool), fps)
-    assert len(near.voxels) == 0
+    assert len(learnt(chair, [(0, 0, 0.7)], 20).voxels) == 0
+
+
+def test_a_chair_beside_somebody_who_stands_is_known_though_their_centroid_is_near():
+    chair = observe(GRID, box((0.4, -0.2, 0), (0.8, 0.2, 0.8)))
+    furniture = learnt(chair, [(0, 0, 1.6)], 8)
+    assert len(furniture.voxels) == len(chair.points)
+    legs = observe(GRID, box((-0.3, -0.15, 0), (0.3, 0.15, 0.9)) | box((-0.9, -0.1, 1.2), (0.9, 0.1, 1.4)))
+    assert len(learnt(legs, [(0, 0, 1.6)], 20).voxels) == np.count_nonzero(np.abs(legs.points[:, 0]) > 0.5)  # arms held out for 2 s
+    assert len(learnt(chair, [(0.1, 0, 0.9)], 20).voxels) < len(chair.points)  # the feet of somebody who sits

@@ -14,7 +14,13 @@ from hmc.tracking.blobs import Observation
 from hmc.tracking.lifecycle import LifecycleSettings, Track, looks_like_person, one_or_two, unowned_blobs
 from hmc.tracking.region import person_radii, region_distance
 
-__all__ = ["FollowingSettings", "assign_voxels", "find_again", "head_centre", "let_go", "locating_voxels", "predict"]
+__all__ = ["FollowingSettings", "assign_voxels", "find_again", "head_centre", "let_go", "let_go_things", "locating_voxels", "predict"]
+
+#: Somebody whose head's centre is so high stands, metres.
+UPRIGHT_M = 1.35
+#: What somebody who stands fills below the first height is within the second of the head, seen from above: arms may be stretched out,
+#: legs are not; metres.
+LEGS_M, STRIDE_M = 1.0, 0.5
 
 
 @dataclass(frozen=True)
@@ -191,6 +197,33 @@ def let_go(
             freed[int(k)] = max(parts, key=lambda rows: np.hypot(*(observation.points[rows].mean(axis=0) - positions[k])[:2]))
             owners[freed[int(k)]] = -1
     return owners, freed
+
+
+def let_go_things(observation: Observation, owners: np.ndarray, shared: np.ndarray, settings: FollowingSettings) -> np.ndarray:
+    """Free what somebody who stands holds beside their legs: a chair that they push or lean on, which would draw them away.
+
+    Parameters
+    ----------
+    observation : Observation
+    owners : ndarray of int, shape (n,)
+        Row of the track that owns each voxel, or -1.
+    shared : ndarray of bool, shape (k,)
+        Those whose component has another owner too; they let nothing go, because the head may be the other's.
+    settings : FollowingSettings
+
+    Returns
+    -------
+    ndarray of int, shape (n,)
+        The owners after that.
+    """
+    owners = owners.copy()
+    best = locating_voxels(observation, owners, len(shared), settings)
+    for k in np.flatnonzero(~shared):
+        mine = observation.points[best & (owners == k)]
+        if len(mine) and (head := head_centre(mine))[2] >= UPRIGHT_M:
+            beside = np.hypot(*(observation.points - head)[:, :2].T) > STRIDE_M
+            owners[(owners == k) & beside & (observation.points[:, 2] < LEGS_M)] = -1
+    return owners
 
 
 def find_again(

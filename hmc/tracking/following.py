@@ -14,7 +14,16 @@ from typing import Any
 import numpy as np
 
 from hmc.errors import InputError
-from hmc.tracking.association import FollowingSettings, assign_voxels, find_again, head_centre, let_go, locating_voxels, predict
+from hmc.tracking.association import (
+    FollowingSettings,
+    assign_voxels,
+    find_again,
+    head_centre,
+    let_go,
+    let_go_things,
+    locating_voxels,
+    predict,
+)
 from hmc.tracking.blobs import Observation, blob_features
 from hmc.tracking.cloud import Cloud, Departed
 from hmc.tracking.furniture import Furniture, learn_furniture, part_of_furniture, without_furniture
@@ -42,6 +51,8 @@ __all__ = ["Filter", "Filtered", "StepInfo", "TrackerState", "advance", "finish"
 MOST_FILLED = 0.25
 #: Someone who came is compared with those who left after this time, when their colours are known.
 RECOGNISE_AFTER_S = 1.0
+#: So near, seen from above, whoever pushes a chair is; metres.
+BESIDE_M = 1.5
 
 
 @dataclass(frozen=True)
@@ -189,6 +200,9 @@ def advance(
     claimed, shared = assign_voxels(observation, positions, settings)
     kept, freed = let_go(observation, claimed, predicted, shared, settings)
     owners = find_again(state.tracks, frame, state.fps, observation, kept, settings)
+    elsewhere = np.unique(owners[kept != owners])
+    found = owners
+    owners = let_go_things(observation, owners, shared, settings)
     owned = blob_features(observation.points, owners, n, size)
     best = locating_voxels(observation, owners, n, settings)
     located = blob_features(observation.points, np.where(best, owners, -1), n, size)
@@ -197,7 +211,7 @@ def advance(
     certain = blob_features(observation.points, np.where(observation.certain, owners, -1), n, size)
     supported = still_a_person(owned, certain, state.tracks, state.fps, settings.lifecycle)
     # Of a person who was found again elsewhere, the filter knows nothing; of one who held another it stands between the two.
-    known = filtered.seen & ~np.isin(np.arange(n), [*freed, *owners[kept != owners]])
+    known = filtered.seen & ~np.isin(np.arange(n), [*freed, *elsewhere])
     measured = np.where(known[:, None], positions, located.centroid)
     gain = np.where(shared, np.where(known, settings.filter_gain, settings.shared_gain), 1.0)
     like = looks_like_person(owned, settings.lifecycle)
@@ -222,7 +236,7 @@ def advance(
     if filtered.looks:
         followed, clouds, looks = exchange_mistaken(followed, clouds, filtered.looks)
         clouds = learn_looks(followed, clouds, looks, filtered.keep_histogram)
-    strangers, parted, like_people = _newcomers(observation, owners, tuple(freed.values()), frame, state, settings)
+    strangers, parted, like_people = _newcomers(observation, found, tuple(freed.values()), frame, state, settings)
     candidates = propose(state.candidates, not_things(strangers, state.things, settings.lifecycle), followed, settings.lifecycle, parted)
     candidates, fresh, earlier = confirm(candidates, state.next_person, state.fps, settings.lifecycle)
     next_person = state.next_person + len(fresh)
@@ -241,11 +255,11 @@ def advance(
     whose = np.full(len(whole.points), -1)
     whose[kept_voxels] = numbers[owners]
     info = StepInfo((*rows, *earlier), whose, tuple(int(number) for number in numbers[:-1][shared]), filtered.color_s, filter_s)
-    places = [track.position for track in staying] + [candidate.rows[-1].position for candidate in candidates]
-    people = np.array(places).reshape(-1, 3)
+    present = (*staying, *(candidate.rows[-1] for candidate in candidates))
+    people, heads = (np.array(places).reshape(-1, 3) for places in ([one.position for one in present], [one.head for one in present]))
     strange = np.zeros(len(whole.points), bool)
     strange[kept_voxels] = like_people
-    furniture = learn_furniture(state.furniture, whole, people, strange, state.fps)
+    furniture = learn_furniture(state.furniture, whole, people, heads, strange, state.fps)
     after = TrackerState(state.fps, staying, candidates, next_person, (), state.departed, state.same, things, furniture)
     return (_with_clouds(after, followed, clouds, frame) if filter else after), info
 
@@ -329,6 +343,7 @@ def _newcomers(
         points = [observation.points[rows] for rows in sets]
         real = real_people(observation.views, observation.points[held >= 0], points, observation.voxel_size_m)
         sets = [rows for rows, one in zip(sets, real, strict=True) if one]
+    sets = _solid_beside_solid(observation, owners, sets, state.tracks, settings)
     # Cut after the ghosts are out: of two who hold each other, one may hide the other in most views.
     sets = [part for rows in sets for part in one_or_two(observation, rows, settings.lifecycle)]
     person = np.full(len(owners), -1)
@@ -339,6 +354,22 @@ def _newcomers(
     located = [observation.points[best & (person == j)] for j in range(n)]
     seen = [Row(frame, -1, points.mean(axis=0), head_centre(points)) for points in located]
     return seen[: len(sets)], seen[len(sets) :], like_people
+
+
+def _solid_beside_solid(
+    observation: Observation, owners: np.ndarray, sets: list[np.ndarray], tracks: tuple[Track, ...], settings: FollowingSettings
+) -> list[np.ndarray]:
+    """The sets without those that lack strict hull beside people who have it: all cameras see who pushes furniture, and the tolerant
+    hull alone makes what looks like a person of the furniture.
+    """
+    least = settings.lifecycle.least_volume_m3 / observation.voxel_size_m**3
+    counts = np.bincount(owners[observation.certain & (owners >= 0)], minlength=len(tracks))
+    solid = np.array([track.position for track, count in zip(tracks, counts, strict=True) if count >= least]).reshape(-1, 3)
+
+    def alone(rows: np.ndarray) -> bool:
+        return not np.any(np.hypot(*(solid - observation.points[rows].mean(axis=0))[:, :2].T) <= BESIDE_M)
+
+    return [rows for rows in sets if observation.certain[rows].sum() >= least or alone(rows)]
 
 
 def _update(

@@ -19,6 +19,11 @@ __all__ = ["Furniture", "learn_furniture", "part_of_furniture", "without_furnitu
 AWAY_M = 0.5
 #: A voxel that was filled for so long while nobody was near is furniture; seconds.
 STANDING_S = 0.6
+#: Somebody whose head's centre is so high stands, metres.
+UPRIGHT_M = 1.35
+#: What somebody who stands fills for long below the first height is within the second of the head, seen from above: arms may be stretched
+#: out, legs are not; metres.
+LEGS_M, STANCE_M = 1.0, 0.35
 #: And is none after it was empty for so long.
 EMPTY_S = 0.2
 #: What touches furniture and is hardly higher than where it does is more of it; somebody who sits on it is higher by this, metres.
@@ -88,16 +93,20 @@ def part_of_furniture(points: np.ndarray, observation: Observation, furniture: F
     return bool(len(touched) and points[:, 2].max() <= touched[:, 2].max() + HIGHER_M)
 
 
-def learn_furniture(furniture: Furniture, observation: Observation, people: np.ndarray, like_people: np.ndarray, fps: float) -> Furniture:
+def learn_furniture(
+    furniture: Furniture, observation: Observation, people: np.ndarray, heads: np.ndarray, like_people: np.ndarray, fps: float
+) -> Furniture:
     """Carry on what is known with this frame.
+
+    Whoever stands is where their head is: their centroid may be between them and a chair that they touch.
 
     Parameters
     ----------
     furniture : Furniture
     observation : Observation
         The whole one.
-    people : ndarray, shape (k, 3)
-        Where tracks and candidates are, world, metres.
+    people, heads : ndarray, shape (k, 3)
+        Centroids of tracks and candidates, and the centres of their heads, world, metres.
     like_people : ndarray of bool, shape (n,)
         Voxels of the observation that look like somebody who has no track.
     fps : float
@@ -109,8 +118,11 @@ def learn_furniture(furniture: Furniture, observation: Observation, people: np.n
     """
     if observation.points.size == 0 and furniture.voxels.size == 0:
         return furniture
-    across = observation.points[:, None, :2] - people[None, :, :2]
-    away = ~np.any(np.einsum("nkc,nkc->nk", across, across) <= AWAY_M**2, axis=1) & ~like_people
+    low = observation.points[:, 2, None] < LEGS_M
+    near = np.where(
+        low & (heads[:, 2] >= UPRIGHT_M), _beside(observation.points, heads, STANCE_M), _beside(observation.points, people, AWAY_M)
+    )
+    away = ~near.any(axis=1) & ~like_people
     places = _places(observation)
     filled = np.isin(furniture.voxels, places, assume_unique=True)
     voxels = np.union1d(furniture.voxels, places[away])
@@ -119,6 +131,12 @@ def learn_furniture(furniture: Furniture, observation: Observation, people: np.n
     frames[np.searchsorted(voxels, places[away])] += 1
     known = frames > 0
     return Furniture(voxels[known], np.minimum(frames[known], round((STANDING_S + EMPTY_S) * fps)))
+
+
+def _beside(points: np.ndarray, people: np.ndarray, reach_m: float) -> np.ndarray:
+    """Which points (n,) are within reach of which places (k,), seen from above."""
+    across = points[:, None, :2] - people[None, :, :2]
+    return np.einsum("nkc,nkc->nk", across, across) <= reach_m**2
 
 
 def _places(observation: Observation) -> np.ndarray:

@@ -39,7 +39,8 @@ class PersonTree:
     at_most, above : tuple of int
         The next node where the feature is at most the threshold, and where it is above; -1 for a leaf.
     share : tuple of float
-        Share of people among the components of the training that came to the node.
+        Share of people among the components of the training that came to the node; the shipped tree's are weighted so that both classes
+        weigh the same as a whole.
     """
 
     feature: tuple[int, ...]

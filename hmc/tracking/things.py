@@ -17,7 +17,7 @@ __all__ = ["came_out", "left_behind", "not_things"]
 #: Somebody who stands where a thing was taken for a person has the head so much higher, metres.
 STANDS_HIGHER_M = 0.2
 #: Who gets up from a thing is first seen apart from it within this distance, metres.
-CAME_OUT_M = 1.0
+CAME_OUT_M = 1.5
 #: And until the track begins comes no nearer to it than by this, metres: somebody else who walks up does.
 NEARER_M = 0.15
 #: The centroid of what is left when somebody gets up is no higher than this, metres.
