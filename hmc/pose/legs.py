@@ -93,9 +93,9 @@ def leg_choice(rng: np.random.Generator, filt: PoseFilter, state: np.ndarray, ta
     else:
         points = points_to_explain(rng, target, preset.fine_hull_points, preset.symmetric.ray_share)
         start = swapped_pose(body, state, "legs")
-        states = np.stack([state, refine(body, samples, start, target, points, preset.symmetric, preset.refine)[0]])
-        values = [residual_values(body, samples, one, target, points, preset.symmetric) for one in states]
-        costs = np.array([float(one @ one) for one in values])
+        exchanged, info = refine(body, samples, start, target, points, preset.symmetric, preset.refine)
+        values = residual_values(body, samples, state, target, points, preset.symmetric)
+        states, costs = np.stack([state, exchanged]), np.array([float(values @ values), info.cost])
     return LegChoice(states, costs)
 
 

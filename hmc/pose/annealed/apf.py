@@ -16,7 +16,7 @@ from hmc.pose.annealed.hull_target import HullTarget
 from hmc.pose.annealed.limb_search import lost_limbs, search_limbs
 from hmc.pose.annealed.presets import PosePreset, drift
 from hmc.pose.annealed.rays import points_to_explain
-from hmc.pose.annealed.refine import refine, residual_values
+from hmc.pose.annealed.refine import refine_best
 from hmc.pose.annealed.scores import (
     ScoreMaps,
     ScoreTable,
@@ -246,11 +246,8 @@ def polish(
     if preset.refine is None:
         raise ValueError(f"preset '{preset.name}' has no `refine`")
     points = points_to_explain(rng, target, preset.fine_hull_points, preset.symmetric.ray_share)
-    trials = [refine(body, samples, start, target, points, preset.symmetric, preset.refine, anchor=anchor) for start in starts]
-    evaluations = sum(info.evaluations for _, info in trials)
-    estimate, _ = min(trials, key=lambda trial: trial[1].cost_after)
-    values = residual_values(body, samples, estimate, target, points, preset.symmetric)
-    cost = float(values @ values)
+    estimate, info = refine_best(body, samples, starts, target, points, preset.symmetric, preset.refine, anchor=anchor)
+    cost, evaluations = info.cost, info.evaluations
     searched: list[str] = []
     if preset.search is not None:
         searched = lost_limbs(rng, body, samples, estimate, target, points, preset.search)

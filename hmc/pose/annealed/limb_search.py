@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
+from hmc.landmarks import landmark_index
 from hmc.montecarlo.truncated import truncated_normal
+from hmc.pose.annealed.cone_maps import cone_maps
 from hmc.pose.annealed.hull_target import HullTarget, sample_points
+from hmc.pose.annealed.nearest_cone import candidates, nearest_cones
 from hmc.pose.annealed.rays import places_and_directions
-from hmc.pose.annealed.refine import RefineSettings, refine
-from hmc.pose.annealed.symmetric import POSTURE, BodyPoints, SymmetricSettings, body_distance, outside_distance, symmetric_cost
+from hmc.pose.annealed.refine import RefineSettings, refine_best
+from hmc.pose.annealed.symmetric import POSTURE, BodyPoints, SymmetricSettings, outside_distance, symmetric_cost
 from hmc.pose.body.joints import DOF_NAMES, dof_index
+from hmc.pose.body.kinematics import landmarks, segment_transforms
 from hmc.pose.body.model import PARTS, BodyModel
 from hmc.pose.body.reach import limb_joint, limb_lengths, reach
 
@@ -29,6 +34,10 @@ LIMBS: dict[str, np.ndarray] = {
 }
 _PARTS = {
     limb: [PARTS.index(f"{limb[0]}_{part}") for part in (("upper_arm", "forearm") if limb.endswith("arm") else ("thigh", "shank"))]
+    for limb in LIMBS
+}
+_LANDMARKS = {
+    limb: [landmark_index(f"{limb[0]}_{name}") for name in (("elbow", "wrist") if limb.endswith("arm") else ("knee", "ankle"))]
     for limb in LIMBS
 }
 
@@ -51,6 +60,10 @@ class SearchSettings:
         Share of them that reach for hull points which the body does not explain, where there are any.
     gain : float
         The new pose is taken when the cost falls by at least this share.
+    hope : float
+        A new pose that costs more than the present one times this after the first steps of its refinement is not refined further ...
+    back_m : float
+        ... nor is one whose limb has come so near to where it is now: it would end there again.
     """
 
     far_m: float = 0.05
@@ -59,6 +72,8 @@ class SearchSettings:
     draws: int = 200
     reach_share: float = 0.5
     gain: float = 0.03
+    hope: float = 1.3
+    back_m: float = 0.05
 
 
 def lost_limbs(
@@ -70,7 +85,9 @@ def lost_limbs(
     hull_points: np.ndarray,
     settings: SearchSettings,
 ) -> list[str]:
-    """Limbs that the hulls contradict, and all four where much of the hull is unexplained; else one picked at random.
+    """Limbs that the hulls contradict, and all where much of the hull is unexplained; else one picked at random.
+
+    Of those that the samples have: a body may lack some (`hmc.pose.scalable`).
 
     The random one is for limbs that rest in a wrong place which is nearly as good, a folded arm before the chest say.
 
@@ -79,12 +96,12 @@ def lost_limbs(
     list of str
         Keys of `LIMBS`.
     """
-    unexplained = body_distance(body, state[None], hull_points)[0]
-    if (unexplained > settings.far_m).mean() > settings.unexplained_share:
-        return list(LIMBS)
+    there = [limb for limb, parts in _PARTS.items() if np.isin(samples.surface.part, parts).any()]
+    if (_unexplained(body, state, hull_points, settings) > settings.far_m).mean() > settings.unexplained_share:
+        return there
     outside = outside_distance(body, samples.surface, state[None], target)[0] > settings.far_m
-    lost = [limb for limb, parts in _PARTS.items() if outside[np.isin(samples.surface.part, parts)].mean() > settings.outside_share]
-    return lost or [str(rng.choice(list(LIMBS)))]
+    lost = [limb for limb in there if outside[np.isin(samples.surface.part, _PARTS[limb])].mean() > settings.outside_share]
+    return lost or [str(rng.choice(there))]
 
 
 def search_limbs(
@@ -129,12 +146,39 @@ def search_limbs(
         trials[:, dofs] = _draw(rng, settings, body, state, limb, hull_points)
         costs = symmetric_cost(body, samples, trials, target, coarse, cost_settings)
         evaluations += settings.draws
-        for pick in np.argsort(costs)[:2]:
-            trial, info = refine(body, samples, trials[pick], target, hull_points, cost_settings, refine_settings, anchor=trials[pick])
-            evaluations += info.evaluations
-            if info.cost_after < (1 - settings.gain) * cost:
-                state, cost = trial, info.cost_after
+        trial, info = refine_best(
+            body,
+            samples,
+            trials[np.argsort(costs)[:2]],
+            target,
+            hull_points,
+            cost_settings,
+            refine_settings,
+            is_hopeless=_has_failed(body, state, cost, limb, settings),
+        )
+        evaluations += info.evaluations
+        if info.cost_after < (1 - settings.gain) * cost:
+            state, cost = trial, info.cost_after
     return state, cost, evaluations
+
+
+def _has_failed(
+    body: BodyModel, state: np.ndarray, cost: float, limb: str, settings: SearchSettings
+) -> Callable[[np.ndarray, float], bool]:
+    """Whether a new pose of a limb is not worth more steps: it costs too much, or is back at `state`, whose cost is `cost`."""
+
+    def has_failed(trial: np.ndarray, trial_cost: float) -> bool:
+        before, now = landmarks(body, np.stack([state, trial]))[:, _LANDMARKS[limb]]
+        return trial_cost > settings.hope * cost or bool(np.linalg.norm(now - before, axis=1).max() < settings.back_m)
+
+    return has_failed
+
+
+def _unexplained(body: BodyModel, state: np.ndarray, hull_points: np.ndarray, settings: SearchSettings) -> np.ndarray:
+    """Distance of hull points and rays to the body, metres; infinite where it is far."""
+    rotations, positions = segment_transforms(body, state[None])
+    maps = cone_maps(body.cones, np.concatenate([rotations[0], positions[0][..., None]], axis=-1)[..., None])
+    return nearest_cones(body.cones, maps, candidates(body.cones, maps, hull_points, 1.1 * settings.far_m))[0]
 
 
 def _draw(rng: np.random.Generator, settings: SearchSettings, body: BodyModel, state: np.ndarray, limb: str, hull_points: np.ndarray):
@@ -144,7 +188,7 @@ def _draw(rng: np.random.Generator, settings: SearchSettings, body: BodyModel, s
     centre, _ = limb_joint(body, state, limb)
     places, _ = places_and_directions(hull_points)
     near = np.linalg.norm(places - centre, axis=1) < sum(limb_lengths(body, limb)) + settings.far_m
-    goals = places[near & (body_distance(body, state[None], hull_points)[0] > settings.far_m)]
+    goals = places[near & (_unexplained(body, state, hull_points, settings) > settings.far_m)]
     n_reach = round(settings.reach_share * settings.draws) if len(goals) else 0
     n_common = (settings.draws - n_reach) // 2
     n_any = settings.draws - n_reach - n_common

@@ -8,7 +8,8 @@ the flesh as round and straight near each point.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,14 +17,13 @@ from hmc.pose.annealed.cone_maps import cone_maps
 from hmc.pose.annealed.floor import floor_gap, lowest_support
 from hmc.pose.annealed.hull_target import HullTarget, distance_gradient
 from hmc.pose.annealed.nearest_cone import Candidates, candidates, nearest_cones
-from hmc.pose.annealed.penetration import penetration_depth, penetration_rows
-from hmc.pose.annealed.symmetric import POSTURE, BodyPoints, SymmetricSettings, body_distance
-from hmc.pose.body.flesh import place_points
+from hmc.pose.annealed.penetration import penetration_rows
+from hmc.pose.annealed.symmetric import POSTURE, BodyPoints, SymmetricSettings
 from hmc.pose.body.joints import N_DOF
-from hmc.pose.body.kinematics import dof_masks, joint_twists, segment_transforms
+from hmc.pose.body.kinematics import dof_masks, joint_twists
 from hmc.pose.body.model import BodyModel
 
-__all__ = ["RefineInfo", "RefineSettings", "refine", "residual_rows", "residual_values"]
+__all__ = ["RefineInfo", "RefineSettings", "refine", "refine_best", "residual_rows", "residual_values"]
 
 #: Which degrees of freedom move each segment, and last the world.
 _MASKS = np.concatenate([dof_masks().astype(float), np.zeros((1, N_DOF))])
@@ -41,24 +41,67 @@ class RefineSettings:
     iterations : int
         Most accepted steps.
     tolerance : float
-        Stop when the cost falls by less than this share in a step.
+        Stop when the cost falls by less than this share in a step, or none is left that promises more.
     stay_weight : float
         Weight (square metres for a step of one prior deviation) that holds angles no data speaks of, such as the twist of a
         straight arm, where the start has them.
+    trial_steps : int
+        Accepted steps after which the best of several starts goes on alone.
     """
 
     iterations: int = 12
     tolerance: float = 2e-3
     stay_weight: float = 4e-6
+    trial_steps: int = 3
 
 
 @dataclass(frozen=True)
 class RefineInfo:
-    """Cost before and after (square metres, the hold on the start included), and cost evaluations."""
+    """What a refinement came to.
+
+    Parameters
+    ----------
+    cost_before, cost_after : float
+        Square metres, the hold included.
+    cost : float
+        The symmetric cost alone, afterwards, square metres.
+    evaluations : int
+        Of the cost.
+    """
 
     cost_before: float
     cost_after: float
+    cost: float
     evaluations: int
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """What stays the same while a pose descends; as the arguments of `refine`, with the weights of the hold, shape (27,)."""
+
+    body: BodyModel
+    samples: BodyPoints
+    target: HullTarget
+    hull_points: np.ndarray
+    cost_settings: SymmetricSettings
+    settings: RefineSettings
+    free: np.ndarray
+    hold: np.ndarray
+
+
+@dataclass(frozen=True)
+class _Descent:
+    """How far a pose has come: its distances and costs, the damping of the next step, and what is to be told in the end."""
+
+    state: np.ndarray
+    anchor: np.ndarray
+    found: _Distances
+    cost: float
+    first: float
+    evaluations: int = 1
+    accepted: int = 0
+    damping: float = 1e-2
+    is_done: bool = False
 
 
 def refine(
@@ -95,47 +138,116 @@ def refine(
         Within the body's joint limits.
     info : RefineInfo
     """
-    free = np.ones(N_DOF, bool) if free is None else free
-    low, high = body.limits.low, body.limits.high
-    state = np.clip(state, low, high)
+    problem = _Problem(
+        body, samples, target, hull_points, cost_settings, settings, _free(free), settings.stay_weight / _deviation(deviation) ** 2
+    )
+    return _outcome(_descend(problem, _begin(problem, state, anchor), settings.iterations))
+
+
+def refine_best(
+    body: BodyModel,
+    samples: BodyPoints,
+    starts: Sequence[np.ndarray],
+    target: HullTarget,
+    hull_points: np.ndarray,
+    cost_settings: SymmetricSettings,
+    settings: RefineSettings,
+    anchor: np.ndarray | None = None,
+    is_hopeless: Callable[[np.ndarray, float], bool] | None = None,
+) -> tuple[np.ndarray, RefineInfo]:
+    """Refine several starts by some steps each, and the one that is best then to the end.
+
+    Parameters
+    ----------
+    body, samples, target, hull_points, cost_settings, settings
+        As for `refine`.
+    starts : sequence of ndarray, shape (27,)
+    anchor : ndarray, shape (27,), optional
+        As for `refine`; each start's own by default.
+    is_hopeless : callable, optional
+        Told the best state after its first steps and its cost (square metres, the hold included): whether to leave it there.
+
+    Returns
+    -------
+    state : ndarray, shape (27,)
+    info : RefineInfo
+        Of the best, with the evaluations of all.
+    """
+    problem = _Problem(
+        body, samples, target, hull_points, cost_settings, settings, _free(None), settings.stay_weight / _deviation(None) ** 2
+    )
+    trials = [_descend(problem, _begin(problem, start, anchor), settings.trial_steps) for start in starts]
+    best = min(trials, key=lambda trial: trial.cost)
+    before = sum(trial.evaluations for trial in trials) - best.evaluations
+    if is_hopeless is None or not is_hopeless(best.state, best.cost):
+        best = _descend(problem, best, settings.iterations)
+    state, info = _outcome(best)
+    return state, replace(info, evaluations=info.evaluations + before)
+
+
+def _free(free: np.ndarray | None) -> np.ndarray:
+    return np.ones(N_DOF, bool) if free is None else free
+
+
+def _deviation(deviation: np.ndarray | None) -> np.ndarray:
+    return np.r_[np.full(3, 0.1), np.full(N_DOF - 3, 0.5)] if deviation is None else deviation
+
+
+def _outcome(descent: _Descent) -> tuple[np.ndarray, RefineInfo]:
+    cost = float(descent.found.residuals @ descent.found.residuals)
+    return descent.state, RefineInfo(descent.first, descent.cost, cost, descent.evaluations)
+
+
+def _begin(problem: _Problem, state: np.ndarray, anchor: np.ndarray | None) -> _Descent:
+    state = np.clip(state, problem.body.limits.low, problem.body.limits.high)
     anchor = state if anchor is None else anchor
-    if deviation is None:
-        deviation = np.r_[np.full(3, 0.1), np.full(N_DOF - 3, 0.5)]
-    hold = settings.stay_weight / deviation**2
+    found, cost = _evaluate(problem, state, anchor)
+    return _Descent(state, anchor, found, cost, cost)
 
-    def evaluate(s, before=None):
-        found = _distances(body, samples, s, target, hull_points, cost_settings, before)
-        return found, float(found.residuals @ found.residuals + hold @ (s - anchor) ** 2)
 
-    found, cost = evaluate(state)
-    first, evaluations, damping, accepted = cost, 1, 1e-2, 0
+def _evaluate(problem: _Problem, state: np.ndarray, anchor: np.ndarray, before: Candidates | None = None) -> tuple[_Distances, float]:
+    found = _distances(problem.body, problem.samples, state, problem.target, problem.hull_points, problem.cost_settings, before)
+    return found, float(found.residuals @ found.residuals + problem.hold @ (state - anchor) ** 2)
+
+
+def _descend(problem: _Problem, descent: _Descent, accepted: int) -> _Descent:
+    """Go on until so many steps were accepted, or nothing is to be gained."""
+    low, high, hold = problem.body.limits.low, problem.body.limits.high, problem.hold
     improved = True
-    while accepted < settings.iterations and damping < 1e4:
+    while descent.accepted < accepted and not descent.is_done:
+        state, found = descent.state, descent.found
         if improved:
-            pulled, jacobian = _pulls(found, cost_settings)
-            gradient = jacobian.T @ found.residuals[pulled] + hold * (state - anchor)
+            pulled, jacobian = _pulls(found, problem.cost_settings)
+            gradient = jacobian.T @ found.residuals[pulled] + hold * (state - descent.anchor)
             normal = jacobian.T @ jacobian + np.diag(hold)
-        # An angle at its limit that wants further out takes no part in this step.
-        stuck = ((state <= low) & (gradient > 0)) | ((state >= high) & (gradient < 0)) | ~free
-        active = np.flatnonzero(~stuck)
-        matrix = normal[np.ix_(active, active)]
-        matrix = matrix + damping * np.diag(np.diag(matrix) + 1e-9)
+            # An angle at its limit that wants further out takes no part in this step.
+            stuck = ((state <= low) & (gradient > 0)) | ((state >= high) & (gradient < 0)) | ~problem.free
+            active = np.flatnonzero(~stuck)
+            normal = normal[np.ix_(active, active)]
+        matrix = normal + descent.damping * np.diag(np.diag(normal) + 1e-9)
         step = np.zeros(N_DOF)
         step[active] = -np.linalg.solve(matrix, gradient[active])
+        promised = -step[active] @ (2 * gradient[active] + normal @ step[active])
+        if promised < problem.settings.tolerance * descent.cost:
+            return replace(descent, is_done=True)
         trial = np.clip(state + np.clip(step, -0.5, 0.5), low, high)
-        trial_found, trial_cost = evaluate(trial, found.pairs)
-        evaluations += 1
-        improved = trial_cost < cost
+        trial_found, trial_cost = _evaluate(problem, trial, descent.anchor, found.pairs)
+        improved = trial_cost < descent.cost
+        descent = replace(descent, evaluations=descent.evaluations + 1)
         if improved:
-            gain = (cost - trial_cost) / max(cost, 1e-12)
-            state, found, cost = trial, trial_found, trial_cost
-            damping = max(damping * 0.3, 1e-4)
-            accepted += 1
-            if gain < settings.tolerance:
-                break
+            gain = (descent.cost - trial_cost) / max(descent.cost, 1e-12)
+            descent = replace(
+                descent,
+                state=trial,
+                found=trial_found,
+                cost=trial_cost,
+                damping=max(descent.damping * 0.3, 1e-4),
+                accepted=descent.accepted + 1,
+                is_done=gain < problem.settings.tolerance,
+            )
         else:
-            damping *= 5
-    return state, RefineInfo(first, cost, evaluations)
+            descent = replace(descent, damping=max(descent.damping * 10, 1e-2))
+    return descent
 
 
 def residual_rows(
@@ -265,23 +377,8 @@ def residual_values(
     hull_points: np.ndarray,
     settings: SymmetricSettings,
 ) -> np.ndarray:
-    """The residuals of `residual_rows` alone, at a fraction of the work."""
-    rotations, positions = segment_transforms(body, state)
-    surface = samples.surface
-    outside, _ = distance_gradient(target, place_points(rotations, positions, surface.points, surface.segment))
-    depth = penetration_depth(body, samples.axes, rotations[None], positions[None])[0]
-    unexplained = body_distance(body, state[None], hull_points)[0]
-    cap = settings.cap_m
-    floor = np.zeros(0) if target.floor_z is None else floor_gap(body, rotations[None], positions[None], target.floor_z)
-    return np.concatenate(
-        [
-            np.sqrt(1 / len(outside)) * np.minimum(outside, cap).astype(float),
-            np.sqrt(settings.explain_weight / len(hull_points)) * np.minimum(unexplained, cap).astype(float),
-            np.sqrt(settings.overlap_weight / len(depth)) * depth,
-            np.sqrt(settings.floor_weight) * floor,
-            _posture(state, settings),
-        ]
-    )
+    """The residuals of `residual_rows` alone, at less of the work."""
+    return _distances(body, samples, state, target, hull_points, settings).residuals
 
 
 def _posture(state: np.ndarray, settings: SymmetricSettings) -> np.ndarray:
