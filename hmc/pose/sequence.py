@@ -25,7 +25,7 @@ from hmc.pose.annealed.presets import PosePreset
 from hmc.pose.annealed.rays import with_rays
 from hmc.pose.annealed.unexplained import explaining
 from hmc.pose.body.joints import DOF_NAMES
-from hmc.pose.body.kinematics import landmarks
+from hmc.pose.body.kinematics import landmark_masks, landmarks
 from hmc.pose.person import Decided, FollowSettings, PersonState, PersonTask, PoseTask, person_step, taken_up
 from hmc.pose.records import from_record, keep_particles, kept_particles, to_record
 from hmc.recording import Recording
@@ -223,12 +223,14 @@ def _assemble(rows: list[Decided]) -> PosedPeople:
     frames, persons, states, costs, status = frames[order], persons[order], states[order], costs[order], status[order]
     bodies = {one.person: one.body for one in rows if one.body is not None}
     missing = np.concatenate([none.astype(bool), *(_missing(one) for one in rows)])[order]
-    # An angle that no data shows is not a number, and so is all that hangs on it.
-    states = np.where(missing, np.nan, states)
     positions = np.full((len(frames), len(LANDMARKS), 3), np.nan)
     for person, body in bodies.items():
         fitted = (persons == person) & (status == "fitted")
         positions[fitted] = landmarks(body, states[fitted])
+        # An angle that no data shows is not a number, and neither is what it moves.
+        unknown = missing[fitted].astype(int) @ landmark_masks(body).T
+        positions[fitted] = np.where(unknown[..., None] > 0, np.nan, positions[fitted])
+    states = np.where(missing, np.nan, states)
     unfitted = Counter((int(person), str(why)) for person, why in zip(persons, status, strict=True) if why != "fitted")
     notes = [f"person {who}: {n} frame{'s' if n > 1 else ''} without a pose: {why}" for (who, why), n in sorted(unfitted.items())]
     notes += _limb_notes(persons, missing)
