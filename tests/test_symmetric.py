@@ -12,7 +12,9 @@ from posed import COST, body_of, crossed_arms, true_state, with_cylinders
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
-from hmc.pose.annealed.hull_target import HullTarget, distance_at, distance_gradient, make_target, sample_points
+from hmc.errors import InputError
+from hmc.pose.annealed.hull_target import FAR_M, HullTarget, distance_at, distance_gradient, make_target, sample_points
+from hmc.pose.annealed.near_distance import near_distance
 from hmc.pose.annealed.penetration import penetration_depth
 from hmc.pose.annealed.symmetric import POSTURE, SymmetricSettings, body_distance, outside_distance, symmetric_cost
 from hmc.pose.body.flesh import cone_distance, place_points
@@ -82,10 +84,10 @@ def test_the_field_is_nothing_inside_both_hulls_and_the_distance_outside(balls):
     away = np.linalg.norm(points - [0, 2.8, 1.2], axis=1)
     found = distance_at(balls, points)
     assert np.all(found[away < 0.26] == 0)
-    assert np.all(np.diff([found[(away > a) & (away < a + 0.05)].mean() for a in (0.2, 0.3, 0.4, 0.5, 0.6, 0.7)]) > 0)
+    assert np.all(np.diff([found[(away > a) & (away < a + 0.05)].mean() for a in (0.2, 0.3, 0.4, 0.5)]) > 0)
     tree = cKDTree(GRID.centres(ball([0, 2.8, 1.2], 0.4)))
     exact = np.maximum(tree.query(points)[0] - GRID.voxel_size_m / 2, 0)
-    far = away > 0.45
+    far = (away > 0.45) & (away < 0.4 + FAR_M)
     more = found[far] - exact[far]
     assert more.min() > -0.04 and more.max() < 0.08  # a voxel's rounding, and what the strict hull may add
     assert np.abs(found[far] - exact[far] - np.median(more)).max() < 0.04
@@ -96,8 +98,10 @@ def test_a_person_at_the_border_of_the_grid():
     target = make_target(GRID, voxels, voxels)
     assert_allclose(target.surface.min(0), GRID.origin + 0.02)
     assert_allclose(target.volume_m3, 60 * 0.04**3)
-    outside = GRID.origin - [[0.3, 0, 0], [0, 0, 0.2]]
-    assert_allclose(distance_at(target, outside), [0.3, 0.2], atol=0.03)
+    outside = GRID.origin - [[0.2, 0, 0], [0, 0, 0.08], [0.34, 0, 0]]
+    *near, far = distance_at(target, outside)
+    assert_allclose(near, [0.2, 0.08], atol=0.03)
+    assert FAR_M <= far < 0.34
 
 
 def test_surface_voxels_have_a_free_neighbour(balls):
@@ -243,3 +247,20 @@ def test_the_true_pose_of_a_rendered_person_costs_least():
         costs = symmetric_cost(body, points, np.stack([true, *others]), target, target.surface[::4], COST)
         assert np.argmin(costs) == 0
         assert costs[0] < 0.3 * np.median(costs)
+
+
+@settings(max_examples=25)
+@given(seed=st.integers(0, 2**31), reach=st.integers(1, 14))
+def test_near_distance_is_the_exact_transform_up_to_its_reach(seed, reach):
+    rng = np.random.default_rng(seed)
+    occupied = rng.random(rng.integers(1, 14, 3)) < rng.choice([0.003, 0.05])
+    expected = np.full(occupied.shape, reach + 1.0)
+    if occupied.any():
+        expected = np.minimum(ndimage.distance_transform_edt(~occupied), reach + 1)
+    assert_allclose(near_distance(occupied, reach), expected, atol=1e-5)
+
+
+@pytest.mark.parametrize("cap_m", [0.0, -0.1, 0.5])
+def test_a_cap_beyond_the_distance_fields_is_refused(cap_m):
+    with pytest.raises(InputError, match="cap_m"):
+        SymmetricSettings(cap_m=cap_m)

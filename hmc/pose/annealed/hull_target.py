@@ -6,15 +6,17 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import ndimage
 
+from hmc.pose.annealed.near_distance import near_distance
 from hmc.voxels.grid import VoxelGrid
 from hmc.voxels.surface import surface
 
-__all__ = ["HullTarget", "distance_at", "distance_gradient", "make_target", "sample_points"]
+__all__ = ["FAR_M", "HullTarget", "distance_at", "distance_gradient", "make_target", "sample_points"]
 
 #: Room left around a person's voxels in the distance field, metres: limbs of wrong guesses still see the way back.
 MARGIN_M = 0.35
+#: Distances are told as far as this, metres: what lies farther off counts no more than what the symmetric cost's cap allows.
+FAR_M = 0.25
 #: A strict hull smaller than this share of the tolerant one says that a camera lost the person: the tolerant one stands for it.
 LEAST_STRICT_SHARE = 0.1
 #: Between the strict and the tolerant hull a body may be, but had better not: this share of the distance to the strict hull,
@@ -33,7 +35,7 @@ class HullTarget:
     ----------
     distance : ndarray of float32, shape (nx, ny, nz)
         How far a body's surface is from where it may be, metres: the distance to the tolerant hull plus a bounded share of that
-        to the strict one; 0 inside both. A crop around the person.
+        to the strict one, each as far as `FAR_M`; 0 inside both. A crop around the person.
     tolerant : ndarray of bool, shape (nx, ny, nz)
         The tolerant hull in the same crop.
     loose : ndarray of bool, shape (nx, ny, nz)
@@ -136,11 +138,11 @@ def _crop(volume: np.ndarray, low: np.ndarray, shape: np.ndarray) -> np.ndarray:
 
 
 def _distance_to(occupied: np.ndarray, voxel_size_m: float) -> np.ndarray:
-    if not occupied.any():
-        return np.full(occupied.shape, np.inf, np.float32)
-    distance = ndimage.distance_transform_edt(~occupied).astype(np.float32) * np.float32(voxel_size_m)
-    # The transform measures to voxel centres; the hull's surface is half a voxel nearer.
-    return np.maximum(distance - np.float32(0.5 * voxel_size_m), 0)
+    distance = near_distance(occupied, int(np.ceil(FAR_M / voxel_size_m)))
+    # Measured to voxel centres; the hull's surface is half a voxel nearer.
+    distance -= np.float32(0.5)
+    distance *= np.float32(voxel_size_m)
+    return np.maximum(distance, 0, out=distance)
 
 
 def sample_points(rng: np.random.Generator, points: np.ndarray, n: int) -> np.ndarray:

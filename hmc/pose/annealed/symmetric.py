@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from hmc.errors import InputError
 from hmc.pose.annealed.cone_maps import ConeMaps, cone_maps, cones_near
 from hmc.pose.annealed.floor import floor_gap
 from hmc.pose.annealed.hull_target import HullTarget, distance_at
@@ -33,6 +34,8 @@ __all__ = [
     "symmetric_cost",
 ]
 
+#: The largest cap: the distance fields must go beyond it by a voxel and more (`hmc.pose.annealed.hull_target.FAR_M`).
+MOST_CAP_M = 0.2
 #: Elements (pairs of a cone and a point x states) worked on at a time: what stays in the second-level cache.
 CHUNK = 16384
 
@@ -84,6 +87,10 @@ class SymmetricSettings:
     overlap_weight: float = 2.0
     posture_weight: float = 3e-6
     floor_weight: float = 0.015
+
+    def __post_init__(self) -> None:
+        if not 0 < self.cap_m <= MOST_CAP_M:
+            raise InputError(f"`cap_m` must be above 0 and at most {MOST_CAP_M} m, where the hulls' distance fields end; got {self.cap_m}")
 
 
 @dataclass(frozen=True)
