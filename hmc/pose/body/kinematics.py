@@ -13,7 +13,7 @@ from hmc.pose.body.joints import N_DOF, SEGMENTS
 from hmc.pose.body.model import BodyModel
 from hmc.pose.body.proportions import landmark_segments
 
-__all__ = ["SEGMENT_DOFS", "dof_masks", "joint_twists", "landmarks", "segment_transforms"]
+__all__ = ["SEGMENT_DOFS", "dof_masks", "joint_twists", "landmark_masks", "landmarks", "segment_transforms"]
 
 _LANDMARK_SEGMENTS = landmark_segments()
 
@@ -143,6 +143,15 @@ def dof_masks() -> np.ndarray:
             masks[index] = masks[segment.parent]
         masks[index, list(SEGMENT_DOFS[index])] = True
     return masks
+
+
+def landmark_masks(body: BodyModel) -> np.ndarray:
+    """Which degrees of freedom move which landmarks, shape (15, 27), bool: a knee is not moved by its own angle."""
+    masks, at_joint = dof_masks(), np.linalg.norm(body.tips, axis=1) < 1e-9
+    carriers = [
+        SEGMENTS[k].parent if still and SEGMENTS[k].parent >= 0 else k for k, still in zip(_LANDMARK_SEGMENTS, at_joint, strict=True)
+    ]
+    return masks[carriers]
 
 
 def _turn(frame: np.ndarray | None, axis: str, cos: np.ndarray, sin: np.ndarray) -> np.ndarray:

@@ -9,11 +9,13 @@ from hmc.errors import InputError
 from hmc.pose.annealed.presets import PosePreset
 from hmc.pose.scalable.limbs import LimbSettings
 from hmc.pose.scalable.model_file import read_hierarchy
-from hmc.pose.scalable.models import MODEL_1, MODEL_2, Inclusive, Unitive
+from hmc.pose.scalable.models import MODEL_1, MODEL_2, UNITIVE_PIECES, Inclusive, Unitive
 
 __all__ = ["SCALABLE_METHODS", "method_preset"]
 
 SCALABLE_METHODS = ("shbm-apf", "ddm-apf", "shbm-ddm-apf")
+#: For presets that refine. Strong annealing leaves particles close together whatever the data: the spread says nothing of a tracked limb.
+_REFINED_LIMBS = LimbSettings(UNITIVE_PIECES, lost_spread_deg=0.0, lost_occupancy=0.2, found_spread_deg=8.0, found_occupancy=0.7)
 _SHIPPED = {"1": (MODEL_1,), "2": (MODEL_2,), "auto": (MODEL_1, MODEL_2)}
 
 
@@ -51,6 +53,6 @@ def method_preset(preset: PosePreset, method: str, models: Sequence[str] = ()) -
     if "shbm" in method:
         preset = replace(preset, models=structural or _SHIPPED["1"])
     if "ddm" in method:
-        limbs = preset.limbs or LimbSettings()
+        limbs = LimbSettings() if preset.refine is None else _REFINED_LIMBS
         preset = replace(preset, limbs=limbs if tree is None else replace(limbs, tree=tree))
     return preset

@@ -18,7 +18,7 @@ from hmc.errors import InputError
 from hmc.pose.body.joints import DOF_NAMES, dof_index
 from hmc.pose.body.model import PARTS
 
-__all__ = ["MODEL_1", "MODEL_2", "UNITIVE", "Inclusive", "Model", "Union", "Unitive"]
+__all__ = ["MODEL_1", "MODEL_2", "UNITIVE", "UNITIVE_PIECES", "Inclusive", "Model", "Union", "Unitive"]
 
 
 @dataclass(frozen=True)
@@ -269,25 +269,36 @@ MODEL_1 = _shbm("1", PARTS, "last")
 MODEL_2 = _shbm("2", _UPPER, "last")
 
 
-def _unitive() -> Unitive:
-    """Figure 7.11: trunk, arms, thighs and shanks. An arm without its forearm is not considered, nor a shank without its thigh."""
+def _angles(side: str, joint: str) -> tuple[str, ...]:
+    return tuple(name for name in DOF_NAMES if name.startswith(f"{side}_{joint}"))
+
+
+def _unitive(name: str, with_forearms: bool) -> Unitive:
     trunk = Model("trunk", (*_ROOT, *_TRUNK, "neck_x", "neck_y"), ("torso", "head"))
-    leaves, unions = [trunk], []
-    for side in "rl":
-        leaves.append(Model(f"{side}_arm", _angles(side, "shoulder", "elbow"), (f"{side}_upper_arm", f"{side}_forearm")))
-    for side in "rl":
-        thigh, shank = (Model(f"{side}_{p}", _angles(side, joint), (f"{side}_{p}",)) for p, joint in (("thigh", "hip"), ("shank", "knee")))
-        leaves += [thigh, shank]
-        unions.append(Union(_united(f"{side}_leg", (thigh, shank)), (thigh.name, shank.name)))
-    arms, legs = leaves[1:3], [union.model for union in unions]
-    unions.append(Union(_united("upper body", (trunk, *arms)), ("trunk", "r_arm", "l_arm")))
-    unions.append(Union(_united("body", (trunk, *arms, *legs)), ("upper body", "r_leg", "l_leg")))
-    return Unitive("body", tuple(leaves), tuple(unions), (("r_shank", "r_thigh"), ("l_shank", "l_thigh")))
+    leaves, unions, needs = [trunk], [], []
+
+    def limb(side: str, name: str, upper: tuple[str, str], lower: tuple[str, str], pieces: bool) -> str:
+        members = [Model(f"{side}_{part}", _angles(side, joint), (f"{side}_{part}",)) for part, joint in (upper, lower)]
+        whole = _united(f"{side}_{name}", members)
+        if not pieces:
+            leaves.append(whole)
+            return whole.name
+        leaves.extend(members)
+        unions.append(Union(whole, (members[0].name, members[1].name)))
+        needs.append((members[1].name, members[0].name))
+        return whole.name
+
+    arms = [limb(side, "arm", ("upper_arm", "shoulder"), ("forearm", "elbow"), with_forearms) for side in "rl"]
+    legs = [limb(side, "leg", ("thigh", "hip"), ("shank", "knee"), True) for side in "rl"]
+    known = {one.name: one for one in (*leaves, *(union.model for union in unions))}
+    upper = _united("upper body", [trunk, *(known[arm] for arm in arms)])
+    unions.append(Union(upper, ("trunk", *arms)))
+    unions.append(Union(_united("body", [upper, *(known[leg] for leg in legs)]), ("upper body", *legs)))
+    return Unitive(name, tuple(leaves), tuple(unions), tuple(needs))
 
 
-def _angles(side: str, *joints: str) -> tuple[str, ...]:
-    return tuple(name for name in DOF_NAMES if name.startswith(tuple(f"{side}_{joint}" for joint in joints)))
-
-
-#: The unitive tree of Figure 7.11.
-UNITIVE = _unitive()
+#: The unitive tree of Figure 7.11: trunk, arms, thighs and shanks. An arm without its forearm is not considered, nor a shank without its
+#: thigh.
+UNITIVE = _unitive("figure 7.11", with_forearms=False)
+#: The same with forearms that may be missing while the upper arm is seen: hands that reach behind a table.
+UNITIVE_PIECES = _unitive("pieces", with_forearms=True)

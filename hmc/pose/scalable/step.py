@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hmc.montecarlo.filters import ParticleState
+from hmc.montecarlo.filters import ParticleState, annealed_step
+from hmc.montecarlo.weights import normalise
 from hmc.pose.annealed.apf import (
     LEAST_SURFACE,
     PoseFilter,
@@ -22,14 +23,42 @@ from hmc.pose.annealed.apf import (
 from hmc.pose.annealed.hull_target import HullTarget
 from hmc.pose.annealed.presets import PosePreset
 from hmc.pose.annealed.rays import points_to_explain
+from hmc.pose.annealed.scores import ScoreMaps, ScoreTable
 from hmc.pose.annealed.symmetric import POSTURE
-from hmc.pose.scalable.restrict import ScoreData, SymmetricData, nearest_part, part_mask
-from hmc.pose.scalable.structure import StructuralInfo, structural_step
+from hmc.pose.body.joints import N_DOF
+from hmc.pose.body.model import PARTS
+from hmc.pose.scalable.limbs import LimbMemory, LimbSettings, limb_spread_deg, look_again
+from hmc.pose.scalable.restrict import ScoreData, SymmetricData, nearest_part, part_mask, restrict_filter, restrict_target
+from hmc.pose.scalable.scouts import limb_occupancy, scout
+from hmc.pose.scalable.structure import structural_step
 
 __all__ = ["PoseStep", "scalable_step", "step_of"]
 
+#: All that the search for lost limbs may look for.
+_LIMB_PARTS = [part for part in PARTS if part not in ("torso", "head")]
 #: A step of one person's filter.
 PoseStep = Callable[[np.random.Generator, PoseFilter, PoseState, HullTarget | None], tuple[PoseState, PoseInfo]]
+
+
+@dataclass(frozen=True)
+class _There:
+    """What of the body is there: parts, shape (n_parts,), and angles, shape (27,)."""
+
+    parts: np.ndarray
+    dofs: np.ndarray
+
+
+@dataclass(frozen=True)
+class _Found:
+    """What a search came to: estimate and best state, each of shape (27,), particles, and those of the lower models."""
+
+    estimate: np.ndarray
+    best: np.ndarray
+    best_log_likelihood: float
+    particles: ParticleState
+    evaluations: int
+    lower: tuple[ParticleState, ...] = ()
+    levels: np.ndarray | None = None
 
 
 def step_of(preset: PosePreset) -> PoseStep:
@@ -38,7 +67,7 @@ def step_of(preset: PosePreset) -> PoseStep:
 
 
 def scalable_step(rng: np.random.Generator, filt: PoseFilter, state: PoseState, target: HullTarget | None) -> tuple[PoseState, PoseInfo]:
-    """One frame: structural annealing, then refinement where the preset has it.
+    """One frame: the limbs that are there, by structural annealing or by plain one, refined where the preset has it; then the scouts.
 
     Parameters
     ----------
@@ -53,55 +82,101 @@ def scalable_step(rng: np.random.Generator, filt: PoseFilter, state: PoseState, 
     state : PoseState
     info : PoseInfo
     """
+    preset, limbs = filt.preset, filt.preset.limbs
+    memory = None if limbs is None else LimbMemory.of(state.memory, limbs)
+    there = _there(limbs, memory)
     if target is None or len(target.surface) < LEAST_SURFACE:
-        return unseen(state)
-    preset = filt.preset
-    found = _structural(rng, filt, state, _observed(rng, filt, state, target))
+        pose, info = unseen(state)
+        return pose, replace(info, missing=~there.dofs)
+    maps = score_maps(target, filt.room) if limbs is not None or preset.likelihood != "symmetric" else None
+    data = _observed(rng, filt, state, target, maps, there)
+    found = _structural(rng, filt, state, data, there) if preset.models else _annealed(rng, filt, state, data, there)
     searched: list[str] = []
     if preset.refine is None:
-        estimate, cost, more = found.threads[-1].mean, np.nan, 0
-        if preset.likelihood == "symmetric":
-            cost = -found.info.best_log_likelihood
+        estimate, more = found.estimate, 0
+        cost = -found.best_log_likelihood if preset.likelihood == "symmetric" else np.nan
     else:
-        estimate, cost, searched, more = polish(rng, filt, [found.info.best, state.state], state.state, target)
-    pose = PoseState(estimate, estimate - state.state, found.threads[-1], _kept(found.threads[:-1]) if preset.refine is None else {})
-    return pose, PoseInfo(cost, tuple(searched), found.evaluations + more, None, "fitted", levels=found.info.estimates)
+        part, seen = restrict_filter(filt, there.parts), _asked(filt, state, target, there)
+        if not there.parts[part_mask(_LIMB_PARTS)].any():
+            part = replace(part, preset=replace(preset, search=None))
+        estimate, cost, searched, more = polish(rng, part, [found.best, state.state], state.state, seen)
+    estimate = np.where(there.dofs, estimate, state.state)
+    kept = {} if preset.refine is not None else _kept(found.lower)
+    particles = found.particles
+    if limbs is not None and memory is not None and filt.table is not None and maps is not None:
+        memory, estimate, looked = _look(rng, filt.table, maps, estimate, particles, memory, limbs)
+        returned = _there(limbs, memory).dofs & ~there.dofs
+        particles = replace(particles, particles=np.where(returned, estimate, particles.particles))
+        there, more = _there(limbs, memory), more + looked
+        kept |= memory.kept()
+    pose = PoseState(estimate, np.where(there.dofs, estimate - state.state, 0.0), particles, kept)
+    missing = None if there.dofs.all() else ~there.dofs
+    return pose, PoseInfo(cost, tuple(searched), found.evaluations + more, None, "fitted", missing, found.levels)
 
 
-def _observed(rng: np.random.Generator, filt: PoseFilter, state: PoseState, target: HullTarget) -> ScoreData | SymmetricData:
+def _there(limbs: LimbSettings | None, memory: LimbMemory | None) -> _There:
+    if limbs is None or memory is None:
+        return _There(np.ones(len(PARTS), bool), np.ones(N_DOF, bool))
+    model = limbs.tree.model(memory.active)
+    return _There(part_mask(model.parts), np.isin(np.arange(N_DOF), model.dofs))
+
+
+def _asked(filt: PoseFilter, state: PoseState, target: HullTarget, there: _There) -> HullTarget:
+    """The hulls without what only a missing part would explain."""
+    if there.parts.all():
+        return target
+    target = restrict_target(target, there.parts)
+    surface = target.surface[there.parts[nearest_part(filt.body, state.state, target.surface)]]
+    target = replace(target, surface=surface if len(surface) else target.surface)
+    if target.rays is not None and len(target.rays):
+        rays = target.rays[there.parts[nearest_part(filt.body, state.state, target.rays)]]
+        target = replace(target, rays=rays if len(rays) else None)
+    return target
+
+
+def _observed(rng, filt, state, target, maps, there) -> ScoreData | SymmetricData:
     """The frame as the preset's likelihood reads it."""
     if filt.preset.likelihood != "symmetric":
-        return ScoreData(score_maps(target, filt.room))
+        return ScoreData(maps)
     points = points_to_explain(rng, target, filt.preset.hull_points, filt.preset.symmetric.ray_share)
     return SymmetricData(target, points, nearest_part(filt.body, state.state, points))
 
 
-@dataclass(frozen=True)
-class _Found:
-    threads: tuple[ParticleState, ...]
-    info: StructuralInfo
-    evaluations: int
+def _annealed(rng, filt, state, data, there) -> _Found:
+    """The plain annealed filter of what is there."""
+    low, high = filt.body.limits.low, filt.body.limits.high
+    starts = state.particles if filt.preset.refine is None else starting_particles(filt, state)
+    particles, info = annealed_step(
+        rng,
+        starts,
+        lambda states: data.log_likelihood(filt, states, there.parts),
+        np.where(there.dofs, filt.drift, 0.0),
+        low,
+        high,
+        filt.preset.annealed,
+    )
+    return _Found(info.estimate, info.best, info.best_log_likelihood, particles, info.evaluations)
 
 
-def _structural(rng, filt, state, data) -> _Found:
-    """The hierarchies' filters, which share the particles; the one that explains the whole body best."""
-    hierarchies = filt.preset.models
+def _structural(rng, filt, state, data, there) -> _Found:
+    """The hierarchies' filters, which share the particles; the one that explains the body best."""
+    hierarchies, refined = filt.preset.models, filt.preset.refine is not None
     settings = replace(filt.preset.structural, gamma=filt.preset.structural.gamma / len(hierarchies))
     low, high = filt.body.limits.low, filt.body.limits.high
     trials = []
     for hierarchy in hierarchies:
-        likelihoods = [_likelihood(filt, data, hierarchy, level) for level in range(len(hierarchy.models))]
-        if filt.preset.refine is None:
-            starts = [*_threads(state, len(hierarchy.models) - 1), state.particles]
-        else:
-            starts = [starting_particles(filt, state)] * len(hierarchy.models)
-        trials.append(structural_step(rng, starts, likelihoods, hierarchy.group, filt.drift, low, high, settings))
+        n = len(hierarchy.models)
+        likelihoods = [_likelihood(filt, data, hierarchy, level, there) for level in range(n)]
+        starts = [starting_particles(filt, state)] * n if refined else [*_threads(state, n - 1), state.particles]
+        group = np.where(there.dofs, hierarchy.group, n)
+        trials.append(structural_step(rng, starts, likelihoods, group, filt.drift, low, high, settings))
     threads, info = max(trials, key=lambda trial: trial[1].best_log_likelihood)
-    return _Found(threads, info, sum(info.evaluations for _, info in trials))
+    evaluations = sum(one.evaluations for _, one in trials)
+    return _Found(threads[-1].mean, info.best, info.best_log_likelihood, threads[-1], evaluations, threads[:-1], info.estimates)
 
 
-def _likelihood(filt, data, hierarchy, level):
-    keep = part_mask(hierarchy.models[level].parts)
+def _likelihood(filt, data, hierarchy, level, there):
+    keep = part_mask(hierarchy.models[level].parts) & there.parts
     lacking = hierarchy.group > level
 
     def log_likelihood(states: np.ndarray) -> np.ndarray:
@@ -128,3 +203,35 @@ def _threads(state: PoseState, n: int) -> list[ParticleState]:
         else state.particles
         for level in range(n)
     ]
+
+
+def _look(
+    rng: np.random.Generator,
+    table: ScoreTable,
+    maps: ScoreMaps,
+    estimate: np.ndarray,
+    particles: ParticleState,
+    memory: LimbMemory,
+    limbs: LimbSettings,
+) -> tuple[LimbMemory, np.ndarray, int]:
+    """Are the tracked limbs still shown, and the missing ones again? Memory, estimate with the limbs that were found, evaluations."""
+    tree = limbs.tree
+    there = part_mask(tree.model(memory.active).parts)
+    weights = normalise(particles.log_weights)
+    evidence = np.zeros(len(tree.limbs), bool)
+    found, evaluations = {}, 0
+    for k, limb in enumerate(tree.limbs):
+        if memory.active[k]:
+            evaluations += 1
+            spread = limb_spread_deg(particles.particles[:, limb.dofs], weights).min()
+            if spread > limbs.lost_spread_deg:
+                evidence[k] = limb_occupancy(table, estimate, maps, limb.parts, there) < limbs.lost_occupancy
+        elif tree.parent[k] < 0 or memory.active[tree.parent[k]]:
+            report = scout(rng, table, maps, estimate, k, memory.active, limbs)
+            evaluations += report.evaluations
+            found[k] = report.state
+            evidence[k] = report.spread_deg < limbs.found_spread_deg and report.occupancy > limbs.found_occupancy
+    after = look_again(memory, evidence, limbs)
+    for k in np.flatnonzero(after.active & ~memory.active).tolist():
+        estimate = np.where(np.isin(np.arange(N_DOF), tree.limbs[k].dofs), found[k], estimate)
+    return after, estimate, evaluations

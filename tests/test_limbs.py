@@ -1,0 +1,211 @@
+"""Bodies of some parts only, the lost and found tests, scouts, and the step that has them, on hulls made of a body's own flesh."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+from posed import body_of
+
+from hmc.errors import InputError
+from hmc.pose.annealed.apf import make_filter, pose_init, score_maps
+from hmc.pose.annealed.hull_target import make_target
+from hmc.pose.annealed.presets import PRESETS
+from hmc.pose.annealed.scores import scores
+from hmc.pose.annealed.symmetric import symmetric_cost
+from hmc.pose.body.flesh import cone_distance, flesh_points, place_points
+from hmc.pose.body.joints import N_DOF, dof_index
+from hmc.pose.body.kinematics import landmark_masks, landmarks, segment_transforms
+from hmc.pose.body.model import PARTS, neutral_state
+from hmc.pose.scalable.limbs import LimbMemory, LimbSettings, limb_spread_deg, look_again
+from hmc.pose.scalable.methods import method_preset
+from hmc.pose.scalable.models import UNITIVE, UNITIVE_PIECES
+from hmc.pose.scalable.restrict import SymmetricData, nearest_part, part_mask, restrict_table
+from hmc.pose.scalable.scouts import limb_occupancy, scout
+from hmc.pose.scalable.step import scalable_step
+from hmc.voxels.grid import VoxelGrid
+
+ALL = np.ones(len(PARTS), bool)
+GRID = VoxelGrid.from_room(np.array([[-1.2, -1.2, -0.1], [1.2, 1.2, 2.1]]), 0.03)
+LIMBS = [limb.name for limb in UNITIVE_PIECES.limbs]
+
+
+def standing(lift: float = 0.95) -> np.ndarray:
+    state = neutral_state("down")
+    state[2] = lift
+    return state
+
+
+def hull_of(state: np.ndarray, keep: np.ndarray = ALL):
+    """The hulls of a body of some parts: every voxel that its flesh touches."""
+    body, _ = body_of()
+    flesh = flesh_points(body, 0.015)
+    rows = keep[flesh.part]
+    points = place_points(*segment_transforms(body, state), flesh.points[rows], flesh.segment[rows])
+    voxels = np.unique(GRID.index_of(points), axis=0)
+    return make_target(GRID, voxels, voxels)
+
+
+def without(*parts: str) -> np.ndarray:
+    return ~part_mask(parts)
+
+
+@pytest.fixture(scope="module")
+def filters():
+    body, _ = body_of()
+    refined = method_preset(PRESETS["default"], "ddm-apf")
+    # A twentieth of the default's work: what is tested is which limbs are there.
+    refined = replace(refined, annealed=replace(refined.annealed, layers=2, particles=30), search=None)
+    return {
+        "default": make_filter(body, refined, 30.0, 0.03),
+        "canton2009": make_filter(body, method_preset(PRESETS["canton2009"], "ddm-apf"), 30.0, 0.03),
+    }
+
+
+def test_scores_of_kept_parts_are_those_of_the_whole_body(filters):
+    table = filters["default"].table
+    states = standing() + np.random.default_rng(0).normal(0, 0.1, (5, N_DOF))
+    maps = score_maps(hull_of(standing()), None)
+    whole = scores(table, states, maps)
+    keep = without("l_forearm", "r_shank")
+    part = scores(restrict_table(table, keep), states, maps)
+    assert_array_equal(part[:, keep][..., [0, 2, 3]], whole[:, keep][..., [0, 2, 3]])
+    assert np.all(part[:, ~keep, 1] == 0) and np.all(part[:, keep, 1] <= whole[:, keep, 1] + 1e-6)
+    alone = part_mask(["l_thigh"])
+    assert not scores(restrict_table(table, alone), states, maps)[..., 1].any()
+
+
+def test_the_likelihood_of_some_parts_does_not_know_the_others(filters):
+    filt, target = filters["default"], hull_of(standing())
+    data = SymmetricData(target, target.surface, nearest_part(filt.body, standing(), target.surface))
+    rng = np.random.default_rng(1)
+    states = standing() + rng.normal(0, 0.05, (6, N_DOF))
+    whole = data.log_likelihood(filt, states, ALL)
+    assert_array_equal(whole, -symmetric_cost(filt.body, filt.samples, states, target, target.surface, filt.preset.symmetric))
+    keep = without("r_thigh", "r_shank")
+    moved = states.copy()
+    moved[:, dof_index("r_hip_x", "r_hip_y", "r_hip_z", "r_knee_y")] += rng.normal(0, 0.5, (6, 4))
+    rest = replace(filt, preset=replace(filt.preset, symmetric=replace(filt.preset.symmetric, posture_weight=0.0)))
+    assert_allclose(data.log_likelihood(rest, moved, keep), data.log_likelihood(rest, states, keep), rtol=1e-4)
+    assert np.all(np.abs(data.log_likelihood(rest, moved, ALL) - data.log_likelihood(rest, states, ALL)) > 1e-6)
+
+
+def test_the_nearest_part_is_that_of_the_nearest_cone():
+    body, _ = body_of()
+    points = np.random.default_rng(2).uniform([-0.5, -0.5, 0], [0.5, 0.5, 1.8], (40, 3))
+    state = standing()
+    rotations, positions = segment_transforms(body, state)
+    nearest = nearest_part(body, state, points)
+    for point, part in zip(points, nearest, strict=True):
+        away = np.array(
+            [
+                cone_distance(body.cones, k, (point - positions[segment]) @ rotations[segment])
+                for k, segment in enumerate(body.cones.segment)
+            ]
+        )
+        assert away[body.cones.part == part].min() <= away.min() + 1e-4
+
+
+def test_an_angle_moves_the_landmarks_that_the_masks_say():
+    body, _ = body_of()
+    state = standing() + np.random.default_rng(3).normal(0, 0.2, N_DOF)
+    for dof in range(N_DOF):
+        moved = np.abs(landmarks(body, state + 1e-3 * np.eye(N_DOF)[dof]) - landmarks(body, state)).max(axis=1) > 1e-7
+        assert_array_equal(moved & ~landmark_masks(body)[:, dof], False)
+    assert landmark_masks(body)[:, dof_index("l_knee_y")].sum() == 1  # the ankle alone
+    assert landmark_masks(body)[:, 0].all()
+
+
+@given(st.integers(2, 30), st.integers(0, 100))
+def test_the_spread_is_the_weighted_standard_deviation(n, seed):
+    rng = np.random.default_rng(seed)
+    angles, weights = rng.normal(size=(n, 3)), rng.random(n) + 0.01
+    weights /= weights.sum()
+    expected = np.sqrt(np.cov(angles.T, aweights=weights, ddof=0).diagonal())
+    assert_allclose(limb_spread_deg(angles, weights), np.degrees(expected), rtol=1e-9)
+
+
+@given(st.lists(st.booleans(), min_size=1, max_size=40), st.integers(1, 5), st.integers(1, 5))
+def test_a_limb_changes_after_enough_frames_on_end_and_not_before(evidence, lost, found):
+    settings = LimbSettings(lost_frames=lost, found_frames=found)
+    memory, active, run = LimbMemory.first(settings), True, 0
+    for one in evidence:
+        memory = look_again(memory, np.array([one] + [False] * (len(UNITIVE.limbs) - 1)), settings)
+        run = run + 1 if one else 0
+        if run == (lost if active else found):
+            active, run = not active, 0
+        assert memory.active[0] == active and memory.active[1:].all()
+
+
+def test_who_loses_a_thigh_loses_the_shank():
+    settings = LimbSettings(tree=UNITIVE_PIECES, lost_frames=1)
+    memory = look_again(LimbMemory.first(settings), np.array([name == "r_thigh" for name in LIMBS]), settings)
+    assert [name for name, there in zip(LIMBS, memory.active, strict=True) if not there] == ["r_thigh", "r_shank"]
+
+
+def test_thresholds_without_hysteresis_are_refused():
+    with pytest.raises(InputError, match="`lost_occupancy` must be at most `found_occupancy`"):
+        LimbSettings(lost_occupancy=0.8)
+    with pytest.raises(InputError, match="`lost_frames`"):
+        LimbSettings(lost_frames=0)
+
+
+@pytest.mark.parametrize("name", ["r_shank", "l_forearm", "l_thigh"])
+def test_occupancy_and_scouts_tell_a_limb_that_is_there_from_one_that_is_not(filters, name):
+    filt = filters["default"]
+    settings, table = filt.preset.limbs, filt.table
+    state = standing()
+    # Away from trunk and floor: the arm out, the knee bent.
+    state[dof_index("l_shoulder_x", "r_knee_y", "r_hip_y")] = np.radians([-30.0, 60.0, -30.0])
+    limb = LIMBS.index(name)
+    active = settings.tree.possible(np.arange(len(LIMBS)) != limb)
+    others = part_mask(settings.tree.model(active).parts)
+    gone = [limb.name for limb, there in zip(settings.tree.limbs, active, strict=True) if not there]
+    there, missing = score_maps(hull_of(state), None), score_maps(hull_of(state, without(*gone)), None)
+    parts = settings.tree.limbs[limb].parts
+    assert limb_occupancy(table, state, there, parts, others) > 0.9
+    assert limb_occupancy(table, state, missing, parts, others) < 0.1
+    found = [scout(np.random.default_rng(seed), table, there, state, limb, active, settings) for seed in range(4)]
+    assert np.median([one.occupancy for one in found]) > settings.found_occupancy
+    assert np.median([one.spread_deg for one in found]) < settings.found_spread_deg
+    lost = [scout(np.random.default_rng(seed), table, missing, state, limb, active, settings) for seed in range(4)]
+    assert max(one.occupancy for one in lost) < settings.found_occupancy
+
+
+def test_a_hidden_shank_is_dropped_and_taken_back_and_the_rest_stays(filters):
+    filt = filters["default"]
+    state = standing()
+    state[dof_index("r_knee_y", "r_hip_y")] = np.radians([50.0, -25.0])
+    whole, hidden = hull_of(state), hull_of(state, without("r_shank"))
+    pose, missing = pose_init(state), []
+    for frame, target in enumerate([whole] * 2 + [hidden] * 6 + [whole] * 8):
+        pose, info = scalable_step(np.random.default_rng([7, frame]), filt, pose, target)
+        missing.append(set() if info.missing is None else set(np.flatnonzero(info.missing).tolist()))
+        away = np.linalg.norm(landmarks(filt.body, pose.state) - landmarks(filt.body, state), axis=1)
+        assert away[:-1].max() < 0.1  # the right ankle is the last
+    assert away[-1] < 0.08
+    knee = set(dof_index("r_knee_y").tolist())
+    assert missing[:2] == [set(), set()] and missing[7] == knee and missing[-1] == set()
+    assert all(one in (set(), knee) for one in missing)
+
+
+def test_the_printed_test_asks_for_spread_and_occupancy(filters):
+    filt = filters["canton2009"]
+    assert filt.preset.limbs == LimbSettings() and filt.preset.limbs.tree == UNITIVE
+    few = replace(filt, preset=replace(filt.preset, annealed=replace(filt.preset.annealed, layers=1, particles=60)))
+    state = standing()
+    pose = pose_init(state)
+    target = hull_of(state, without("r_shank", "r_thigh", "l_thigh", "l_shank"))
+    tight = replace(few, drift=0.01 * few.drift)
+    for frame in range(4):
+        pose, _ = scalable_step(np.random.default_rng(frame), tight, pose, target)
+    assert LimbMemory.of(pose.memory, filt.preset.limbs).active.all()  # nothing is there, but the particles agree
+    wide = replace(few, drift=np.where(np.arange(N_DOF) < 6, 0.01, 3.0) * few.drift)
+    pose = pose_init(state)
+    for frame in range(4):
+        pose, info = scalable_step(np.random.default_rng(frame), wide, pose, target)
+    memory = LimbMemory.of(pose.memory, filt.preset.limbs)
+    assert not memory.active[[limb.name.endswith(("thigh", "shank")) for limb in UNITIVE.limbs]].any()
+    assert info.missing[dof_index("r_knee_y", "l_hip_x")].all()
