@@ -15,6 +15,7 @@ __all__ = ["RIGS", "make_rig"]
 RIGS: dict[str, tuple[int, int, int]] = {
     "ring7": (7, 0, 0),
     "ring7_overhead": (7, 0, 1),
+    "ring8": (8, 0, 0),
     "corners4": (0, 4, 0),
     "corners4_overhead": (0, 4, 1),
 }

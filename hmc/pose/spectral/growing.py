@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
+
+from hmc.pose.spectral.pieces import limb_pieces
 
 __all__ = ["Branch", "GrowSettings", "baseline_growing", "grow_branches"]
 
@@ -30,9 +30,10 @@ class GrowSettings:
         P and N: nodes of the first fit, and of each step.
     turn_deg : float
         A new principal direction is taken where it differs by more than this from the old one, degrees.
-    origin_radii : tuple of float
-        A branch ends where it is nearer to the origin than the first of these, in median distances of the core from the origin; than the
-        later ones where it meets no other branch before.
+    origin_radius : float
+        A branch ends where it is nearer to the origin than this, in median distances of the core from the origin, or meets another.
+    least_rise : float
+        The tip of a branch is at least so many times farther from the origin than the place where it meets another.
     outlier_error, most_outliers : float, int
         OT2, in median distances of all nodes from the origin, and OT1, nodes of a branch.
     most_branches : int
@@ -44,12 +45,13 @@ class GrowSettings:
     first_nodes: int = 14
     next_nodes: int = 14
     turn_deg: float = 10.0
-    origin_radii: tuple[float, ...] = (1.9, 1.7, 1.5, 1.35, 1.2)
+    origin_radius: float = 1.25
+    least_rise: float = 1.2
     outlier_error: float = 0.05
     most_outliers: int = 15
     reach: float = 0.15
     most_branches: int = 8
-    least_nodes: int = 10
+    least_nodes: int = 30
 
 
 @dataclass(frozen=True)
@@ -98,45 +100,27 @@ def grow_branches(places: np.ndarray, edges: np.ndarray, core: np.ndarray, setti
     free, pieces = np.ones(len(places), bool), np.zeros(len(places), int)
     if settings.stop == "origin":
         trunk = float(np.median(far[core] if core.any() else far))
-        free, pieces = _near_the_origin(edges, far, trunk * np.array(settings.origin_radii), settings.least_nodes)
+        pieces = limb_pieces(edges, far, settings.origin_radius * trunk, settings.least_nodes, settings.least_rise)
+        free = pieces >= 0
     branches: list[Branch] = []
     tree = cKDTree(places)
     while len(branches) < settings.most_branches and free.any():
         tip = int(np.argmax(np.where(free, far, -1.0)))
         branch = _grow(places, tree, far, free & (pieces == pieces[tip]), tip, settings)
+        if settings.stop == "origin":
+            branch = _with_rest(places, branch, np.setdiff1d(np.flatnonzero(free & (pieces == pieces[tip])), branch.nodes))
         free[branch.nodes] = False
         if len(branch.nodes) >= settings.least_nodes:
             branches.append(branch)
     return branches
 
 
-def _near_the_origin(edges: np.ndarray, far: np.ndarray, radii: np.ndarray, least: int) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes that are not near the origin, and the piece of the graph each is in.
-
-    What is near is the largest radius, and less for a piece that does not meet another one before: legs part further in than arms.
-    """
-    free = far > radii[0]
-    pieces = _pieces(edges, free)
-    for radius in radii[1:]:
-        wider = far > radius
-        merged = _pieces(edges, wider)
-        counts = np.bincount(pieces[free], minlength=pieces.max() + 1)
-        large = np.flatnonzero(counts >= least)
-        tips = np.array([np.flatnonzero(free & (pieces == piece))[0] for piece in large], int)
-        goals, meeting = np.unique(merged[tips], return_counts=True)
-        alone = goals[meeting == 1]
-        grown = wider & np.isin(merged, alone)
-        # A piece that has met another one stays as it was.
-        pieces = np.where(grown, merged + len(far), pieces)
-        free = free | grown
-        pieces = np.unique(pieces, return_inverse=True)[1]
-    return free, pieces
-
-
-def _pieces(edges: np.ndarray, free: np.ndarray) -> np.ndarray:
-    """Connected component of each node in the graph of the free nodes alone."""
-    a, b = edges[free[edges].all(1)].T
-    return connected_components(csr_array((np.ones(len(a), np.int8), (a, b)), shape=(len(free), len(free))), directed=False)[1]
+def _with_rest(places: np.ndarray, branch: Branch, rest: np.ndarray) -> Branch:
+    """A branch with nodes beside it, each at the site of the branch's nearest node."""
+    if len(rest) == 0:
+        return branch
+    nearest = cKDTree(places[branch.nodes]).query(places[rest])[1]
+    return Branch(np.concatenate([branch.nodes, rest]), np.concatenate([branch.sites, branch.sites[nearest]]))
 
 
 def _grow(places: np.ndarray, tree: cKDTree, far: np.ndarray, free: np.ndarray, tip: int, settings: GrowSettings) -> Branch:

@@ -20,8 +20,10 @@ HEAD_LENGTH_M, HEAD_ELONGATION = 0.52, 4.3
 HEAD_AREA_M2 = 0.0115
 #: Shorter branches are no limbs, metres.
 LEAST_LIMB_M = 0.15
-#: A leg's cross-section is commonly above this share of a stature of 1.7 m, square metres.
-LEG_AREA_M2 = 0.0125
+#: A leg has at least this share of the largest limb's volume.
+LEG_SHARE = 0.4
+#: A single leg with a larger cross-section is two, square metres.
+TWO_LEGS_M2 = 0.024
 
 
 @dataclass(frozen=True)
@@ -109,11 +111,17 @@ def name_branches(shapes: Sequence[BranchShape], trunk: np.ndarray, up: np.ndarr
     else:
         doubts.append("no head found")
     limbs = [k for k, s in enumerate(shapes) if not names[k] and s.length_m >= LEAST_LIMB_M]
-    # How far up the trunk a limb begins, and how thick it is, decide together.
+    # How far up the trunk a limb begins, and how large it is, decide together: a hanging forearm begins at the hip, but is no leg.
     height = {k: float((shapes[k].base - trunk) @ axis) for k in limbs}
-    thick = {k: shapes[k].area_m2 * shapes[k].length_m for k in limbs}
-    arms = sorted((k for k in limbs if height[k] > 0), key=lambda k: -height[k])
-    legs = sorted((k for k in limbs if height[k] <= 0), key=lambda k: -thick[k])
+    volume = {k: shapes[k].area_m2 * shapes[k].length_m for k in limbs}
+    largest = max(volume.values(), default=0.0)
+    low = sorted((k for k in limbs if height[k] <= 0 and volume[k] > LEG_SHARE * largest), key=lambda k: -volume[k])
+    legs = low[:2]
+    arms = sorted((k for k in limbs if k not in low), key=lambda k: -volume[k])
+    doubled = [k for k in legs if shapes[k].area_m2 > TWO_LEGS_M2 and len(legs) < 2]
+    for k in doubled:
+        legs.remove(k)
+        doubts.append("the legs are together")
     for found, kind in ((arms, "arm"), (legs, "leg")):
         for number, k in enumerate(found[:2]):
             names[k] = f"{kind}_{number + 1}"
@@ -121,4 +129,6 @@ def name_branches(shapes: Sequence[BranchShape], trunk: np.ndarray, up: np.ndarr
             doubts.append(f"{2 - len(found)} {kind}{'s' if len(found) == 0 else ''} not found")
         elif len(found) > 2:
             doubts.append(f"{len(found) - 2} more than two {kind}s")
+    if len(low) > 2:
+        doubts.append(f"{len(low) - 2} more than two legs")
     return names, tuple(doubts)

@@ -31,12 +31,15 @@ class SkeletonSettings:
         Of each curve, equally spaced.
     knots : int
         Inner knots of the spline.
+    trunk_trim : float
+        Share of the trunk's site values left out at either end, where they run off into a shoulder or a hip.
     least_voxels : int
         Smaller parts have no curve.
     """
 
     nodes: int = 16
     knots: int = 3
+    trunk_trim: float = 0.12
     least_voxels: int = 12
 
 
@@ -133,6 +136,8 @@ def extract_skeletons(segmentation: Segmentation, points: np.ndarray, settings: 
         number = np.cumsum(own) - 1
         sites = site_values(number[segmentation.edges[own[segmentation.edges].all(1)]], len(rows))
         known = np.isfinite(sites)
+        if part == "trunk":
+            known &= (sites > settings.trunk_trim) & (sites < 1 - settings.trunk_trim)
         if np.count_nonzero(known) < settings.least_voxels:
             continue
         curves[part] = curve_through(points[rows[known]], sites[known], settings)

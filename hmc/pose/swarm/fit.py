@@ -13,7 +13,7 @@ from hmc.pose.swarm.error import Observed, skeleton_error
 from hmc.pose.swarm.model import ANGLE_INDEX, ANGLES, N_PARAMETERS, SkeletonModel
 from hmc.pose.swarm.pso import PsoSettings, pso_run
 
-__all__ = ["FitSettings", "Fitted", "Prior", "bounds_around", "fine_tune", "fit_flat", "fit_hierarchical", "rest_state"]
+__all__ = ["FitSettings", "Fitted", "Prior", "bounds_around", "fine_tune", "fit_around", "fit_flat", "fit_hierarchical", "rest_state"]
 
 _TORSO = tuple(range(7))
 
@@ -172,6 +172,35 @@ def fit_hierarchical(
     return Fitted(tuned.state, tuned.error_m, tuned.parts, evaluations + tuned.evaluations)
 
 
+def fit_around(
+    rng: np.random.Generator,
+    model: SkeletonModel,
+    observed: Observed,
+    starts: np.ndarray,
+    low: np.ndarray,
+    high: np.ndarray,
+    settings: FitSettings,
+    particles: int,
+    iterations: int,
+    prior: Prior | None = None,
+) -> Fitted:
+    """All parameters within a box, from several starts: temporal PSO (section 3.2.2.5).
+
+    Parameters
+    ----------
+    rng, model, observed, settings
+        As for `fit_hierarchical`.
+    starts : ndarray, shape (k, 23)
+        The first is what parameters outside the search keep.
+    low, high : ndarray, shape (23,)
+    particles, iterations : int
+    prior : Prior, optional
+    """
+    swarm = _sized(settings.swarm, particles, iterations)
+    state, evaluations = _optimise(rng, model, observed, starts[0], np.arange(N_PARAMETERS), low, high, swarm, prior, starts)
+    return _fitted(model, observed, state, evaluations)
+
+
 def fit_flat(
     rng: np.random.Generator, model: SkeletonModel, observed: Observed, start: np.ndarray, swarm: PsoSettings, spin_range: float = np.pi
 ) -> Fitted:
@@ -202,7 +231,7 @@ def _sized(swarm: PsoSettings, particles: int, iterations: int) -> PsoSettings:
     )
 
 
-def _optimise(rng, model, observed, state, free, low, high, swarm, prior):
+def _optimise(rng, model, observed, state, free, low, high, swarm, prior, starts=None):
     """The state with some parameters optimised, and the number of evaluations."""
 
     def cost(values: np.ndarray) -> np.ndarray:
@@ -213,7 +242,7 @@ def _optimise(rng, model, observed, state, free, low, high, swarm, prior):
             errors = errors + prior.weight * np.abs(states[:, 7:] - prior.state[7:]).mean(1)
         return errors
 
-    found = pso_run(rng, cost, low[free], high[free], swarm, state[None, free])
+    found = pso_run(rng, cost, low[free], high[free], swarm, (state[None] if starts is None else starts)[:, free])
     out = state.copy()
     out[free] = found.leader
     # Only the direction of the neck counts: keep it on the torso.

@@ -1,0 +1,141 @@
+"""What the voxels of one frame say of a body: parts, the curves that can be trusted, and where the feet point."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hmc.pose.spectral.segmentation import Segmentation, SegmentationSettings, segment_body
+from hmc.pose.spectral.skeleton import SkeletonSettings, extract_skeletons
+
+__all__ = ["BodyReading", "ReadingSettings", "read_body"]
+
+
+@dataclass(frozen=True)
+class ReadingSettings:
+    """How a frame is read.
+
+    Parameters
+    ----------
+    segmentation : SegmentationSettings
+    skeleton : SkeletonSettings
+    foot_share : float
+        Length of a foot, over the stature, that is cut off the end of a leg's curve.
+    longest_limb : float
+        A limb's curve that is longer than this, over the stature, is that of two limbs.
+    least_limb : float
+        A limb's curve that is shorter than this, over the stature, says too little.
+    least_curves : int
+        Fewer curves, that of the trunk among them, are no body.
+    """
+
+    segmentation: SegmentationSettings = field(default_factory=SegmentationSettings)
+    skeleton: SkeletonSettings = field(default_factory=SkeletonSettings)
+    foot_share: float = 0.085
+    longest_limb: float = 0.75
+    least_limb: float = 0.1
+    least_curves: int = 3
+
+
+@dataclass(frozen=True)
+class BodyReading:
+    """A frame as it was read.
+
+    Parameters
+    ----------
+    segmentation : Segmentation
+    curves : dict of str to ndarray, shape (nodes, 3)
+        Of the parts that can be trusted, metres; limbs begin at the trunk, legs end at the ankle.
+    feet : ndarray, shape (k, 3)
+        From heel to toe, of each foot that was seen, metres.
+    left_out : tuple of str
+        Parts with a curve that is not to be trusted, and why.
+    status : str
+        ``"read"``, or why not.
+    """
+
+    segmentation: Segmentation
+    curves: dict[str, np.ndarray]
+    feet: np.ndarray
+    left_out: tuple[str, ...]
+    status: str
+
+
+def read_body(
+    voxels: np.ndarray,
+    points: np.ndarray,
+    voxel_size_m: float,
+    height_m: float,
+    settings: ReadingSettings | None = None,
+    votes: tuple[np.ndarray, np.ndarray] | None = None,
+) -> BodyReading:
+    """Segment a person's voxels and draw the curves.
+
+    Parameters
+    ----------
+    voxels : ndarray of int, shape (n, 3)
+    points : ndarray, shape (n, 3)
+        Their centres, world, metres.
+    voxel_size_m : float
+    height_m : float
+        Stature.
+    settings : ReadingSettings, optional
+    votes : (votes, voters), optional
+        As for `hmc.pose.spectral.segmentation.segment_body`.
+
+    Returns
+    -------
+    BodyReading
+    """
+    settings = settings or ReadingSettings()
+    segmentation = segment_body(voxels, points, voxel_size_m, settings.segmentation, votes)
+    if segmentation.status != "segmented":
+        return BodyReading(segmentation, {}, np.zeros((0, 3)), (), segmentation.status)
+    found = extract_skeletons(segmentation, points, settings.skeleton)
+    twice = {one.partition(" and ")[0] for one in segmentation.touching if one.endswith(" and trunk")}
+    curves, feet, left_out = {}, [], []
+    for part, curve in found.items():
+        length = float(np.linalg.norm(np.diff(curve, axis=0), axis=1).sum()) / height_m
+        if part[:3] in ("arm", "leg"):
+            why = ""
+            if part in twice:
+                why = "touches the trunk twice"
+            elif length > settings.longest_limb:
+                why = "is too long for one limb"
+            elif length < settings.least_limb:
+                why = "is too short"
+            if why:
+                left_out.append(f"{part} {why}")
+                continue
+        if part[:3] == "leg" and length > 3 * settings.foot_share:
+            curve, foot = cut_foot(curve, settings.foot_share * height_m)
+            feet.append(foot)
+        curves[part] = curve
+    status = "read"
+    if "trunk" not in curves:
+        status = "no trunk found"
+    elif len(curves) < settings.least_curves:
+        status = f"only {', '.join(curves)} found"
+    return BodyReading(segmentation, curves, np.array(feet).reshape(-1, 3), tuple(left_out), status)
+
+
+def cut_foot(curve: np.ndarray, foot_m: float) -> tuple[np.ndarray, np.ndarray]:
+    """A leg's curve up to the ankle, with as many nodes, and the vector from there to its end.
+
+    Parameters
+    ----------
+    curve : ndarray, shape (n, 3)
+        The end at the trunk first, metres.
+    foot_m : float
+        Length of the foot along the curve.
+
+    Returns
+    -------
+    curve : ndarray, shape (n, 3)
+    foot : ndarray, shape (3,)
+    """
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))])
+    at = np.linspace(0, max(way[-1] - foot_m, 0.0), len(curve))
+    cut = np.stack([np.interp(at, way, curve[:, axis]) for axis in range(3)], axis=1)
+    return cut, curve[-1] - cut[-1]

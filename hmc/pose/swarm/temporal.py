@@ -1,0 +1,224 @@
+"""Following a skeleton from frame to frame: a swarm near the last pose, and a new start where that is not good enough.
+
+Source: Hsiao (2008), section 3.2.2.5 and Figure 3-22.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from hmc.pose.spectral.reading import BodyReading
+from hmc.pose.swarm.error import Observed, observe_curves
+from hmc.pose.swarm.fit import FitSettings, Fitted, Prior, bounds_around, fine_tune, fit_around, fit_hierarchical, rest_state
+from hmc.pose.swarm.heading import facing_evidence, heading_of, spin_towards
+from hmc.pose.swarm.model import SkeletonModel
+
+__all__ = ["SwarmInfo", "SwarmSettings", "SwarmState", "start_fit", "swarm_step"]
+
+
+@dataclass(frozen=True)
+class SwarmSettings:
+    """How a person is followed.
+
+    Parameters
+    ----------
+    fit : FitSettings
+        Of a start.
+    nodes : int
+        Nodes of a curve that count.
+    reach_m_s, reach_rad_s : float
+        Temporal constraint: fastest change of positions and angles.
+    least_reach_m, least_reach_rad : float
+        The constraint is not tighter than this in any frame.
+    particles, iterations : int
+        Of the temporal swarm.
+    doubt_m, doubt_ratio : float
+        A start is tried beside the temporal fit when its error is larger than the first, metres, and than the second times the error that
+        was usual.
+    margin_m : float
+        The start is taken when its error is smaller by this, metres.
+    facing_m : float
+        By how much facing straight backwards raises an error, metres.
+    always_check : bool
+        Try a start in every frame, as the thesis does.
+    """
+
+    fit: FitSettings = field(default_factory=FitSettings)
+    nodes: int = 8
+    reach_m_s: float = 2.5
+    reach_rad_s: float = 14.0
+    least_reach_m: float = 0.05
+    least_reach_rad: float = 0.35
+    particles: int = 36
+    iterations: int = 30
+    doubt_m: float = 0.045
+    doubt_ratio: float = 1.4
+    margin_m: float = 0.012
+    facing_m: float = 0.02
+    always_check: bool = False
+
+
+@dataclass(frozen=True)
+class SwarmState:
+    """A followed skeleton.
+
+    Parameters
+    ----------
+    state, velocity : ndarray, shape (23,)
+        The last fit, and its change a frame.
+    usual_m : float
+        Running mean of the error, metres.
+    facing : float
+        Sum of the evidence for the heading since the last start; negative: probably back to front.
+    missed : int
+        Frames without a fit since the last one.
+    """
+
+    state: np.ndarray
+    velocity: np.ndarray
+    usual_m: float
+    facing: float = 0.0
+    missed: int = 0
+
+
+@dataclass(frozen=True)
+class SwarmInfo:
+    """What happened in one frame.
+
+    Parameters
+    ----------
+    status : str
+        ``"fitted"``, or ``"no fit: "`` and why.
+    error_m : float
+        Mean distance of corresponding nodes, metres; NaN without a fit.
+    started : bool
+        Whether the pose was found without the last one.
+    turned : bool
+        Whether the skeleton was turned about, because it had faced backwards.
+    evaluations : int
+    doubts : tuple of str
+        What the segmentation says is missing, touches or is left out.
+    """
+
+    status: str
+    error_m: float
+    started: bool
+    turned: bool
+    evaluations: int
+    doubts: tuple[str, ...]
+
+
+def start_fit(
+    rng: np.random.Generator, model: SkeletonModel, observed: Observed, reading: BodyReading, heading: np.ndarray | None,
+    settings: SwarmSettings, last: np.ndarray | None = None,
+) -> Fitted:
+    """A pose from one frame alone; with a heading, or the last pose, the two ways round are weighed by them.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    model : SkeletonModel
+    observed : Observed
+    reading : BodyReading
+    heading : ndarray, shape (2,), or None
+        As from `hmc.pose.swarm.heading.heading_of`.
+    settings : SwarmSettings
+    last : ndarray, shape (23,), optional
+        The last pose, where there is one: it is what is likely where curves are missing.
+    """
+    trunk = reading.curves["trunk"]
+    up = trunk[-1] - trunk[0]
+    rest = rest_state(model, trunk.mean(0), up)
+    if last is not None:
+        rest[7:] = last[7:]
+        forward = np.array([np.cos(last[6]), np.sin(last[6])])
+        spins = [float(np.arctan2(forward[1], forward[0]))]
+        rest[6] = spins[0]
+    elif heading is not None:
+        spins = [spin_towards(rest, heading)]
+    else:
+        spins = []
+    # Either way round, unless the heading leaves no doubt.
+    spins = [spins[0], spins[0] + np.pi] if spins else [0.0, np.pi / 2, np.pi, 3 * np.pi / 2]
+    fits, evaluations = [], 0
+    for spin in spins:
+        start = rest.copy()
+        start[6] = spin
+        found = fit_hierarchical(rng, model, observed, start, settings.fit, spin_range=1.0)
+        evaluations += found.evaluations
+        wrong = 0.5 * (1 - facing_evidence(found.state, heading) / max(float(np.linalg.norm(heading)), 1e-9)) if heading is not None else 0.0
+        if last is not None:
+            wrong += 0.5 * (1 - np.cos(found.state[6] - last[6]))
+        fits.append((found.error_m + settings.facing_m * wrong, found))
+    best = min(fits, key=lambda pair: pair[0])[1]
+    return replace(best, evaluations=evaluations)
+
+
+def swarm_step(
+    rng: np.random.Generator, model: SkeletonModel, state: SwarmState | None, reading: BodyReading, fps: float,
+    velocity: np.ndarray | None = None, settings: SwarmSettings | None = None,
+) -> tuple[SwarmState | None, SwarmInfo]:
+    """One frame of a person.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    model : SkeletonModel
+    state : SwarmState or None
+        None: nothing is known yet.
+    reading : BodyReading
+    fps : float
+    velocity : ndarray, shape (3,), optional
+        Of the person's track, metres a second.
+    settings : SwarmSettings, optional
+
+    Returns
+    -------
+    state : SwarmState or None
+    info : SwarmInfo
+    """
+    settings = settings or SwarmSettings()
+    segmentation = reading.segmentation
+    doubts = (*segmentation.doubts, *(f"{one} touch" for one in segmentation.touching), *reading.left_out)
+    if reading.status != "read":
+        kept = None if state is None else replace(state, velocity=np.zeros_like(state.velocity), missed=state.missed + 1)
+        return kept, SwarmInfo(f"no fit: {reading.status}", np.nan, False, False, 0, doubts)
+    observed = observe_curves(model, reading.curves, settings.nodes)
+    heading = heading_of(reading.feet, velocity)
+    if state is None:
+        found = start_fit(rng, model, observed, reading, heading, settings)
+        facing = facing_evidence(found.state, heading)
+        return SwarmState(found.state, np.zeros_like(found.state), found.error_m, facing), _info(found, True, False, 0, doubts)
+    frames = 1 + state.missed
+    metres = max(settings.reach_m_s * frames / fps, settings.least_reach_m)
+    radians = max(settings.reach_rad_s * frames / fps, settings.least_reach_rad)
+    prior = Prior(state.state)
+    low, high = bounds_around(model, state.state, metres, min(radians, np.pi))
+    starts = np.stack([state.state, state.state + state.velocity])
+    found = fit_around(rng, model, observed, starts, low, high, settings.fit, settings.particles, settings.iterations, prior)
+    tuned = fine_tune(rng, model, observed, found.state, settings.fit, prior)
+    found = replace(tuned, evaluations=found.evaluations + tuned.evaluations)
+    facing = state.facing + facing_evidence(found.state, heading)
+    started = turned = False
+    spent = 0
+    backwards = facing < -4.0 and facing_evidence(found.state, heading) < 0
+    doubtful = found.error_m > max(settings.doubt_m, settings.doubt_ratio * state.usual_m)
+    if doubtful or backwards or settings.always_check:
+        trial = start_fit(rng, model, observed, reading, heading, settings, None if backwards else state.state)
+        spent = trial.evaluations
+        margin = -settings.facing_m if backwards and facing_evidence(trial.state, heading) > 0 else settings.margin_m
+        if trial.error_m < found.error_m - margin:
+            found, started, turned = trial, True, backwards
+            facing = facing_evidence(trial.state, heading)
+        elif backwards:
+            facing = 0.0
+    change = np.zeros_like(found.state) if started else (found.state - state.state) / frames
+    # Sums of evidence fade, so that a wrong start can be seen after a while.
+    now = SwarmState(found.state, change, 0.9 * state.usual_m + 0.1 * found.error_m, 0.97 * facing)
+    return now, _info(found, started, turned, spent, doubts)
+
+
+def _info(found: Fitted, started: bool, turned: bool, spent: int, doubts: tuple[str, ...]) -> SwarmInfo:
+    return SwarmInfo("fitted", found.error_m, started, turned, found.evaluations + spent, doubts)
