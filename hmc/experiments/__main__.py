@@ -1,4 +1,4 @@
-"""``python -m hmc.experiments list | run ID... | status | merge FOLDER...``."""
+"""``python -m hmc.experiments list | run ID... | status | merge FOLDER... | report``."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def main(argv: list[str] | None = None) -> int:
 
 def _make_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m hmc.experiments", description="The papers' tables and figures, computed again.")
-    actions = parser.add_subparsers(required=True, metavar="{list,run,status,merge}")
+    actions = parser.add_subparsers(required=True, metavar="{list,run,status,merge,report}")
     listing = actions.add_parser("list", help="all experiments")
     listing.set_defaults(act=_list)
     run = actions.add_parser("run", help="compute experiments and write their tables and figures")
@@ -53,7 +53,9 @@ def _make_parser() -> argparse.ArgumentParser:
     merge = actions.add_parser("merge", help="bring the cells that several machines computed together")
     merge.add_argument("others", type=Path, nargs="+", metavar="FOLDER", help="folders of runs, as their --out")
     merge.set_defaults(act=_merge)
-    for action in (run, status, merge):
+    report = actions.add_parser("report", help="one page and one PDF of all that is computed, and how it compares with the papers")
+    report.set_defaults(act=_report)
+    for action in (run, status, merge, report):
         action.add_argument("--out", type=Path, default=Path("experiments"), metavar="DIR", help="folder of cells, inputs and reports")
     for action in (run, status):
         action.add_argument("--quick", action="store_true", help="a small grid that shows the shape, in minutes")
@@ -131,6 +133,22 @@ def _merge(args: argparse.Namespace) -> int:
                 f"{_cells(len(paths))} {'is' if len(paths) == 1 else 'are'} {what}: {paths[0]}{' and more' * (len(paths) > 1)}", sys.stderr
             )
     return EXIT_FAILED if merged.damaged else 0
+
+
+def _report(args: argparse.Namespace) -> int:
+    from hmc.experiments.booklet import write_booklet
+    from hmc.experiments.page import to_html, verdict_counts
+    from hmc.experiments.summary import summarise
+    from hmc.files import atomic_write
+
+    rows = summarise(args.out)
+    page, booklet = _folder(args.out) / "report.html", args.out / "report.pdf"
+    with atomic_write(page) as file:
+        file.write(to_html(rows))
+    write_booklet(booklet, rows)
+    _tell(verdict_counts(rows))
+    _tell(f"wrote {page} and {booklet}")
+    return 0
 
 
 def _cells(n: int) -> str:

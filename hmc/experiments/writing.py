@@ -69,7 +69,11 @@ def write_report(out: Path, experiment: Experiment, plan: Plan, report: Report) 
         "cells": {cell_key(experiment, cell): cell for cell in grid},
     }
     claims = [{"claim": claim.text, "holds": claim.holds, "detail": claim.detail} for claim in report.claims]
-    write_run(folder / "run.toml", experiment.id, parameters, None, seeds="of each cell, by its parameters", claims=claims)
+    captions = {table.name: table.caption for table in report.tables}
+    write_run(
+        folder / "run.toml", experiment.id, parameters, None, seeds="of each cell, by its parameters", claims=claims,
+        figures=list(report.figures), captions=captions,
+    )  # fmt: skip
     return folder
 
 
