@@ -40,6 +40,7 @@ EXPERIMENTS = {
     "table-6.4": "table_6_4",
     "fig-6.19": "fig_6_19",
     "what-each-adds": "what_each_adds",
+    "lost-arm": "lost_arm",
     "fig-B.1": "fig_b_1",
 }
 
