@@ -24,6 +24,10 @@ __all__ = ["add_parser", "run"]
 METHODS = ("apf", "shbm-apf", "ddm-apf", "shbm-ddm-apf", "smd", "marker-apf")
 #: The journal of a run that is not finished.
 POSE_JOURNAL = ".pose.journal"
+#: Methods whose poses can be smoothed.
+SMOOTHABLE = ("apf", "shbm-apf", "ddm-apf", "shbm-ddm-apf")
+#: Time over which poses are smoothed where no other is said, seconds.
+SMOOTH_S = 0.3
 #: Its silhouettes, which the tracker leaves for the poses.
 MASKS = ".masks"
 
@@ -67,6 +71,14 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
         help="everybody's stature in metres; auto: estimated from each person's volume; by default what recording.toml says of a "
         "single person, else auto",
     )
+    parser.add_argument(
+        "--smooth",
+        type=positive_float,
+        nargs="?",
+        const=SMOOTH_S,
+        metavar="S",
+        help=f"smooth the finished poses over so many seconds (without a number: {SMOOTH_S})",
+    )
     add_marker_options(parser)
     return parser
 
@@ -85,9 +97,12 @@ def run(args: argparse.Namespace) -> int:
     from hmc.pose.sequence import pose_recording
     from hmc.pose.smd.presets import smd_preset
     from hmc.pose.smd.sequence import SmdTask, pose_by_descent
+    from hmc.pose.smoothing import smooth_people
     from hmc.results import write_joints, write_pose, write_run, write_tracks
     from hmc.tracking.resumable import person_grid, track_recording
 
+    if args.smooth and args.method not in SMOOTHABLE:
+        raise InputError(f"--smooth: not for --method {args.method}; it is for {', '.join(SMOOTHABLE)}")
     recording = open_selected(args)
     if args.method == "marker-apf":
         return run_markers(args, _height(args.height, recording), recording)
@@ -111,6 +126,7 @@ def run(args: argparse.Namespace) -> int:
         "following": following,
         "tracker": tracker.settings,
         "frontend": frontend,
+        "smooth_s": args.smooth or 0.0,
     }
     source = recording_source(recording)
     depends_on = {"method": args.method, "seed": args.seed, **source, "parameters": parameters}
@@ -160,6 +176,8 @@ def run(args: argparse.Namespace) -> int:
             on_problem=problems.append,
             progress=lambda steps, total: progress(steps, total, "pose", args.quiet),
         )
+    if args.smooth:
+        people = smooth_people(people, preset, recording.fps, args.smooth)
     problems += people.notes
     write_tracks(paths["tracks.csv"], tracks)
     write_joints(paths["joints.csv"], people.poses)

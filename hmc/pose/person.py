@@ -18,6 +18,7 @@ from hmc.pose.annealed.presets import PosePreset
 from hmc.pose.body.joints import DOF_NAMES
 from hmc.pose.body.model import BodyModel
 from hmc.pose.legs import LegChoice, LegSettings, choose_legs, leg_choice, leg_points
+from hmc.pose.loss import LossSettings, loss_init, loss_step, recalled, remembered
 from hmc.pose.scalable.step import step_of
 from hmc.pose.start import StartSettings, start_person
 
@@ -39,11 +40,14 @@ class FollowSettings:
     start : StartSettings
     legs : LegSettings or None
         None: the legs stay as the filter has them. Presets without `refine` leave them too.
+    loss : LossSettings or None
+        How a pose that got lost as a whole is noticed and found anew; None: it is not, nor by presets without `refine`.
     """
 
     window_s: float = 1.5
     start: StartSettings = field(default_factory=StartSettings)
     legs: LegSettings | None = field(default_factory=LegSettings)
+    loss: LossSettings | None = field(default_factory=LossSettings)
 
 
 @dataclass(frozen=True)
@@ -80,9 +84,14 @@ class PoseTask:
         """How legs are told apart, where they are."""
         return self.settings.legs if self.preset.refine is not None else None
 
-    def rng(self, person: int, frame: int) -> np.random.Generator:
-        """The random numbers of a person's frame."""
-        return np.random.default_rng([self.seed, person, frame])
+    @property
+    def loss(self) -> LossSettings | None:
+        """How a lost pose is found anew, where it is."""
+        return self.settings.loss if self.preset.refine is not None else None
+
+    def rng(self, person: int, frame: int, *purpose: int) -> np.random.Generator:
+        """The random numbers of a person's frame, others for every purpose."""
+        return np.random.default_rng([self.seed, person, frame, *purpose])
 
 
 @dataclass(frozen=True)
@@ -210,6 +219,7 @@ def person_step(
     else:
         rng = task.rng(person.number, frame)
         pose, info = step_of(task.preset)(rng, state.filter, state.pose, target)
+        pose, info = _found_again(task, person, state.filter, state.pose, frame, pose, info, target)
         state = replace(state, pose=pose, followed=(*state.followed, _followed(task, rng, state.filter, frame, pose, info, target)))
     return _decide(task, person, state, is_last)
 
@@ -229,11 +239,34 @@ def _start(task: PoseTask, person: PersonTask, state: PersonState) -> PersonStat
     )
     if started is None:
         return None
+    poses = started.states
+    if task.loss is not None:
+        usual = remembered(loss_init(np.array([info.cost for info in started.infos]), task.loss))
+        poses = [replace(pose, memory={**pose.memory, **usual}) for pose in poses]
     followed = tuple(
         _followed(task, task.rng(person.number, frame), started.filter, frame, pose, info, target)
-        for frame, target, pose, info in zip(frames, targets, started.states, started.infos, strict=True)
+        for frame, target, pose, info in zip(frames, targets, poses, started.infos, strict=True)
     )
-    return replace(state, filter=started.filter, pose=started.states[-1], watched=(), followed=followed)
+    return replace(state, filter=started.filter, pose=poses[-1], watched=(), followed=followed)
+
+
+def _found_again(
+    task: PoseTask,
+    person: PersonTask,
+    filt: PoseFilter,
+    before: PoseState,
+    frame: int,
+    pose: PoseState,
+    info: PoseInfo,
+    target: HullTarget | None,
+) -> tuple[PoseState, PoseInfo]:
+    """The pose and its account, replaced where the pose was lost; what is known of that goes on in its memory."""
+    if task.loss is None:
+        return pose, info
+    rng, velocity = task.rng(person.number, frame, 1), person.velocities[np.searchsorted(person.frames, frame)]
+    known = recalled(before.memory)
+    pose, info, known = loss_step(rng, filt, task.fps, pose, info, target, velocity, known, task.loss, task.settings.start)
+    return replace(pose, memory={**pose.memory, **remembered(known)}), info
 
 
 def _followed(

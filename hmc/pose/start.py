@@ -28,7 +28,7 @@ from hmc.pose.body.proportions import canton_body, default_body
 from hmc.pose.initialisation import first_poses, swapped_poses
 from hmc.pose.scalable.step import step_of
 
-__all__ = ["StartSettings", "Started", "estimate_height", "follow", "possible_heights", "start_person"]
+__all__ = ["StartSettings", "Started", "estimate_height", "follow", "possible_heights", "start_person", "walk_factor"]
 
 #: Fewer frames say too little of a body: what they cannot tell apart, such as fat silhouettes from a tall person, would be fitted.
 LEAST_BODY_FRAMES = 6
@@ -269,7 +269,7 @@ def _best_hypothesis(frame_rng, filt, fps, targets, usable, velocities, floor_z,
     for anchor in anchors:
         rng = frame_rng(anchor)
         states, costs = first_poses(rng, body, samples, targets[anchor], preset.symmetric, floor_z)
-        costs = costs * _walk_factor(states[:, 3], velocities[anchor], settings)
+        costs = costs * walk_factor(states[:, 3], velocities[anchor], settings)
         pool += [(cost, anchor, state) for cost, state in zip(costs, states, strict=True)]
     pool.sort(key=lambda entry: entry[0])
     # All candidates are compared in the frame that was easiest to explain.
@@ -278,7 +278,7 @@ def _best_hypothesis(frame_rng, filt, fps, targets, usable, velocities, floor_z,
     here = [state for _, where, state in pool if where == anchor]
     trials = [*here, *swapped_poses(body, here[0]), *swapped_poses(body, here[min(1, len(here) - 1)])]
     refined = [refine(body, samples, trial, targets[anchor], points, preset.symmetric, preset.refine) for trial in trials]
-    refined.sort(key=lambda pair: pair[1].cost_after * _walk_factor(pair[0][3], velocities[anchor], settings))
+    refined.sort(key=lambda pair: pair[1].cost_after * walk_factor(pair[0][3], velocities[anchor], settings))
     chosen: list[np.ndarray] = []
     for state, _ in refined:
         if all(np.abs(landmarks(body, state) - landmarks(body, other)).max() > 0.08 for other in chosen):
@@ -294,7 +294,7 @@ def _best_hypothesis(frame_rng, filt, fps, targets, usable, velocities, floor_z,
         path, infos = follow(lambda k: frame_rng(first + k), _quick(filt), state, anchor - first, targets[first:last])
         followed = np.array([info.cost for info in infos])
         headings = np.array([one.state[3] for one in path])
-        scores.append(np.nanmean(followed * _walk_factor(headings, velocities[first:last], settings)))
+        scores.append(np.nanmean(followed * walk_factor(headings, velocities[first:last], settings)))
     order = np.argsort(scores)
     return anchor, chosen[order[0]], np.array(scores)[order]
 
@@ -315,8 +315,22 @@ def _search_all(rng, filt, state, target, points):
     )[0]
 
 
-def _walk_factor(headings: np.ndarray, velocities: np.ndarray, settings: StartSettings) -> np.ndarray:
-    """By how much walking backwards raises a cost: 1 for forwards or hardly moving, 1 + walk_penalty for straight back."""
+def walk_factor(headings: np.ndarray, velocities: np.ndarray, settings: StartSettings) -> np.ndarray:
+    """By how much walking backwards raises a cost.
+
+    Parameters
+    ----------
+    headings : ndarray, shape (n,)
+        Radians about Z.
+    velocities : ndarray, shape (n, 3) or (3,)
+        Of the track, metres a second.
+    settings : StartSettings
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        1 for forwards or hardly moving, 1 + walk_penalty for straight back.
+    """
     speed = np.hypot(velocities[..., 0], velocities[..., 1])
     forwards = (np.cos(headings) * velocities[..., 0] + np.sin(headings) * velocities[..., 1]) / np.maximum(speed, 1e-9)
     return np.where(speed > settings.walk_speed_m_s, 1 + settings.walk_penalty * (1 - forwards) / 2, 1.0)
