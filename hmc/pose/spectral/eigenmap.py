@@ -92,7 +92,7 @@ def _connected(weights: csr_array, k: int) -> tuple[np.ndarray, np.ndarray]:
     inverse = LinearOperator((n, n), matvec=lambda x: (y := factor.solve(np.asarray(x).ravel())) - null * (null @ y), dtype=float)
     start = _start_vector(n)
     start -= null * (null @ start)
-    values, vectors = eigsh(inverse, k=k, which="LM", v0=start, tol=1e-9)
+    values, vectors = eigsh(inverse, k=k, which="LM", v0=start, tol=1e-7)
     order = np.argsort(-values)
     return 1 / values[order] + SHIFT, root[:, None] * vectors[:, order]
 

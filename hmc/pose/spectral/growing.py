@@ -7,15 +7,15 @@ of the farthest node, so that settings do not depend on the number of voxels.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from hmc.pose.spectral.pieces import limb_pieces
+from hmc.pose.spectral.pieces import Pieces, PieceSettings, limb_pieces
 
-__all__ = ["Branch", "GrowSettings", "baseline_growing", "grow_branches"]
+__all__ = ["Branch", "GrowSettings", "baseline_growing", "ends_near_origin", "grow_branches"]
 
 
 @dataclass(frozen=True)
@@ -32,13 +32,12 @@ class GrowSettings:
         A new principal direction is taken where it differs by more than this from the old one, degrees.
     origin_radius : float
         A branch ends where it is nearer to the origin than this, in median distances of the core from the origin, or meets another.
-    least_rise : float
-        The tip of a branch is at least so many times farther from the origin than the place where it meets another.
+    pieces : PieceSettings
+        When branches meet.
     outlier_error, most_outliers : float, int
         OT2, in median distances of all nodes from the origin, and OT1, nodes of a branch.
-    most_branches : int
-    least_nodes : int
-        Smaller branches are left out.
+    most_branches, least_nodes : int
+        How many branches Sundaresan's method takes, and how small they may be.
     """
 
     stop: Literal["origin", "outliers"] = "origin"
@@ -46,12 +45,12 @@ class GrowSettings:
     next_nodes: int = 14
     turn_deg: float = 10.0
     origin_radius: float = 1.25
-    least_rise: float = 1.2
+    pieces: PieceSettings = field(default_factory=PieceSettings)
     outlier_error: float = 0.05
     most_outliers: int = 15
     reach: float = 0.15
     most_branches: int = 8
-    least_nodes: int = 30
+    least_nodes: int = 10
 
 
 @dataclass(frozen=True)
@@ -75,17 +74,35 @@ def baseline_growing() -> GrowSettings:
     return replace(GrowSettings(), stop="outliers", most_branches=6)
 
 
-def grow_branches(places: np.ndarray, edges: np.ndarray, core: np.ndarray, settings: GrowSettings | None = None) -> list[Branch]:
+def ends_near_origin(places: np.ndarray, edges: np.ndarray, core: np.ndarray, settings: GrowSettings | None = None) -> Pieces:
+    """Where branches end: near the origin, or where they meet. Arguments as for `grow_branches`, and:
+
+    Parameters
+    ----------
+    places : ndarray, shape (n, k)
+    edges : ndarray of int, shape (m, 2)
+        Of the graph.
+    core : ndarray of bool, shape (n,)
+        Nodes deep inside the body, which say how far from the origin the trunk reaches. All nodes where none is.
+    settings : GrowSettings, optional
+    """
+    settings = settings or GrowSettings()
+    far = np.linalg.norm(places, axis=1)
+    trunk = float(np.median(far[core] if core.any() else far))
+    return limb_pieces(edges, far, settings.origin_radius * trunk, settings.pieces)
+
+
+def grow_branches(
+    places: np.ndarray, pieces: Pieces | None = None, settings: GrowSettings | None = None
+) -> list[Branch]:
     """All branches of an embedding, the one with the farthest tip first.
 
     Parameters
     ----------
     places : ndarray, shape (n, k)
         Of the nodes in the eigenspace.
-    edges : ndarray of int, shape (m, 2)
-        Of the graph: what is near the origin left out, a branch is connected.
-    core : ndarray of bool, shape (n,)
-        Nodes deep inside the body, which say how far from the origin the trunk reaches. All nodes where none is.
+    pieces : Pieces, optional
+        Where branches end (`ends_near_origin`); left out, each ends by Sundaresan's outliers.
     settings : GrowSettings, optional
 
     Returns
@@ -94,48 +111,44 @@ def grow_branches(places: np.ndarray, edges: np.ndarray, core: np.ndarray, setti
         No node is in two.
     """
     settings = settings or GrowSettings()
-    if len(places) < settings.first_nodes + 1:
-        return []
     far = np.linalg.norm(places, axis=1)
-    free, pieces = np.ones(len(places), bool), np.zeros(len(places), int)
-    if settings.stop == "origin":
-        trunk = float(np.median(far[core] if core.any() else far))
-        pieces = limb_pieces(edges, far, settings.origin_radius * trunk, settings.least_nodes, settings.least_rise)
-        free = pieces >= 0
-    branches: list[Branch] = []
-    tree = cKDTree(places)
-    while len(branches) < settings.most_branches and free.any():
-        tip = int(np.argmax(np.where(free, far, -1.0)))
-        branch = _grow(places, tree, far, free & (pieces == pieces[tip]), tip, settings)
-        if settings.stop == "origin":
-            branch = _with_rest(places, branch, np.setdiff1d(np.flatnonzero(free & (pieces == pieces[tip])), branch.nodes))
+    if pieces is not None:
+        branches = []
+        for number in range(pieces.count):
+            own = np.flatnonzero(pieces.labels == number)
+            branch = _grow(places[own], far[own], np.ones(len(own), bool), settings)
+            branches.append(_with_rest(places[own], branch, own))
+        return branches
+    branches, free = [], np.ones(len(places), bool)
+    while len(branches) < settings.most_branches and np.count_nonzero(free) > settings.first_nodes:
+        branch = _grow(places, far, free, settings)
         free[branch.nodes] = False
         if len(branch.nodes) >= settings.least_nodes:
             branches.append(branch)
     return branches
 
 
-def _with_rest(places: np.ndarray, branch: Branch, rest: np.ndarray) -> Branch:
-    """A branch with nodes beside it, each at the site of the branch's nearest node."""
-    if len(rest) == 0:
-        return branch
-    nearest = cKDTree(places[branch.nodes]).query(places[rest])[1]
-    return Branch(np.concatenate([branch.nodes, rest]), np.concatenate([branch.sites, branch.sites[nearest]]))
+def _with_rest(places: np.ndarray, branch: Branch, nodes: np.ndarray) -> Branch:
+    """A branch of all these nodes: those beside what was grown have the site of the nearest grown one."""
+    rest = np.setdiff1d(np.arange(len(nodes)), branch.nodes)
+    nearest = cKDTree(places[branch.nodes]).query(places[rest])[1] if len(rest) else rest
+    return Branch(nodes[np.concatenate([branch.nodes, rest])], np.concatenate([branch.sites, branch.sites[nearest]]))
 
 
-def _grow(places: np.ndarray, tree: cKDTree, far: np.ndarray, free: np.ndarray, tip: int, settings: GrowSettings) -> Branch:
-    """One branch, from its tip inwards."""
-    nodes = _nearest(tree, places, free, places[tip], settings.first_nodes + 1)
+def _grow(places: np.ndarray, far: np.ndarray, free: np.ndarray, settings: GrowSettings) -> Branch:
+    """One branch of the free nodes, from the farthest one inwards."""
+    free = free.copy()
+    tip = int(np.argmax(np.where(free, far, -1.0)))
+    nodes = _nearest(places, free, places[tip], settings.first_nodes + 1)
     direction = _principal(places[nodes], places[nodes].mean(0) - places[tip])
     sites = (places[nodes] - places[tip]) @ direction
-    free = free.copy()
     free[nodes] = False
     limit, reach = settings.outlier_error * float(np.median(far)), settings.reach * far[tip]
     outliers = 0
     while True:
         end = int(np.argmax(sites))
         here = places[nodes[end]]
-        new = _nearest(tree, places, free, here, settings.next_nodes)
+        new = _nearest(places, free, here, settings.next_nodes)
         new = new[np.linalg.norm(places[new] - here, axis=1) < reach]
         if len(new) == 0:
             break
@@ -146,8 +159,7 @@ def _grow(places: np.ndarray, tree: cKDTree, far: np.ndarray, free: np.ndarray, 
         new_sites = float(sites[end]) + (places[new] - here) @ direction
         if settings.stop == "outliers":
             curve = _curve(sites[recent], places[nodes[recent]], new_sites)
-            off = np.linalg.norm(places[new] - curve, axis=1) > limit
-            outliers += np.count_nonzero(off)
+            outliers += np.count_nonzero(np.linalg.norm(places[new] - curve, axis=1) > limit)
             if outliers > settings.most_outliers:
                 break
         nodes, sites = np.concatenate([nodes, new]), np.concatenate([sites, new_sites])
@@ -155,20 +167,20 @@ def _grow(places: np.ndarray, tree: cKDTree, far: np.ndarray, free: np.ndarray, 
     return Branch(nodes, sites)
 
 
-def _nearest(tree: cKDTree, places: np.ndarray, free: np.ndarray, point: np.ndarray, n: int) -> np.ndarray:
-    """The n free nodes nearest to a point."""
-    k = min(4 * n, len(places))
-    while True:
-        found = np.atleast_1d(tree.query(point, k)[1])
-        found = found[free[found]]
-        if len(found) >= n or k == len(places):
-            return found[:n]
-        k = min(4 * k, len(places))
+def _nearest(places: np.ndarray, free: np.ndarray, point: np.ndarray, n: int) -> np.ndarray:
+    """The n free nodes nearest to a point, nearest first."""
+    left = np.flatnonzero(free)
+    distance = ((places[left] - point) ** 2).sum(1)
+    if len(left) > n:
+        chosen = np.argpartition(distance, n)[:n]
+        left, distance = left[chosen], distance[chosen]
+    return left[np.argsort(distance)]
 
 
 def _principal(points: np.ndarray, along: np.ndarray) -> np.ndarray:
     """First principal direction of some points, on the side of `along`."""
-    direction = np.linalg.svd(points - points.mean(0), full_matrices=False)[2][0]
+    centred = points - points.mean(0)
+    direction = np.linalg.eigh(centred.T @ centred)[1][:, -1]
     return direction if direction @ along >= 0 else -direction
 
 

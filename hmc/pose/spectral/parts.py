@@ -96,6 +96,10 @@ def name_branches(shapes: Sequence[BranchShape], trunk: np.ndarray, up: np.ndarr
     names, doubts = [""] * len(shapes), []
     up = np.array([0.0, 0.0, 1.0]) if up is None else up
     heads = [k for k, s in enumerate(shapes) if s.length_m < HEAD_LENGTH_M and s.elongation < HEAD_ELONGATION and s.area_m2 > HEAD_AREA_M2]
+    if not heads and len(shapes) > 4:
+        # With a shoulder or a hand at it, a head is longer; of five branches it is still the stoutest of those that are no legs.
+        stout = sorted(range(len(shapes)), key=lambda k: -shapes[k].length_m * shapes[k].area_m2)[2:]
+        heads = [k for k in stout if shapes[k].area_m2 > HEAD_AREA_M2 * 0.8][:1]
     axis = up
     limbs = [k for k, s in enumerate(shapes) if s.length_m >= LEAST_LIMB_M and k not in heads]
     if heads:

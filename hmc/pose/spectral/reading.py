@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hmc.pose.spectral.segmentation import Segmentation, SegmentationSettings, segment_body
-from hmc.pose.spectral.skeleton import SkeletonSettings, extract_skeletons
+from hmc.pose.spectral.skeleton import SkeletonSettings, equally_spaced, extract_skeletons
 
 __all__ = ["BodyReading", "ReadingSettings", "read_body"]
 
@@ -97,11 +97,12 @@ def read_body(
     curves, feet, left_out = {}, [], []
     for part, curve in found.items():
         length = float(np.linalg.norm(np.diff(curve, axis=0), axis=1).sum()) / height_m
-        if part[:3] in ("arm", "leg"):
+        if part[:3] in ("arm", "leg") and "trunk" in found:
             why = ""
             if part in twice:
-                why = "touches the trunk twice"
-            elif length > settings.longest_limb:
+                # Its hand is at the trunk: it begins at the end that is on the limb's own side of the trunk.
+                curve = _from_base(curve, found["trunk"], part)
+            if length > settings.longest_limb:
                 why = "is too long for one limb"
             elif length < settings.least_limb:
                 why = "is too short"
@@ -120,6 +121,12 @@ def read_body(
     return BodyReading(segmentation, curves, np.array(feet).reshape(-1, 3), tuple(left_out), status)
 
 
+def _from_base(curve: np.ndarray, trunk: np.ndarray, part: str) -> np.ndarray:
+    """A limb's curve that begins at the end nearer to the upper end of the trunk, for a leg to the lower one."""
+    end = trunk[-1] if part[:3] == "arm" else trunk[0]
+    return curve if np.linalg.norm(curve[0] - end) <= np.linalg.norm(curve[-1] - end) else curve[::-1]
+
+
 def cut_foot(curve: np.ndarray, foot_m: float) -> tuple[np.ndarray, np.ndarray]:
     """A leg's curve up to the ankle, with as many nodes, and the vector from there to its end.
 
@@ -135,7 +142,6 @@ def cut_foot(curve: np.ndarray, foot_m: float) -> tuple[np.ndarray, np.ndarray]:
     curve : ndarray, shape (n, 3)
     foot : ndarray, shape (3,)
     """
-    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))])
-    at = np.linspace(0, max(way[-1] - foot_m, 0.0), len(curve))
-    cut = np.stack([np.interp(at, way, curve[:, axis]) for axis in range(3)], axis=1)
+    length = float(np.linalg.norm(np.diff(curve, axis=0), axis=1).sum())
+    cut = equally_spaced(curve, len(curve), 0.0, max(length - foot_m, 0.0))
     return cut, curve[-1] - cut[-1]

@@ -6,14 +6,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components
+from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import cKDTree
 
 from hmc.pose.spectral.eigenmap import eigenmap
 from hmc.pose.spectral.graph import GraphSettings, VoxelGraph, adjacency, build_graph, core_nodes
-from hmc.pose.spectral.growing import Branch, GrowSettings, baseline_growing, grow_branches
+from hmc.pose.spectral.growing import Branch, GrowSettings, baseline_growing, ends_near_origin, grow_branches
 from hmc.pose.spectral.parts import PART_NAMES, BranchShape, branch_shape, name_branches
-from hmc.pose.spectral.touching import touching_parts
+from hmc.pose.spectral.touching import contacts, touching_parts
 
 __all__ = ["Segmentation", "SegmentationSettings", "baseline_segmentation", "segment_body"]
 
@@ -30,6 +30,10 @@ class SegmentationSettings:
         Of the eigenspace.
     bridge_m : float
         Pieces of the hull that are nearer than this to the largest one belong to it, metres.
+    longest_limb_m : float
+        A branch that begins and ends at the trunk and is longer than this is two limbs whose ends touch, metres.
+    hip_m : float
+        A leg reaches so far above where it leaves the other one, metres: to the hip.
     least_voxels : int
         Fewer voxels are no body.
     """
@@ -38,6 +42,8 @@ class SegmentationSettings:
     grow: GrowSettings = field(default_factory=GrowSettings)
     dimensions: int = 6
     bridge_m: float = 0.13
+    longest_limb_m: float = 1.05
+    hip_m: float = 0.09
     least_voxels: int = 150
 
 
@@ -120,7 +126,18 @@ def segment_body(
     graph = VoxelGraph(voxels[inside], number[graph.edges[kept]], graph.weights[kept])
     places = eigenmap(adjacency(graph), settings.dimensions).vectors
     core = core_nodes(graph.voxels, voxel_size_m, settings.graph.core_m)
-    branches = grow_branches(places, graph.edges, core, settings.grow)
+    pieces = met = None
+    if settings.grow.stop == "origin":
+        pieces = ends_near_origin(places, graph.edges, core, settings.grow)
+        cut = np.concatenate([pieces.cut, *(_halves(graph.edges, pieces.labels == k, points[inside], settings) for k in range(pieces.count))])
+        if len(cut):
+            # Without the faces over which limbs touch, each goes its own way.
+            apart = without_edges(graph, cut)
+            trial = eigenmap(adjacency(apart), settings.dimensions)
+            if trial.labels.max() == 0:
+                graph, places, met = apart, trial.vectors, pieces
+                pieces = ends_near_origin(places, graph.edges, core, settings.grow)
+    branches = grow_branches(places, pieces, settings.grow)
     labels, branches = _tidy(branches, graph.edges, len(inside))
     shapes = [branch_shape(branch, points[inside], voxel_size_m) for branch in branches]
     rest = points[inside][labels < 0]
@@ -133,6 +150,11 @@ def segment_body(
     for place, k in enumerate(known):
         stars[labels == k] = place + 1
     touching = touching_parts(stars, graph.edges, along, ("trunk", *(names[k] for k in known)))
+    if met is not None:
+        found = [np.bincount(labels[(met.labels == k) & (labels >= 0)], minlength=1).argmax() for k in range(met.count)]
+        touching += tuple(f"{names[found[a]]} and {names[found[b]]}" for a, b in met.touches if names[found[a]] and names[found[b]])
+    if pieces is not None:
+        labels = _legs_to_hips(labels, names, graph.edges, round(settings.hip_m / voxel_size_m))
     out = np.full(n, -1)
     trunk = labels < 0
     if settings.grow.stop == "outliers":
@@ -149,6 +171,44 @@ def segment_body(
     edges = inside[graph.edges]
     moved = {names[k]: Branch(inside[branches[k].nodes], branches[k].sites) for k in known}
     return Segmentation(out, all_places, moved, {names[k]: shapes[k] for k in known}, edges, doubts, touching, "segmented")
+
+
+def _halves(edges: np.ndarray, own: np.ndarray, points: np.ndarray, settings: SegmentationSettings) -> np.ndarray:
+    """Where to cut a branch that is two limbs in one, pairs of neighbours: half-way between the two places where it meets the trunk."""
+    none = np.zeros((0, 2), int)
+    places = contacts(own.astype(int), edges, 1, 0)
+    if len(places) < 2:
+        return none
+    rows, number = np.flatnonzero(own), np.cumsum(own) - 1
+    inner = number[edges[own[edges].all(1)]]
+    steps = np.ones(len(inner))
+    graph = csr_array((steps, (inner[:, 0], inner[:, 1])), shape=(len(rows), len(rows)))
+    ways = [dijkstra(graph, directed=False, indices=number[place], min_only=True, unweighted=True) for place in places[:2]]
+    voxel = float(np.median(np.linalg.norm(points[edges[:50, 0]] - points[edges[:50, 1]], axis=1)))
+    # Steps along faces are longer than the way; a limb of two has the far contact at the end of its longer half.
+    if ways[0][number[places[1]]].min() * voxel < settings.longest_limb_m:
+        return none
+    side = ways[0] < ways[1]
+    return rows[inner[side[inner[:, 0]] != side[inner[:, 1]]]]
+
+
+def _legs_to_hips(labels: np.ndarray, names: list[str], edges: np.ndarray, steps: int) -> np.ndarray:
+    """Labels with the legs grown into the trunk, step by step, so that they meet half-way."""
+    legs = [k for k, name in enumerate(names) if name.startswith("leg")]
+    labels = labels.copy()
+    both = np.concatenate([edges, edges[:, ::-1]])
+    for _ in range(steps):
+        ahead = both[np.isin(labels[both[:, 0]], legs) & (labels[both[:, 1]] < 0)]
+        labels[ahead[:, 1]] = labels[ahead[:, 0]]
+    return labels
+
+
+def without_edges(graph: VoxelGraph, cut: np.ndarray) -> VoxelGraph:
+    """The graph without some of its edges, given as pairs of nodes in either order."""
+    n = len(graph.voxels)
+    keys = np.sort(graph.edges, axis=1) @ [n, 1]
+    kept = ~np.isin(keys, np.sort(cut, axis=1) @ [n, 1])
+    return VoxelGraph(graph.voxels, graph.edges[kept], graph.weights[kept])
 
 
 def bridged(graph: VoxelGraph, points: np.ndarray, voxel_size_m: float, settings: SegmentationSettings) -> VoxelGraph:

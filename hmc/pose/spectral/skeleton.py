@@ -6,7 +6,7 @@ Source: Hsiao (2008), section 3.1.5 and Eq. 3-16. Sundaresan's curves, from the 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import BSpline
@@ -18,7 +18,7 @@ from hmc.pose.spectral.growing import Branch
 from hmc.pose.spectral.parts import PART_NAMES
 from hmc.pose.spectral.segmentation import Segmentation
 
-__all__ = ["SkeletonSettings", "baseline_skeletons", "curve_through", "extract_skeletons", "site_values"]
+__all__ = ["SkeletonSettings", "baseline_skeletons", "curve_through", "equally_spaced", "extract_skeletons", "site_values"]
 
 
 @dataclass(frozen=True)
@@ -104,8 +104,25 @@ def curve_through(points: np.ndarray, sites: np.ndarray, settings: SkeletonSetti
         rows = BSpline.design_matrix(s, corners, 3).toarray()
         coefficients = np.linalg.lstsq(rows, x, rcond=None)[0]
         curve = BSpline(corners, coefficients, 3)(np.linspace(low, high, 64))
+    return equally_spaced(curve, settings.nodes)
+
+
+def equally_spaced(curve: np.ndarray, n: int, first: float = 0.0, last: float | None = None) -> np.ndarray:
+    """Equally spaced points on a polyline.
+
+    Parameters
+    ----------
+    curve : ndarray, shape (m, 3)
+    n : int
+    first, last : float
+        Where the points begin and end along the polyline, metres; by default at its ends.
+
+    Returns
+    -------
+    ndarray, shape (n, 3)
+    """
     way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))])
-    at = np.linspace(0, way[-1], settings.nodes)
+    at = np.linspace(first, way[-1] if last is None else last, n)
     return np.stack([np.interp(at, way, curve[:, axis]) for axis in range(3)], axis=1)
 
 
@@ -126,6 +143,8 @@ def extract_skeletons(segmentation: Segmentation, points: np.ndarray, settings: 
     """
     settings = settings or SkeletonSettings()
     curves: dict[str, np.ndarray] = {}
+    share = settings.trunk_trim / max(1 - 2 * settings.trunk_trim, 1e-9)
+    straight = replace(settings, knots=0)
     trunk = segmentation.voxels_of("trunk")
     middle = points[trunk].mean(0) if len(trunk) else points.mean(0)
     for label, part in enumerate(PART_NAMES):
@@ -140,7 +159,13 @@ def extract_skeletons(segmentation: Segmentation, points: np.ndarray, settings: 
             known &= (sites > settings.trunk_trim) & (sites < 1 - settings.trunk_trim)
         if np.count_nonzero(known) < settings.least_voxels:
             continue
-        curves[part] = curve_through(points[rows[known]], sites[known], settings)
+        curves[part] = curve_through(points[rows[known]], sites[known], straight if part in ("trunk", "head") else settings)
+    if "trunk" in curves:
+        # The ends that were left out go straight on.
+        trunk_curve = curves["trunk"]
+        reach = share * np.linalg.norm(np.diff(trunk_curve, axis=0), axis=1).sum()
+        ends = [a + reach * (a - b) / max(float(np.linalg.norm(a - b)), 1e-9) for a, b in (trunk_curve[[0, 3]], trunk_curve[[-1, -4]])]
+        curves["trunk"] = equally_spaced(np.vstack([ends[0], trunk_curve, ends[1]]), settings.nodes)
     for part, curve in curves.items():
         start = _lower_end(curve, segmentation) if part == "trunk" else middle
         if np.linalg.norm(curve[0] - start) > np.linalg.norm(curve[-1] - start):

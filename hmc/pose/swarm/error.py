@@ -8,6 +8,7 @@ from itertools import permutations
 
 import numpy as np
 
+from hmc.pose.spectral.skeleton import equally_spaced
 from hmc.pose.swarm.model import SkeletonModel, joint_shares, part_chains, part_lengths, segment_ends
 
 __all__ = ["MODEL_PARTS", "Observed", "best_assignments", "observe_curves", "pair_errors", "skeleton_error"]
@@ -76,18 +77,21 @@ def observe_curves(
         the trunk. Else curve and part correspond from end to end, as in the thesis.
     """
     names = tuple(curves)
-    nodes = np.array([curve[np.rint(np.linspace(0, len(curve) - 1, n)).astype(int)] for curve in curves.values()]).reshape(-1, n, 3)
     allowed = tuple(KINDS[name] for name in names) if named else (tuple(range(6)),) * len(names)
     pairs = np.array([(k, part) for k, parts in enumerate(allowed) for part in parts], int).reshape(-1, 2)
     lengths, joints = part_lengths(model), joint_shares(model)
-    blends = np.zeros((len(pairs), n, 3))
-    for q, (k, part) in enumerate(pairs):
-        length = float(np.linalg.norm(np.diff(nodes[k], axis=0), axis=1).sum())
-        share = np.clip(length / lengths[part], LEAST_SHARE, 1.0) if from_tip and part >= 2 else 1.0
+    nodes, blends = np.zeros((len(names), n, 3)), np.zeros((len(pairs), n, 3))
+    for k, curve in enumerate(curves.values()):
+        length = float(np.linalg.norm(np.diff(curve, axis=0), axis=1).sum())
+        limb = from_tip and allowed[k][0] >= 2
+        # What a curve has beyond the length of the limb is inside the trunk.
+        nodes[k] = equally_spaced(curve, n, max(length - lengths[allowed[k][0]], 0.0) if limb else 0.0)
+        share = np.clip(length / lengths[allowed[k][0]], LEAST_SHARE, 1.0) if limb else 1.0
         at = np.linspace(1 - share, 1, n)
-        lower = np.clip((at - joints[part]) / (1 - joints[part]), 0, 1)
-        upper = np.clip(at / joints[part], 0, 1)
-        blends[q] = np.stack([1 - upper, upper - lower, lower], axis=1)
+        for q in np.flatnonzero(pairs[:, 0] == k):
+            joint = joints[pairs[q, 1]]
+            lower, upper = np.clip((at - joint) / (1 - joint), 0, 1), np.clip(at / joint, 0, 1)
+            blends[q] = np.stack([1 - upper, upper - lower, lower], axis=1)
     return Observed(names, nodes, pairs, blends, best_assignments(pairs, allowed))
 
 

@@ -41,6 +41,8 @@ class SwarmSettings:
         The start is taken when its error is smaller by this, metres.
     facing_m : float
         By how much facing straight backwards raises an error, metres.
+    backwards : float
+        A skeleton is turned about when the evidence for its heading falls below this; two feet that point backwards are -2 a frame.
     always_check : bool
         Try a start in every frame, as the thesis does.
     """
@@ -57,6 +59,7 @@ class SwarmSettings:
     doubt_ratio: float = 1.4
     margin_m: float = 0.012
     facing_m: float = 0.02
+    backwards: float = -2.5
     always_check: bool = False
 
 
@@ -203,7 +206,7 @@ def swarm_step(
     facing = state.facing + facing_evidence(found.state, heading)
     started = turned = False
     spent = 0
-    backwards = facing < -4.0 and facing_evidence(found.state, heading) < 0
+    backwards = facing < settings.backwards and facing_evidence(found.state, heading) < 0
     doubtful = found.error_m > max(settings.doubt_m, settings.doubt_ratio * state.usual_m)
     if doubtful or backwards or settings.always_check:
         trial = start_fit(rng, model, observed, reading, heading, settings, None if backwards else state.state)
