@@ -23,7 +23,7 @@ from hmc.pose.markers.likelihood import MarkerLikelihood, marker_cost, marker_vi
 from hmc.pose.markers.nearest import nearest_detections
 from hmc.pose.markers.points import find_points, triangulate
 from hmc.pose.markers.sequence import pose_from_markers
-from hmc.pose.markers.start import start_poses
+from hmc.pose.markers.start import left_over, start_poses
 from hmc.pose.markers.synthetic import SyntheticDetector, detect_synthetic, marker_visibility, seen_by_ideal_detector
 
 BODY = default_body(1.75)
@@ -132,19 +132,44 @@ def test_triangulation_is_opencvs_and_exact_over_many_views():
 
 def test_points_are_found_among_false_detections():
     points = landmarks(BODY, standing())
-    found = find_points(observe_markers(VIEWS, detections(points, false=4, noise=0.5), GATE))
-    assert np.linalg.norm(points[:, None] - found, axis=-1).min(axis=1).max() < 0.02
-    assert find_points(observe_markers(VIEWS, [np.zeros((0, 2))] * len(RIG), GATE)).shape == (0, 3)
+    found, views = find_points(observe_markers(VIEWS, detections(points, false=4, noise=0.5), GATE))
+    apart = np.linalg.norm(points[:, None] - found, axis=-1)
+    assert apart.min(axis=1).max() < 0.02
+    assert (views[apart.argmin(axis=1)] == len(RIG)).all() and views.min() >= 3
+    assert find_points(observe_markers(VIEWS, [np.zeros((0, 2))] * len(RIG), GATE))[0].shape == (0, 3)
 
 
 def test_a_pose_begins_from_points_alone():
     truth = standing(3)
     truth[dof_index("root_rz")] = 2.4
     points = np.random.default_rng(0).permutation(landmarks(BODY, truth))
-    state, cost = start_poses(BODY, points)[0]
+    views = np.full(len(points), 5)
+    state, cost = start_poses(np.random.default_rng(0), BODY, points, views)[0]
     assert cost < 1e-3
     assert np.linalg.norm(landmarks(BODY, state) - landmarks(BODY, truth), axis=1).mean() < 0.02
-    assert start_poses(BODY, points[:3]) == []
+    assert start_poses(np.random.default_rng(0), BODY, points[:3], views[:3]) == []
+
+
+def test_a_pose_begins_among_more_false_points_than_true_ones():
+    """Twenty-four false points that three or four views agree on, between the true ones that five do, of somebody who boxes."""
+    rng = np.random.default_rng(5)
+    truth = standing(3)
+    truth[dof_index("l_elbow_z", "r_elbow_z")], truth[dof_index("root_rz")] = np.radians([-90, 100]), 0.7
+    places = landmarks(BODY, truth)
+    points = np.concatenate([places, rng.uniform(places.min(0), places.max(0), (24, 3))])
+    views = np.concatenate([np.full(15, 5), rng.integers(3, 5, 24)])
+    state, _ = start_poses(np.random.default_rng(0), BODY, points, views)[0]
+    assert np.linalg.norm(landmarks(BODY, state) - places, axis=1).mean() < 0.05
+    assert left_over(BODY, state, points, views) == 0
+
+
+def test_markers_of_two_people_are_refused():
+    both = landmarks(BODY, standing()), landmarks(BODY, standing()) + [0.9, 0.3, 0]
+    uv = np.concatenate([project(RIG, points)[0] for points in both], axis=1).reshape(-1, 2)
+    cameras = np.repeat(RIG.names, 30)
+    table = DetectionTable(np.repeat(np.arange(4), len(uv)), np.tile(cameras, 4), np.tile(uv, (4, 1)))
+    with pytest.raises(InputError, match="more than one person seems to wear markers"):
+        pose_from_markers(RIG, table, range(4), 30.0, marker_preset("default"), height_m=1.75, skin=False)
 
 
 def test_learnt_markers_are_where_they_were_worn():

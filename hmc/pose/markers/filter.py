@@ -191,7 +191,8 @@ def marker_step(rng: np.random.Generator, filt: MarkerFilter, state: PoseState, 
         estimate, points = _refine(body, seen, annealed.best, preset.likelihood.gate_px)
     cost, matched = _cost(body, seen, estimate, preset.likelihood)
     if preset.search and np.isnan(points[LIMBS]).any():
-        other, _ = lay_body(body, find_points(seen), estimate, SEARCH_GATES_M)
+        found, views = find_points(seen)
+        other, _ = lay_body(body, found, estimate, SEARCH_GATES_M, views)
         other, other_points = _refine(body, seen, other, preset.likelihood.gate_px)
         other_cost, other_matched = _cost(body, seen, other, preset.likelihood)
         if other_cost < cost:

@@ -97,7 +97,7 @@ def _image_errors(projections: np.ndarray, points: np.ndarray, uv: np.ndarray) -
     return np.where(np.isnan(off), 0.0, off)
 
 
-def find_points(seen: SeenMarkers, room: np.ndarray | None = None, most: int = 40) -> np.ndarray:
+def find_points(seen: SeenMarkers, room: np.ndarray | None = None, most: int = 40) -> tuple[np.ndarray, np.ndarray]:
     """Points that several views agree on, without knowing what they are.
 
     Every two detections that lie on each other's epipolar lines make a point; the one with the most detections near its images is taken,
@@ -113,8 +113,10 @@ def find_points(seen: SeenMarkers, room: np.ndarray | None = None, most: int = 4
 
     Returns
     -------
-    ndarray, shape (n, 3)
+    points : ndarray, shape (n, 3)
         World, metres; `least_views` agree on each.
+    views : ndarray of int, shape (n,)
+        How many agree: among many false detections, few do so by chance.
     """
     projections, detections = seen.views.projections, seen.detections
     rows = []
@@ -129,12 +131,13 @@ def find_points(seen: SeenMarkers, room: np.ndarray | None = None, most: int = 4
     if room is not None:
         points = points[((points >= room[0]) & (points <= room[1])).all(axis=1)]
     if not len(points):
-        return points
+        return points, np.zeros(0, int)
     image = np.einsum("vij,mj->mvi", projections, np.column_stack([points, np.ones(len(points))]))
     expected = image[..., :2] / np.where(image[..., 2:] > 0.05, image[..., 2:], np.nan)
     distance = [np.linalg.norm(expected[:, v, None] - detections[v], axis=-1) for v in range(len(detections))]
     free = [np.ones(len(one), bool) for one in detections]
     found: list[np.ndarray] = []
+    views: list[int] = []
     while len(found) < most:
         least = np.stack([np.where(free[v], distance[v], np.inf).min(axis=1, initial=np.inf) for v in range(len(detections))], axis=1)
         least = np.where(np.isnan(least), np.inf, least)
@@ -149,4 +152,5 @@ def find_points(seen: SeenMarkers, room: np.ndarray | None = None, most: int = 4
             k = int(np.where(free[v], distance[v][best], np.inf).argmin())
             uv[v], free[v][k] = detections[v][k], False
         found.append(triangulate(projections, uv))
-    return np.array(found).reshape(-1, 3)
+        views.append(int(support[best].sum()))
+    return np.array(found).reshape(-1, 3), np.array(views, int)

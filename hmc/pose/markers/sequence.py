@@ -21,7 +21,7 @@ from hmc.pose.markers.detections import DetectionTable
 from hmc.pose.markers.filter import MarkerFilter, MarkerInfo, MarkerPreset, make_marker_filter, marker_step
 from hmc.pose.markers.likelihood import SeenMarkers, marker_views, observe_markers
 from hmc.pose.markers.points import find_points
-from hmc.pose.markers.start import LEAST_POINTS, start_poses
+from hmc.pose.markers.start import LEAST_POINTS, left_over, start_poses
 from hmc.pose.sequence import PosedPeople
 from hmc.results import PoseStates, PoseTable
 
@@ -37,6 +37,8 @@ RIVAL_COST = 2.0
 HEIGHTS_M = (1.55, 1.65, 1.75, 1.85, 1.95)
 #: After this many frames without a pose it is begun anew.
 LOST_FRAMES = 10
+#: So many points that several views agree on, away from the person, are somebody else's.
+SOMEBODY_ELSE = 8
 #: Where markers are worn is learnt from at most this many frames.
 LEARN_FRAMES = 60
 
@@ -99,7 +101,7 @@ def pose_from_markers(
     Raises
     ------
     InputError
-        When there is nowhere in these frames a pose to begin with.
+        When there is nowhere in these frames a pose to begin with, or more than one person wears markers.
     """
     views = marker_views(rig)
     by_frame = {frame: table.in_frame(frame, rig.names) for frame in frames}
@@ -107,7 +109,7 @@ def pose_from_markers(
     def seen(frame: int) -> SeenMarkers:
         return seen_in_frame(rig, views, by_frame[frame], preset.likelihood.gate_px)
 
-    anchor, body, markers, state = _begin(seen, frames, fps, preset, height_m, skin, room)
+    anchor, body, markers, state = _begin(seed, seen, frames, fps, preset, height_m, skin, room)
     if skin and preset.refine:
         states, points = [], []
         pose, filt = pose_init(state), make_marker_filter(markers, preset, fps)
@@ -125,7 +127,7 @@ def pose_from_markers(
         if k == anchor - 1:
             pose, lost = pose_init(found[anchor][0].state), 0
         one = seen(frames[k])
-        pose, lost = _begun_anew(filt, pose, lost, one, room)
+        pose, lost = _begun_anew(_rng(seed, frames[k], 3), filt, pose, lost, one, room)
         pose, info = marker_step(_rng(seed, frames[k], 1), filt, pose, one)
         lost = 0 if info.status == "fitted" else lost + 1
         found[k] = pose, info
@@ -140,30 +142,36 @@ def _body(preset: MarkerPreset, height_m: float) -> BodyModel:
     return canton_body(height_m) if preset.body == "canton" else default_body(height_m)
 
 
-def _begin(seen, frames, fps, preset, height_m, skin, room) -> tuple[int, BodyModel, BodyModel, np.ndarray]:
+def _begin(seed, seen, frames, fps, preset, height_m, skin, room) -> tuple[int, BodyModel, BodyModel, np.ndarray]:
     """The frame in which the first pose fits best, the body without and with markers, and the pose."""
     heights = HEIGHTS_M if height_m is None else (height_m,)
-    best, least, tried, spacing = None, np.inf, 0, max(1, round(START_S * fps / START_FRAMES))
+    best, least, others, tried, spacing = None, np.inf, 0, 0, max(1, round(START_S * fps / START_FRAMES))
     k = 0
     while k < len(frames) and tried < START_FRAMES:
-        points = find_points(seen(frames[k]), room)
+        points, agreeing = find_points(seen(frames[k]), room)
         if len(points) < LEAST_POINTS:
             k += 1
             continue
         for height in heights:
             body = _body(preset, height)
             markers = with_skin_markers(body) if skin else body
-            starts = start_poses(markers, points)
+            starts = start_poses(_rng(seed, frames[k], 3), markers, points, agreeing)
             if starts and starts[0][1] < least:
                 least = starts[0][1]
                 worth_trying = [state for state, cost in starts[:TRIALS] if cost <= RIVAL_COST * least]
                 best = k, body, markers, worth_trying
+                others = left_over(markers, starts[0][0], points, agreeing)
         tried += 1
         k += spacing
     if best is None:
         raise InputError(
             f"in no frame do {LEAST_POINTS} markers or more appear in enough views at places that agree; "
             "check the detections and the calibration"
+        )
+    if others >= SOMEBODY_ELSE:
+        raise InputError(
+            f"more than one person seems to wear markers: in frame {frames[best[0]]}, {others} points that several views agree on are away "
+            "from the person that was found; this method follows one: give the detections of one person"
         )
     k, body, markers, states = best
     return k, body, markers, _proved(seen, frames[k : k + TRIAL_FRAMES], make_marker_filter(markers, preset, fps), states)
@@ -183,10 +191,10 @@ def _proved(seen, frames: Sequence[int], filt: MarkerFilter, states: list[np.nda
     return states[int(np.argmin(costs))]
 
 
-def _begun_anew(filt: MarkerFilter, pose: PoseState, lost: int, seen: SeenMarkers, room: np.ndarray | None) -> tuple[PoseState, int]:
+def _begun_anew(rng, filt: MarkerFilter, pose: PoseState, lost: int, seen: SeenMarkers, room) -> tuple[PoseState, int]:
     if lost < LOST_FRAMES:
         return pose, lost
-    starts = start_poses(filt.body, find_points(seen, room))
+    starts = start_poses(rng, filt.body, *find_points(seen, room))
     return (pose_init(starts[0][0]), 0) if starts else (pose, lost)
 
 
