@@ -1,5 +1,7 @@
 """Search for lost limbs on rendered people: a displaced limb is named, and found again."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from acted import act
@@ -61,9 +63,12 @@ def test_a_limb_in_the_air_is_named(scene, limb):
 
 def test_a_good_pose_has_one_limb_looked_at_by_turns(scene):
     body, points, target, hull, state, _ = scene
-    settings = SearchSettings(unexplained_share=0.5, far_m=0.08)
+    settings = SearchSettings(unexplained_share=0.5, far_m=0.08, random_share=1.0)
     picks = [lost_limbs(np.random.default_rng(k), body, points, state, target, hull, settings) for k in range(30)]
     assert {len(p) for p in picks} == {1} and {p[0] for p in picks} == set(LIMBS)
+    settings = replace(settings, random_share=0.5)
+    looked = sum(bool(lost_limbs(np.random.default_rng(k), body, points, state, target, hull, settings)) for k in range(60))
+    assert 20 <= looked <= 40
 
 
 @pytest.mark.parametrize("limb", LIMBS)

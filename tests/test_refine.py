@@ -8,8 +8,8 @@ from posed import COST, body_of, crossed_arms, mean_error, true_state, with_cyli
 
 from hmc.pose.annealed.penetration import axis_points
 from hmc.pose.annealed.rays import points_to_explain
-from hmc.pose.annealed.refine import RefineSettings, refine, residual_rows, residual_values
-from hmc.pose.annealed.symmetric import BodyPoints, SymmetricSettings, symmetric_cost
+from hmc.pose.annealed.refine import RefineSettings, refine, refine_best, residual_rows, residual_values
+from hmc.pose.annealed.symmetric import BodyPoints, SymmetricSettings, symmetric_cost, thinned
 from hmc.pose.body.joints import N_DOF, dof_index
 from hmc.pose.body.kinematics import landmarks
 
@@ -166,3 +166,33 @@ def test_displaced_poses_of_rendered_people_are_recovered(motion):
     before, after = np.mean(gains, axis=0)
     assert before > 0.08
     assert after < 0.055 and after < 0.6 * before
+
+
+def test_of_several_starts_the_best_goes_to_the_end(scene):
+    body, points, target, hull, _ = scene
+    near, far = poses(scene)
+    settings = RefineSettings(iterations=12)
+    alone, info = refine(body, points, near, target, hull, COST, settings)
+    best, both = refine_best(body, points, [far, near], target, hull, COST, settings, trial_steps=4)
+    assert_allclose(best, alone, atol=0.02)
+    assert both.cost == pytest.approx(info.cost, rel=0.02) and both.evaluations > info.evaluations
+    seen = []
+
+    def is_hopeless(state, cost):
+        seen.append((state, cost))
+        return True
+
+    left, given_up = refine_best(body, points, [far, near], target, hull, COST, settings, trial_steps=2, is_hopeless=is_hopeless)
+    assert given_up.cost > info.cost and given_up.evaluations < both.evaluations
+    np.testing.assert_array_equal(seen[0][0], left)
+    assert seen[0][1] == pytest.approx(given_up.cost_after)
+
+
+def test_thinned_points_cost_nearly_the_same(scene):
+    body, points, target, hull, _ = scene
+    few = thinned(points, 120)
+    assert 80 < len(few.surface.points) < 180 and set(few.surface.segment) == set(points.surface.segment)
+    assert 3 * len(few.axes.points) == len(points.axes.points)
+    states = np.stack(poses(scene))
+    full, rough = (symmetric_cost(body, p, states, target, hull, SymmetricSettings()) for p in (points, few))
+    assert_allclose(rough, full, rtol=0.35)

@@ -7,7 +7,7 @@ also has the pose with exchanged legs, refined, and the better choice for a whol
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,6 +22,8 @@ from hmc.pose.initialisation import swapped_pose
 
 __all__ = ["LegChoice", "LegSettings", "choose_legs", "leg_choice", "leg_points"]
 
+#: Exchanged legs are refined until a step gains less than this share: half of what they count more than they cost (`LegSettings.doubt`).
+TOLERANCE = 0.01
 _LEGS = [landmark_index(name) for name in ("l_knee", "l_ankle", "r_knee", "r_ankle")]
 
 
@@ -93,7 +95,8 @@ def leg_choice(rng: np.random.Generator, filt: PoseFilter, state: np.ndarray, ta
     else:
         points = points_to_explain(rng, target, preset.fine_hull_points, preset.symmetric.ray_share)
         start = swapped_pose(body, state, "legs")
-        exchanged, info = refine(body, samples, start, target, points, preset.symmetric, preset.refine)
+        rough = replace(preset.refine, tolerance=TOLERANCE)
+        exchanged, info = refine(body, samples, start, target, points, preset.symmetric, rough)
         values = residual_values(body, samples, state, target, points, preset.symmetric)
         states, costs = np.stack([state, exchanged]), np.array([float(values @ values), info.cost])
     return LegChoice(states, costs)

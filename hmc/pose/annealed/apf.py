@@ -16,7 +16,7 @@ from hmc.pose.annealed.hull_target import HullTarget
 from hmc.pose.annealed.limb_search import lost_limbs, search_limbs
 from hmc.pose.annealed.presets import PosePreset, drift
 from hmc.pose.annealed.rays import points_to_explain
-from hmc.pose.annealed.refine import refine_best
+from hmc.pose.annealed.refine import refine
 from hmc.pose.annealed.scores import (
     ScoreMaps,
     ScoreTable,
@@ -27,7 +27,7 @@ from hmc.pose.annealed.scores import (
     observe,
     scores,
 )
-from hmc.pose.annealed.symmetric import BodyPoints, body_points, symmetric_cost
+from hmc.pose.annealed.symmetric import BodyPoints, body_points, symmetric_cost, thinned
 from hmc.pose.body.flesh import flesh_points, surface_coordinates
 from hmc.pose.body.model import BodyModel
 from hmc.voxels.grid import VoxelGrid
@@ -194,7 +194,7 @@ def pose_step(rng: np.random.Generator, filt: PoseFilter, state: PoseState, targ
     symmetric = preset.likelihood == "symmetric"
     likelihood = _by_symmetric_cost(rng, filt, target) if symmetric or filt.table is None else _by_scores(filt, filt.table, target)
     if preset.refine is None:
-        particles, annealed = annealed_step(rng, state.particles, likelihood, filt.drift, low, high, preset.annealed)
+        particles, annealed = annealed_step(rng, starting_particles(filt, state), likelihood, filt.drift, low, high, preset.annealed)
         estimate = annealed.estimate
         cost = -annealed.best_log_likelihood if symmetric else np.nan
         info = PoseInfo(cost, (), annealed.evaluations, annealed, "fitted")
@@ -211,12 +211,17 @@ def unseen(state: PoseState) -> tuple[PoseState, PoseInfo]:
 
 
 def starting_particles(filt: PoseFilter, state: PoseState) -> ParticleState:
-    """Where a frame's particles start if the last estimate was refined.
+    """Where a frame's particles start, by the preset's `motion`: the last frame's, or, if its estimate was refined, that, which is better.
 
-    It is better than any particle: half start by the no-motion and half by the smooth-motion assumption (Canton 2009, section 3.1.2.2).
+    Source: Canton (2009), section 3.1.2.2.
     """
-    predicted = np.clip(state.state + state.velocity, filt.body.limits.low, filt.body.limits.high)
-    return particle_init(np.stack([state.state, predicted]))
+    last = state.particles if filt.preset.refine is None else particle_init(state.state[None])
+    if filt.preset.motion == "none":
+        return last
+    moved = np.clip(last.particles + state.velocity, filt.body.limits.low, filt.body.limits.high)
+    if filt.preset.motion == "smooth":
+        return replace(last, particles=moved)
+    return ParticleState(np.concatenate([last.particles, moved]), np.tile(last.log_weights, 2))
 
 
 def polish(
@@ -246,8 +251,11 @@ def polish(
     if preset.refine is None:
         raise ValueError(f"preset '{preset.name}' has no `refine`")
     points = points_to_explain(rng, target, preset.fine_hull_points, preset.symmetric.ray_share)
-    estimate, info = refine_best(body, samples, starts, target, points, preset.symmetric, preset.refine, anchor=anchor)
-    cost, evaluations = info.cost, info.evaluations
+    # Each to the end: a start that has moved a limb across costs more than one that has lost it until late in the refinement.
+    trials = [refine(body, samples, start, target, points, preset.symmetric, preset.refine, anchor=anchor) for start in starts]
+    evaluations = sum(info.evaluations for _, info in trials)
+    estimate, info = min(trials, key=lambda trial: trial[1].cost_after)
+    cost = info.cost
     searched: list[str] = []
     if preset.search is not None:
         searched = lost_limbs(rng, body, samples, estimate, target, points, preset.search)
@@ -259,10 +267,12 @@ def polish(
 
 
 def _by_symmetric_cost(rng, filt, target):
+    # Particles only have to find the way to the minimum; the refinement, with all points, goes to its bottom.
+    samples = thinned(filt.samples, filt.preset.coarse_samples)
     points = points_to_explain(rng, target, filt.preset.hull_points, filt.preset.symmetric.ray_share)
 
     def log_likelihood(states: np.ndarray) -> np.ndarray:
-        return -symmetric_cost(filt.body, filt.samples, states, target, points, filt.preset.symmetric)
+        return -symmetric_cost(filt.body, samples, states, target, points, filt.preset.symmetric)
 
     return log_likelihood
 

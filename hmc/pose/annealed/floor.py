@@ -11,7 +11,7 @@ import numpy as np
 from hmc.pose.body.joints import SEGMENTS
 from hmc.pose.body.model import BodyModel
 
-__all__ = ["HANG_M", "SINK_M", "floor_gap", "lowest_support"]
+__all__ = ["HANG_M", "SINK_M", "above_floor", "floor_gap", "lowest_support"]
 
 #: A lowest point this far above the floor is still standing (on tiptoe, on a mat, in the middle of a step), metres ...
 HANG_M = 0.10
@@ -38,8 +38,13 @@ def floor_gap(body: BodyModel, rotations: np.ndarray, positions: np.ndarray, flo
     ndarray, shape (n,)
         Metres.
     """
-    height = lowest_support(body, rotations, positions)[0] - floor_z
-    return height - np.clip(height, -SINK_M, HANG_M)
+    return above_floor(lowest_support(body, rotations, positions)[0], floor_z)
+
+
+def above_floor(height: np.ndarray, floor_z: float) -> np.ndarray:
+    """The same of a height, metres, as from `lowest_support`."""
+    height = height - floor_z
+    return height - np.minimum(np.maximum(height, -SINK_M), HANG_M)
 
 
 def lowest_support(body: BodyModel, rotations: np.ndarray, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -54,6 +54,8 @@ class SearchSettings:
         A limb is lost when more than this share of its surface is that far outside the tolerant hull ...
     unexplained_share : float
         ... or when more than this share of the hull's surface is that far from the body (then every limb is looked for).
+    random_share : float
+        Share of the frames without a lost limb in which one picked at random is looked for.
     draws : int
         Random poses a limb.
     reach_share : float
@@ -69,6 +71,7 @@ class SearchSettings:
     far_m: float = 0.05
     outside_share: float = 0.25
     unexplained_share: float = 0.02
+    random_share: float = 0.5
     draws: int = 200
     reach_share: float = 0.5
     gain: float = 0.03
@@ -85,7 +88,7 @@ def lost_limbs(
     hull_points: np.ndarray,
     settings: SearchSettings,
 ) -> list[str]:
-    """Limbs that the hulls contradict, and all where much of the hull is unexplained; else one picked at random.
+    """Limbs that the hulls contradict, and all where much of the hull is unexplained; else now and then one picked at random.
 
     Of those that the samples have: a body may lack some (`hmc.pose.scalable`).
 
@@ -101,7 +104,8 @@ def lost_limbs(
         return there
     outside = outside_distance(body, samples.surface, state[None], target)[0] > settings.far_m
     lost = [limb for limb in there if outside[np.isin(samples.surface.part, _PARTS[limb])].mean() > settings.outside_share]
-    return lost or [str(rng.choice(there))]
+    at_random = [str(rng.choice(there))] if rng.random() < settings.random_share else []
+    return lost or at_random
 
 
 def search_limbs(
@@ -149,7 +153,7 @@ def search_limbs(
         trial, info = refine_best(
             body,
             samples,
-            trials[np.argsort(costs)[:2]],
+            [trials[pick] for pick in np.argsort(costs)[:2]],
             target,
             hull_points,
             cost_settings,
@@ -178,7 +182,7 @@ def _unexplained(body: BodyModel, state: np.ndarray, hull_points: np.ndarray, se
     """Distance of hull points and rays to the body, metres; infinite where it is far."""
     rotations, positions = segment_transforms(body, state[None])
     maps = cone_maps(body.cones, np.concatenate([rotations[0], positions[0][..., None]], axis=-1)[..., None])
-    return nearest_cones(body.cones, maps, candidates(body.cones, maps, hull_points, 1.1 * settings.far_m))[0]
+    return nearest_cones(body.cones, maps, candidates(body.cones, maps, hull_points, 1.1 * settings.far_m)).distance
 
 
 def _draw(rng: np.random.Generator, settings: SearchSettings, body: BodyModel, state: np.ndarray, limb: str, hull_points: np.ndarray):

@@ -15,7 +15,7 @@ from hmc.pose.annealed.rays import places_and_directions, slide_to_axis
 from hmc.pose.annealed.symmetric import cone_shapes, squared_distance
 from hmc.pose.body.model import Cones
 
-__all__ = ["Candidates", "candidates", "nearest_cones"]
+__all__ = ["Candidates", "Nearest", "candidates", "nearest_cones", "towards"]
 
 #: How far the ends of the cones may go before the candidates are looked for again, metres.
 SWAY_M = 0.06
@@ -52,7 +52,7 @@ class Candidates:
     first: np.ndarray
     counts: np.ndarray
     at: np.ndarray
-    shapes: tuple[np.ndarray, ...]
+    shapes: tuple[np.ndarray, np.ndarray, np.ndarray]
     ends: np.ndarray
 
 
@@ -77,15 +77,38 @@ def candidates(cones: Cones, maps: ConeMaps, points: np.ndarray, reach_m: float,
     near, held = cones_near(cones, maps, places, reach_m, directions, SWAY_M)
     point, cone = np.nonzero((near & ~held).T)
     at = cone * (3 * len(places)) + point + (np.arange(3) * len(places))[:, None]
-    shapes = tuple(values[cone] for values in cone_shapes(cones))
+    length, radii, slope = (values[cone] for values in cone_shapes(cones))
     first = np.flatnonzero(np.diff(point, prepend=-1))
-    return Candidates(points, held, reach_m, cone, point, first, np.diff(first, append=len(point)), at, shapes, ends)
+    return Candidates(points, held, reach_m, cone, point, first, np.diff(first, append=len(point)), at, (length, radii, slope), ends)
 
 
-def nearest_cones(cones: Cones, maps: ConeMaps, pairs: Candidates) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Distance of hull points or rays to the nearest cone, and what it takes to tell how it changes.
+@dataclass(frozen=True)
+class Nearest:
+    """How far hull points or rays are from the body, and what pulls them together.
 
-    Which cone is nearest is found in single precision.
+    Parameters
+    ----------
+    distance : ndarray, shape (m,)
+        Metres; 0 inside the body, infinite where no cone is within reach.
+    pulls : ndarray of int, shape (k,)
+        The points of which the distance is neither.
+    cone : ndarray of int, shape (k,)
+        The cone that is nearest to each.
+    offsets : ndarray, shape (3, k)
+        The way out from the cone to each, in the cone's coordinates, metres.
+    places : ndarray, shape (k, 3)
+        The point, or that of the ray which is nearest, world, metres.
+    """
+
+    distance: np.ndarray
+    pulls: np.ndarray
+    cone: np.ndarray
+    offsets: np.ndarray
+    places: np.ndarray
+
+
+def nearest_cones(cones: Cones, maps: ConeMaps, pairs: Candidates) -> Nearest:
+    """Distance of hull points or rays to the nearest cone, which is found in single precision.
 
     Parameters
     ----------
@@ -94,19 +117,6 @@ def nearest_cones(cones: Cones, maps: ConeMaps, pairs: Candidates) -> tuple[np.n
         Of the pose.
     pairs : Candidates
         That are good for this pose.
-
-    Returns
-    -------
-    distance : ndarray, shape (m,)
-        Metres; 0 inside the body, infinite where no cone is within reach.
-    pulls : ndarray of int, shape (k,)
-        The points of which the distance is neither.
-    towards : ndarray, shape (k, 3)
-        How their distance changes when the cone moves: minus the outward direction, world.
-    segment : ndarray of int, shape (k,)
-        That carries the nearest cone.
-    places : ndarray, shape (k, 3)
-        The point, or that of the ray which is nearest, world, metres.
     """
     places, directions = places_and_directions(pairs.points)
     n = len(places)
@@ -119,18 +129,33 @@ def nearest_cones(cones: Cones, maps: ConeMaps, pairs: Candidates) -> tuple[np.n
     some = np.flatnonzero((squared > 0) & (squared < np.float32(1.01 * pairs.reach_m**2)))
     pulls, cone = point[some], cone[some]
     at = cone * (3 * n) + pulls + (np.arange(3) * n)[:, None]
-    local, lengths, radii, where = local.ravel().take(at), cones.lengths[cone], cones.radii[cone], places[pulls]
+    local, lengths, radii, where = local.ravel().take(at), cones.lengths[cone], cones.radii.reshape(-1, 4)[cone].T, places[pulls]
     if directions is not None and along is not None:
         # The ray's nearest point moves along with the cone, but along the ray, where the distance does not change.
         where += slide_to_axis(local, along.ravel().take(at), lengths)[:, None] * directions[pulls]
     x, y, z = local
     clipped = np.minimum(np.maximum(z, 0), lengths)
-    a, b = (radii[:, 0] + (clipped / lengths)[:, None] * (radii[:, 1] - radii[:, 0])).T
+    a, b = radii[:2] + clipped / lengths * (radii[2:] - radii[:2])
     shrink = 1 - 1 / np.sqrt(np.maximum((x / a) ** 2 + (y / b) ** 2, 1.0))
-    outward = np.stack([x * shrink, y * shrink, z - clipped], axis=1)
-    distance[pulls] = found = np.sqrt(np.einsum("ki,ki->k", outward, outward))
-    outward /= -np.maximum(found, 1e-9)[:, None]
-    return distance, pulls, np.einsum("ki,kij->kj", outward, maps.to_cone[cone, :, :3, 0]), cones.segment[cone], where
+    local[:2] *= shrink
+    z -= clipped
+    distance[pulls] = np.sqrt(np.einsum("ik,ik->k", local, local))
+    return Nearest(distance, pulls, cone, local, where)
+
+
+def towards(maps: ConeMaps, nearest: Nearest, rows: np.ndarray) -> np.ndarray:
+    """How some of the distances change when the cone moves: minus the outward direction, world, shape (n, 3).
+
+    Parameters
+    ----------
+    maps : ConeMaps
+        Of the pose.
+    nearest : Nearest
+    rows : ndarray of int, shape (n,)
+        Among `Nearest.pulls`.
+    """
+    outward = nearest.offsets[:, rows] / -np.maximum(nearest.distance[nearest.pulls[rows]], 1e-9)
+    return np.einsum("ik,kij->kj", outward, maps.to_cone[..., 0].take(nearest.cone[rows], axis=0)[:, :, :3])
 
 
 def _nearest(local: np.ndarray, along: np.ndarray | None, pairs: Candidates) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -141,7 +166,7 @@ def _nearest(local: np.ndarray, along: np.ndarray | None, pairs: Candidates) -> 
     if along is not None:
         slide_to_axis(places, along.ravel().take(pairs.at).astype(np.float32)[:, :, None], pairs.shapes[0])
     squared = np.empty((len(pairs.cone), 1), np.float32)
-    squared_distance(places, *pairs.shapes, out=squared)
+    squared_distance(places, *pairs.shapes, squared)
     squared = squared[:, 0]
     best = np.flatnonzero(squared == np.minimum.reduceat(squared, pairs.first).repeat(pairs.counts))
     # Of several equally near cones the first.

@@ -64,9 +64,12 @@ class PosePreset:
     annealed : AnnealedSettings
     drift_scale : float
         Factor on `drift`.
-    surface_samples, hull_points : int
+    motion : {"none", "smooth", "both"}
+        Where a frame's particles start: where the last frame's were; moved on as in the frame before; or half and half (Canton, section
+        3.1.2.2).
+    coarse_samples, hull_points : int
         Points of the body's surface, and rays and points of the hull's, in the symmetric cost, for the particles.
-    fine_hull_points : int
+    surface_samples, fine_hull_points : int
         The same in the refinement.
     density : float
         Spacing of the flesh table over the voxel size (Canton, Eq. 6.26), for the four scores.
@@ -93,8 +96,10 @@ class PosePreset:
     likelihood: Literal["symmetric", "factorised", "global"] = "symmetric"
     annealed: AnnealedSettings = field(default_factory=AnnealedSettings)
     drift_scale: float = 1.0
+    motion: Literal["none", "smooth", "both"] = "none"
+    coarse_samples: int = 120
+    hull_points: int = 60
     surface_samples: int = 350
-    hull_points: int = 250
     fine_hull_points: int = 600
     density: float = 1.0
     symmetric: SymmetricSettings = field(default_factory=SymmetricSettings)
@@ -126,6 +131,7 @@ PRESETS: dict[str, PosePreset] = {
         source="found on rendered recordings (docs/accuracy.md): symmetric cost, strong selection, refinement, limb search, fitted body",
         annealed=AnnealedSettings(layers=4, particles=150, survival_rate=0.04, spread=0.6),
         drift_scale=0.7,
+        motion="both",
         refine=RefineSettings(),
         search=SearchSettings(),
         fit_body=FitBodySettings(),

@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hmc.pose.annealed.cone_maps import cone_maps
-from hmc.pose.annealed.floor import floor_gap, lowest_support
+from hmc.pose.annealed.cone_maps import ConeMaps, cone_maps
+from hmc.pose.annealed.floor import above_floor, lowest_support
 from hmc.pose.annealed.hull_target import HullTarget, distance_gradient
-from hmc.pose.annealed.nearest_cone import Candidates, candidates, nearest_cones
+from hmc.pose.annealed.nearest_cone import Candidates, Nearest, candidates, nearest_cones, towards
 from hmc.pose.annealed.penetration import penetration_rows
 from hmc.pose.annealed.symmetric import POSTURE, BodyPoints, SymmetricSettings
 from hmc.pose.body.joints import N_DOF
@@ -45,14 +45,11 @@ class RefineSettings:
     stay_weight : float
         Weight (square metres for a step of one prior deviation) that holds angles no data speaks of, such as the twist of a
         straight arm, where the start has them.
-    trial_steps : int
-        Accepted steps after which the best of several starts goes on alone.
     """
 
     iterations: int = 12
     tolerance: float = 2e-3
     stay_weight: float = 4e-6
-    trial_steps: int = 3
 
 
 @dataclass(frozen=True)
@@ -153,6 +150,7 @@ def refine_best(
     cost_settings: SymmetricSettings,
     settings: RefineSettings,
     anchor: np.ndarray | None = None,
+    trial_steps: int = 3,
     is_hopeless: Callable[[np.ndarray, float], bool] | None = None,
 ) -> tuple[np.ndarray, RefineInfo]:
     """Refine several starts by some steps each, and the one that is best then to the end.
@@ -164,6 +162,8 @@ def refine_best(
     starts : sequence of ndarray, shape (27,)
     anchor : ndarray, shape (27,), optional
         As for `refine`; each start's own by default.
+    trial_steps : int
+        Accepted steps after which the best goes on alone.
     is_hopeless : callable, optional
         Told the best state after its first steps and its cost (square metres, the hold included): whether to leave it there.
 
@@ -176,7 +176,10 @@ def refine_best(
     problem = _Problem(
         body, samples, target, hull_points, cost_settings, settings, _free(None), settings.stay_weight / _deviation(None) ** 2
     )
-    trials = [_descend(problem, _begin(problem, start, anchor), settings.trial_steps) for start in starts]
+    trials: list[_Descent] = []
+    for start in starts:
+        begun = _begin(problem, start, anchor, trials[-1].found.pairs if trials else None)
+        trials.append(_descend(problem, begun, trial_steps))
     best = min(trials, key=lambda trial: trial.cost)
     before = sum(trial.evaluations for trial in trials) - best.evaluations
     if is_hopeless is None or not is_hopeless(best.state, best.cost):
@@ -198,10 +201,10 @@ def _outcome(descent: _Descent) -> tuple[np.ndarray, RefineInfo]:
     return descent.state, RefineInfo(descent.first, descent.cost, cost, descent.evaluations)
 
 
-def _begin(problem: _Problem, state: np.ndarray, anchor: np.ndarray | None) -> _Descent:
+def _begin(problem: _Problem, state: np.ndarray, anchor: np.ndarray | None, before: Candidates | None = None) -> _Descent:
     state = np.clip(state, problem.body.limits.low, problem.body.limits.high)
     anchor = state if anchor is None else anchor
-    found, cost = _evaluate(problem, state, anchor)
+    found, cost = _evaluate(problem, state, anchor, before)
     return _Descent(state, anchor, found, cost, cost)
 
 
@@ -217,7 +220,7 @@ def _descend(problem: _Problem, descent: _Descent, accepted: int) -> _Descent:
     while descent.accepted < accepted and not descent.is_done:
         state, found = descent.state, descent.found
         if improved:
-            pulled, jacobian = _pulls(found, problem.cost_settings)
+            pulled, jacobian = _pulls(problem.body, problem.samples, found, problem.cost_settings)
             gradient = jacobian.T @ found.residuals[pulled] + hold * (state - descent.anchor)
             normal = jacobian.T @ jacobian + np.diag(hold)
             # An angle at its limit that wants further out takes no part in this step.
@@ -274,7 +277,7 @@ def residual_rows(
         Zero where a distance is zero or beyond the cap.
     """
     distances = _distances(body, samples, state, target, hull_points, settings)
-    pulled, rows = _pulls(distances, settings)
+    pulled, rows = _pulls(body, samples, distances, settings)
     jacobian = np.zeros((len(distances.residuals), N_DOF))
     jacobian[pulled] = rows
     return distances.residuals, jacobian
@@ -287,86 +290,112 @@ class _Distances:
     Parameters
     ----------
     residuals : ndarray, shape (n + 27,)
-        The posture's last.
-    distance, cap, weight : ndarray, shape (n,)
-    rows : ndarray of int, shape (m,)
-        Which of these distances may change with the state.
-    directions, places : tuple of ndarray, of shape (m, 3) in all
-        The way in which a point has to move to add to the distance, and where the point is.
-    movers : tuple of ndarray of int, of shape (m,) in all
-        Rows of `_RELATIVE`.
+        Weighted: of the body's surface, of what is to be explained, of the axes' depth, of the floor, and of the posture.
+    weights : ndarray, shape (4,)
+        Of the first four.
     axes, centres : ndarray, shape (27, 3)
         The joints' twists.
+    maps : ConeMaps
     pairs : Candidates
         For poses near this one.
+    points, slope : ndarray, shape (n_surface, 3)
+        The surface's points in the world, metres, and how far each gets from the hull where it moves.
+    outside, depth : ndarray
+        Distances, metres, not weighted.
+    nearest : Nearest
+    outward, axis_points : ndarray, shape (n_axes, 3)
+    segment, other : ndarray of int, shape (n_axes,)
+        As from `penetration_rows`.
+    floor : tuple of ndarray
+        As from `lowest_support`; empty where there is no floor.
     """
 
     residuals: np.ndarray
-    distance: np.ndarray
-    cap: np.ndarray
-    weight: np.ndarray
-    rows: np.ndarray
-    directions: tuple[np.ndarray, ...]
-    places: tuple[np.ndarray, ...]
-    movers: tuple[np.ndarray, ...]
+    weights: np.ndarray
     axes: np.ndarray
     centres: np.ndarray
+    maps: ConeMaps
     pairs: Candidates
+    points: np.ndarray
+    slope: np.ndarray
+    outside: np.ndarray
+    nearest: Nearest
+    depth: np.ndarray
+    outward: np.ndarray
+    axis_points: np.ndarray
+    segment: np.ndarray
+    other: np.ndarray
+    floor: tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 def _distances(body, samples, state, target, hull_points, settings, before=None) -> _Distances:
     axes, centres, rotations, positions = joint_twists(body, state)
     maps = cone_maps(body.cones, np.concatenate([rotations, positions[..., None]], axis=-1)[..., None])
     carrier = samples.surface.segment
-    points = np.einsum("nij,nj->ni", rotations[carrier], samples.surface.points) + positions[carrier]
+    points = np.einsum("nij,nj->ni", rotations.take(carrier, axis=0), samples.surface.points)
+    points += positions.take(carrier, axis=0)
     outside, slope = distance_gradient(target, points)
     pairs = candidates(body.cones, maps, hull_points, settings.cap_m, before)
-    unexplained, pulls, towards, nearest, hull_places = nearest_cones(body.cones, maps, pairs)
-    depth, outward, axis_places, segment, other = penetration_rows(body, samples.axes, rotations, positions, maps)
-    gap, lowest, shank = np.zeros(0), np.zeros((0, 3)), np.zeros(0, int)
+    nearest = nearest_cones(body.cones, maps, pairs)
+    depth, outward, axis_points, segment, other = penetration_rows(body, samples.axes, rotations, positions, maps)
+    gap, floor = np.zeros(0), (np.zeros(0), np.zeros((0, 3)), np.zeros(0, int))
     if target.floor_z is not None:
-        gap = floor_gap(body, rotations[None], positions[None], target.floor_z)
-        _, lowest, shank = lowest_support(body, rotations[None], positions[None])
-
-    sizes = np.array([len(outside), len(unexplained), len(depth), len(gap)])
-    shares = np.array([1, settings.explain_weight, settings.overlap_weight, settings.floor_weight]) / np.maximum(sizes, 1)
-    distance = np.concatenate([outside, unexplained, depth, gap])
-    weight = np.repeat(np.sqrt(shares), sizes)
-    cap = np.repeat([settings.cap_m, settings.cap_m, np.inf, np.inf], sizes)
+        floor = lowest_support(body, rotations[None], positions[None])
+        gap = above_floor(floor[0], target.floor_z)
+    sizes = np.array([len(outside), len(nearest.distance), len(depth), 1])
+    weights = np.sqrt(np.array([1, settings.explain_weight, settings.overlap_weight, settings.floor_weight]) / sizes)
+    residuals = [
+        weights[0] * np.minimum(outside, settings.cap_m),
+        weights[1] * np.minimum(nearest.distance, settings.cap_m),
+        weights[2] * depth,
+        weights[3] * gap,
+        _posture(state, settings),
+    ]
     return _Distances(
-        residuals=np.concatenate([weight * np.minimum(distance, cap), _posture(state, settings)]),
-        distance=distance,
-        cap=cap,
-        weight=weight,
-        rows=np.concatenate([np.arange(len(outside)), len(outside) + pulls, np.arange(len(outside) + len(unexplained), len(distance))]),
-        directions=(slope, towards, -outward, np.tile([0.0, 0.0, 1.0], (len(gap), 1))),
-        places=(points, hull_places, axis_places, lowest),
-        # What carries both parts leaves them where they are to one another.
-        movers=(_TO_WORLD + carrier, _TO_WORLD + nearest, len(_MASKS) * other + segment, _TO_WORLD + shank),
-        axes=axes,
-        centres=centres,
-        pairs=pairs,
-    )
+        np.concatenate(residuals), weights, axes, centres, maps, pairs, points, slope, outside, nearest, depth, outward, axis_points,
+        segment, other, floor,
+    )  # fmt: skip
 
 
-def _pulls(found: _Distances, settings: SymmetricSettings) -> tuple[np.ndarray, np.ndarray]:
+def _pulls(body: BodyModel, samples: BodyPoints, found: _Distances, settings: SymmetricSettings) -> tuple[np.ndarray, np.ndarray]:
     """Which residuals change with the state, and how: shapes (m,) and (m, 27)."""
-    distance = found.distance[found.rows]
-    chosen = np.flatnonzero((distance != 0) & (distance < found.cap[found.rows]))
-    rows = found.rows[chosen]
-    wrenches = np.empty((len(rows), 6))
-    directions = np.concatenate(found.directions).take(chosen, axis=0)
-    directions *= found.weight[rows, None]
+    n_outside, n_explain = len(found.outside), len(found.nearest.distance)
+    out = np.flatnonzero((found.outside > 0) & (found.outside < settings.cap_m))
+    pulled = found.nearest.distance[found.nearest.pulls]
+    explain = np.flatnonzero((pulled > 0) & (pulled < settings.cap_m))
+    deep = np.flatnonzero(found.depth)
+    gap = np.flatnonzero(found.residuals[n_outside + n_explain + len(found.depth) : -N_DOF])
+    # The way in which a point has to move to add to the distance, where the point is, and what moves it: a row of `_RELATIVE`.
+    directions = [
+        found.weights[0] * found.slope[out],
+        found.weights[1] * towards(found.maps, found.nearest, explain),
+        -found.weights[2] * found.outward[deep],
+    ]
+    places = [found.points[out], found.nearest.places[explain], found.axis_points[deep]]
+    # What carries both parts leaves them where they are to one another.
+    movers = [
+        _TO_WORLD + samples.surface.segment[out],
+        _TO_WORLD + body.cones.segment[found.nearest.cone[explain]],
+        len(_MASKS) * found.other[deep] + found.segment[deep],
+    ]
+    if len(gap):
+        _, lowest, shank = found.floor
+        directions.append(np.array([[0.0, 0.0, found.weights[3]]]))
+        places.append(lowest)
+        movers.append(_TO_WORLD + shank)
+    rows = [out, n_outside + found.nearest.pulls[explain], n_outside + n_explain + deep, n_outside + n_explain + len(found.depth) + gap]
+    n = sum(map(len, rows))
+    wrenches = np.empty((n, 6))
+    direction = np.concatenate(directions, out=wrenches[:, 3:])
     # g . (axis x (p - centre)) = (p x g) . axis - g . (axis x centre)
-    wrenches[:, :3] = _cross(np.concatenate(found.places).take(chosen, axis=0), directions)
-    wrenches[:, 3:] = directions
+    wrenches[:, :3] = _cross(np.concatenate(places), direction)
     twists = np.concatenate([found.axes, -_cross(found.axes, found.centres)], axis=1)
     twists[:3] = np.eye(6)[3:]  # translations
-    jacobian = np.empty((len(rows) + N_DOF, N_DOF))
+    jacobian = np.empty((n + N_DOF, N_DOF))
     np.matmul(wrenches, twists.T, out=jacobian[:-N_DOF])
-    jacobian[:-N_DOF] *= _RELATIVE.take(np.concatenate(found.movers).take(chosen), axis=0)
+    jacobian[:-N_DOF] *= _RELATIVE.take(np.concatenate(movers), axis=0)
     jacobian[-N_DOF:] = np.diag(np.sqrt(settings.posture_weight) / POSTURE[1])
-    return np.concatenate([rows, len(found.distance) + np.arange(N_DOF)]), jacobian
+    return np.concatenate([*rows, len(found.residuals) - N_DOF + np.arange(N_DOF)]), jacobian
 
 
 def residual_values(

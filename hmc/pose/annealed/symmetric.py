@@ -15,7 +15,7 @@ from hmc.errors import InputError
 from hmc.pose.annealed.cone_maps import ConeMaps, cone_maps, cones_near
 from hmc.pose.annealed.floor import floor_gap
 from hmc.pose.annealed.hull_target import HullTarget, distance_at
-from hmc.pose.annealed.penetration import AxisPoints, axis_points, depths_placed
+from hmc.pose.annealed.penetration import POINTS_A_CONE, AxisPoints, axis_points, depths_placed
 from hmc.pose.annealed.placing import place_segments
 from hmc.pose.annealed.rays import places_and_directions, slide_to_axis
 from hmc.pose.body.flesh import SurfaceSamples, surface_samples
@@ -32,6 +32,7 @@ __all__ = [
     "outside_distance",
     "squared_distance",
     "symmetric_cost",
+    "thinned",
 ]
 
 #: The largest cap: the distance fields must go beyond it by a voxel and more (`hmc.pose.annealed.hull_target.FAR_M`).
@@ -104,6 +105,15 @@ class BodyPoints:
 def body_points(body: BodyModel, coordinates: tuple[np.ndarray, np.ndarray, np.ndarray]) -> BodyPoints:
     """The points of a body, its surface sampled at given coordinates (`hmc.pose.body.flesh.surface_coordinates`)."""
     return BodyPoints(surface_samples(body, coordinates), axis_points(body))
+
+
+def thinned(points: BodyPoints, n: int) -> BodyPoints:
+    """About `n` of the surface's points, evenly spread, and the middle one on the axis of each cone."""
+    step = max(1, round(len(points.surface.points) / n))
+    surface, axes = points.surface, points.axes
+    few = SurfaceSamples(*(values[::step] for values in (surface.points, surface.normals, surface.segment, surface.part)))
+    middles = AxisPoints(*(values[POINTS_A_CONE // 2 :: POINTS_A_CONE] for values in (axes.points, axes.segment, axes.against)))
+    return BodyPoints(few, middles)
 
 
 def outside_distance(body: BodyModel, samples: SurfaceSamples, states: np.ndarray, target: HullTarget) -> np.ndarray:
