@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -27,7 +27,7 @@ STUDIED = {False: ("walk", "jog", "throw_catch", "gesture", "box"), True: ("walk
 QUICK_FRAMES = 13
 
 
-def filter_grid(plan: Plan, settings: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+def filter_grid(plan: Plan, settings: Sequence[dict[str, Any]], actions: Mapping[bool, Sequence[str]] = STUDIED) -> list[dict[str, Any]]:
     """Every setting with both ways of annealing on every studied action, by the actors in turn.
 
     Parameters
@@ -35,8 +35,10 @@ def filter_grid(plan: Plan, settings: Sequence[dict[str, Any]]) -> list[dict[str
     plan : Plan
     settings : sequence of mapping
         What differs from 7 cameras, 20 mm, the factorised likelihood, density 1, 6 layers of 600 particles.
+    actions : mapping of bool to sequence of str
+        By `plan.quick`.
     """
-    sources = action_sources(plan, STUDIED[plan.quick])
+    sources = action_sources(plan, actions[plan.quick])
     if not plan.recordings:
         sources = [source for k, source in enumerate(sources) if k % 2 == k // 2 % 2]  # one actor an action, in turn
     base = {"cameras": 0, "frames": QUICK_FRAMES if plan.quick else 0, "voxel_mm": 20, "likelihood": "factorised", "layers": 6,
