@@ -22,7 +22,7 @@ LEAN = replace(
     annealed=AnnealedSettings(layers=2, particles=50, survival_rate=0.1, spread=0.5),
     search=SearchSettings(draws=40),
 )
-SETTINGS = LossSettings(patience_s=0.2, turn_every_s=0.13)
+SETTINGS = LossSettings(patience_s=0.2, turn_every_s=0.13, suspicion_s=0.13)
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +51,7 @@ def run(walker, state, settings=SETTINGS, usual=None, velocity=True):
 def test_a_pose_that_was_left_behind_is_found_again(walker):
     acted, filt = walker
     start = true_state(filt.body, acted)
-    start[:2] += (1.3, 0.9)
+    start[:2] += (3.0, 2.0)
     errors, losses = run(walker, start)
     assert errors[0] > 0.3
     assert errors[-3:].max() < 0.1

@@ -1,11 +1,14 @@
 """An arm cut out of silhouettes: what is cut, when it counts as taken back, and what the report says of runs that are known."""
 
+from dataclasses import replace
+
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from acted import act, ring
 from hypothesis import given
 from hypothesis import strategies as st
+from posed import body_of, true_state
 
 from hmc.camera.model import project
 from hmc.experiments import Plan, find_experiment
@@ -13,6 +16,13 @@ from hmc.experiments.experiment import Cell
 from hmc.experiments.lost_arm import BACK_M, STAYS, taken_back, without_arm
 from hmc.experiments.style import house_style
 from hmc.landmarks import landmark_index
+from hmc.montecarlo.filters import AnnealedSettings
+from hmc.pose.annealed.apf import make_filter, pose_init, pose_step
+from hmc.pose.annealed.hull_target import make_target
+from hmc.pose.annealed.presets import PRESETS
+from hmc.pose.annealed.rays import with_rays
+from hmc.pose.body.kinematics import landmarks
+from hmc.voxels.carving import carve_levels, make_tables
 
 
 def test_the_arm_is_cut_out_and_the_rest_stays():
@@ -26,6 +36,36 @@ def test_the_arm_is_cut_out_and_the_rest_stays():
         assert not cut[row, column].any()
         column, row = np.rint(project(camera, others)[0]).astype(int).T
         assert np.array_equal(cut[row, column], mask[row, column])
+
+
+def arm_errors(targets, acted, arm, search):
+    """The worse error of elbow and wrist, frame by frame, of a filter that starts from the truth."""
+    preset = replace(PRESETS["default"], annealed=AnnealedSettings(layers=2, particles=50, survival_rate=0.1, spread=0.5), search=search)
+    filt = make_filter(body_of(acted.height_m)[0], preset, acted.fps, acted.grid.voxel_size_m, acted.grid.bounds)
+    pose, errors = pose_init(true_state(filt.body, acted)), []
+    for frame, target in enumerate(targets):
+        pose, _ = pose_step(np.random.default_rng([3, frame]), filt, pose, target)
+        off = landmarks(filt.body, pose.state)[arm[1:]] - acted.landmarks[frame][arm[1:]]
+        errors.append(float(np.linalg.norm(off, axis=1).max()))
+    return np.array(errors)
+
+
+def test_an_arm_that_is_lost_for_more_than_half_a_second_is_taken_back():
+    """The left arm of a man who talks, in one camera's silhouette alone for twelve frames; without the limb search it stays lost."""
+    acted, gone = act("gesture", frames=30, fps=20), (3, 15)
+    arm = [landmark_index(f"l_{part}") for part in ("shoulder", "elbow", "wrist")]
+    tables, targets = make_tables(acted.grid, ring()), list(acted.targets)
+    for frame in range(*gone):
+        whole = acted.masks[frame]
+        cut = [without_arm(camera, mask, acted.landmarks[frame][arm]) for camera, mask in zip(ring(), whole, strict=True)]
+        masks = [whole[0], *cut[1:]]
+        strict, tolerant = carve_levels(tables, masks, (0, 1))
+        targets[frame] = with_rays(make_target(acted.grid, np.argwhere(strict), np.argwhere(tolerant)), ring(), masks)
+    errors = arm_errors(targets, acted, arm, PRESETS["default"].search)
+    assert errors[: gone[0]].max() < 0.1 and errors[gone[1] - 1] > 0.3
+    back = taken_back(errors[gone[1] :])
+    assert back is not None and back <= 15
+    assert taken_back(arm_errors(targets, acted, arm, None)[gone[1] :]) is None
 
 
 @given(st.lists(st.booleans(), max_size=30))

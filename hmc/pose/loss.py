@@ -18,6 +18,7 @@ import numpy as np
 
 from hmc.pose.annealed.apf import PoseFilter, PoseInfo, PoseState, pose_init
 from hmc.pose.annealed.hull_target import HullTarget
+from hmc.pose.annealed.limb_search import LIMBS, search_limbs
 from hmc.pose.annealed.rays import points_to_explain
 from hmc.pose.annealed.refine import refine, residual_values
 from hmc.pose.initialisation import first_poses, swapped_pose
@@ -43,8 +44,8 @@ class LossSettings:
         A fresh start is taken where its cost is below this share of the pose's as it is.
     memory_s : float
         Time over which the usual cost is a mean, seconds.
-    turn_every_s : float
-        How often the body turned about is tried, seconds.
+    turn_every_s, suspicion_s : float
+        How often the body turned about is tried, and how often once it was better, seconds.
     turn_drift, turn_limit : float
         What is taken from each logarithm of a ratio of costs, and the sum at which the body is turned about.
     """
@@ -53,7 +54,8 @@ class LossSettings:
     patience_s: float = 0.3
     gain: float = 0.6
     memory_s: float = 3.0
-    turn_every_s: float = 0.3
+    turn_every_s: float = 1.0
+    suspicion_s: float = 0.2
     turn_drift: float = 0.1
     turn_limit: float = 0.8
 
@@ -166,7 +168,7 @@ def loss_step(
         )
     usual = state.usual + (level - state.usual) * min(1.0, dt / settings.memory_s)
     state = replace(state, usual=usual, bad_s=0.0, wait_s=settings.patience_s)
-    if state.since_turn_s < settings.turn_every_s - dt / 2:
+    if state.since_turn_s < (settings.suspicion_s if state.turned else settings.turn_every_s) - dt / 2:
         return pose, info, state
     (as_it_is, cost), (turned, turned_cost) = _both_ways(rng, filt, pose.state, target)
     factors = walk_factor(np.array([as_it_is[3], turned[3]]), velocity, start)
@@ -190,10 +192,20 @@ def _fresh_start(rng, filt, now, target, settings) -> tuple[np.ndarray, float] |
 
 
 def _both_ways(rng, filt, now, target) -> list[tuple[np.ndarray, float]]:
-    """The pose and the one turned about, both refined to the same points, with their costs."""
+    """The pose and the one turned about, both refined to the same points, with their costs.
+
+    Arms and legs of a body that has been followed the wrong way round have gone astray too: those of the turned one are looked for.
+    """
     preset = filt.preset
     points = points_to_explain(rng, target, preset.fine_hull_points, preset.symmetric.ray_share)
-    both = [now, swapped_pose(filt.body, now, "all")]
-    refined = [refine(filt.body, filt.samples, one, target, points, preset.symmetric, preset.refine)[0] for one in both]
-    costs = [residual_values(filt.body, filt.samples, one, target, points, preset.symmetric) for one in refined]
-    return [(one, float(values @ values)) for one, values in zip(refined, costs, strict=True)]
+    both = []
+    for start, search in ((now, None), (swapped_pose(filt.body, now, "all"), preset.search)):
+        state, _ = refine(filt.body, filt.samples, start, target, points, preset.symmetric, preset.refine)
+        values = residual_values(filt.body, filt.samples, state, target, points, preset.symmetric)
+        cost = float(values @ values)
+        if search is not None:
+            state, cost, _ = search_limbs(
+                rng, filt.body, filt.samples, state, cost, list(LIMBS), target, points, preset.symmetric, preset.refine, search
+            )
+        both.append((state, cost))
+    return both
