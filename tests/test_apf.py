@@ -9,8 +9,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from posed import COST, body_of, mean_error, true_state
 
 from hmc.errors import InputError
-from hmc.montecarlo.filters import AnnealedSettings
-from hmc.pose.annealed.apf import make_filter, pose_init, pose_step
+from hmc.montecarlo.filters import AnnealedSettings, particle_init
+from hmc.pose.annealed.apf import make_filter, pose_init, pose_step, starting_particles
 from hmc.pose.annealed.presets import PRESETS, drift, pose_preset
 from hmc.pose.body.joints import DOF_NAMES, N_DOF, mirror_state
 from hmc.pose.body.kinematics import landmarks
@@ -120,6 +120,24 @@ def test_a_state_is_all_that_goes_on():
     on, _ = pose_step(np.random.default_rng(1), filt, state, acted.targets[1])
     resumed, _ = pose_step(np.random.default_rng(1), filt, pose_init(state.state, state.velocity), acted.targets[1])
     assert_array_equal(on.state, resumed.state)
+
+
+@pytest.mark.parametrize("name", ["default", "canton2009"])
+def test_particles_start_as_the_motion_says(name):
+    filt = filter_of(name, act("walk"))
+    body, refined = filt.body, name == "default"
+    particles = np.stack([true_state(body, act("walk"))] * 3) + np.arange(3)[:, None] * 1e-3
+    velocity = np.full(N_DOF, 0.01)
+    state = pose_init(particles[1], velocity, particle_init(particles))
+    starts = {m: starting_particles(replace(filt, preset=replace(filt.preset, motion=m)), state) for m in ("none", "smooth", "both")}
+    last = particles[1:2] if refined else particles
+    moved = np.clip(last + velocity, body.limits.low, body.limits.high)
+    assert_array_equal(starts["none"].particles, last)
+    assert_array_equal(starts["smooth"].particles, moved)
+    assert_array_equal(starts["both"].particles, np.concatenate([last, moved]))
+    for one in starts.values():
+        assert len(one.log_weights) == len(one.particles) and np.ptp(one.log_weights) == 0
+    assert PRESETS["default"].motion == "both" and PRESETS["canton2009"].motion == "none"
 
 
 def test_a_filter_starts_where_it_is_told():
