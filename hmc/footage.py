@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
@@ -16,7 +16,7 @@ import numpy as np
 from hmc.camera.calibration import natural_key
 from hmc.errors import InputError
 
-__all__ = ["IMAGE_SUFFIXES", "VIDEO_SUFFIXES", "Footage", "find_footage", "open_images", "open_video", "read_footage"]
+__all__ = ["IMAGE_SUFFIXES", "VIDEO_SUFFIXES", "Footage", "find_footage", "open_images", "open_video", "read_footage", "starting_at"]
 
 VIDEO_SUFFIXES = frozenset({".mp4", ".avi", ".mov", ".mkv", ".m4v", ".mpg", ".mpeg", ".webm", ".wmv", ".mts", ".ts", ".h264"})
 IMAGE_SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp", ".pgm", ".ppm"})
@@ -43,6 +43,8 @@ class Footage:
         As the video's header says.
     notes : tuple of str
         What was odd when it was opened.
+    skipped : int
+        Frames of the file before frame 0, of a camera that began before the others.
     """
 
     path: Path
@@ -51,6 +53,7 @@ class Footage:
     images: dict[int, Path] | None = None
     fps: float | None = None
     notes: tuple[str, ...] = ()
+    skipped: int = 0
 
 
 def find_footage(folder: Path, name: str, first_number: int | None = None, count: bool = True) -> Footage | None:
@@ -187,6 +190,22 @@ def _footage_of_images(path: Path, images: dict[int, Path], first_number: int = 
     raise InputError(f"{path}: none of its {len(images)} images can be read; copy or convert them again")
 
 
+def starting_at(footage: Footage, first: int) -> Footage:
+    """The footage without its first frames: `first` becomes frame 0.
+
+    Raises
+    ------
+    InputError
+        When it has no frame from there on.
+    """
+    if first >= footage.n_frames:
+        raise InputError(
+            f"{footage.path}: has {footage.n_frames} frames, but `first_frame` of recording.toml says that it begins with {first}"
+        )
+    images = None if footage.images is None else {number - first: file for number, file in footage.images.items() if number >= first}
+    return replace(footage, n_frames=footage.n_frames - first, images=images, skipped=footage.skipped + first)
+
+
 def read_footage(footage: Footage, first: int, last: int, on_problem: Callable[[str], None], label: str) -> Iterator[np.ndarray | None]:
     """Frames ``first`` to ``last`` (not included) of one camera, in order.
 
@@ -205,7 +224,8 @@ def read_footage(footage: Footage, first: int, last: int, on_problem: Callable[[
         None where the frame is missing, unreadable or of another size.
     """
     images = footage.images
-    frames = _read_video(footage, first, last) if images is None else _read_images(images, first, last)
+    skipped = footage.skipped
+    frames = _read_video(footage, first + skipped, last + skipped) if images is None else _read_images(images, first, last)
     lost: list[int] = []
 
     def say_lost() -> None:

@@ -8,7 +8,7 @@ Units are metres, Z is up and the floor is at z = 0.
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,7 +19,7 @@ from hmc.camera.calibration import build_camera, read_entries
 from hmc.camera.coverage import estimate_room
 from hmc.camera.model import Rig
 from hmc.errors import InputError
-from hmc.footage import Footage, find_footage, number_images, read_footage
+from hmc.footage import Footage, find_footage, number_images, read_footage, starting_at
 from hmc.settings import read_settings
 
 __all__ = ["Frame", "Recording", "background_frames", "iterate_frames", "open_recording"]
@@ -144,7 +144,13 @@ def open_recording(path: str | Path, cameras: Sequence[str] | None = None, start
             raise InputError(f"{path}: no camera named '{', '.join(unknown)}' in the calibration; it has {', '.join(by_name)}")
         entries = [by_name[name] for name in cameras]
     names = [entry.name for entry in entries]
-    footage, silhouettes = find_views(path, names, everyone)
+    starts = settings.get("first_frame", {})
+    strangers = [name for name in starts if name not in everyone]
+    if strangers:
+        raise InputError(
+            f"{path / 'recording.toml'}: `first_frame` names '{strangers[0]}', which is no camera of the calibration ({', '.join(everyone)})"
+        )
+    footage, silhouettes = find_views(path, names, everyone, starts=starts)
     both = [image or mask for image, mask in zip(footage, silhouettes, strict=True)]
     sizes = {name: view.size for name, view in zip(names, both, strict=True) if view is not None}
     try:
@@ -263,7 +269,12 @@ def background_frames(recording: Recording, camera_index: int, limit: int | None
 
 
 def find_views(
-    path: Path, names: Sequence[str], everyone: Sequence[str], count: bool = True, on_error: Callable[[str, str], None] | None = None
+    path: Path,
+    names: Sequence[str],
+    everyone: Sequence[str],
+    count: bool = True,
+    on_error: Callable[[str, str], None] | None = None,
+    starts: Mapping[str, int] | None = None,
 ) -> tuple[list[Footage | None], list[Footage | None]]:
     """The images (in ``videos/``, else in ``images/``) and the silhouettes of each camera.
 
@@ -279,11 +290,14 @@ def find_views(
         As `hmc.footage.open_video`.
     on_error : callable, optional
         Called with a camera's name and what is wrong with its files, which then count as missing; by default that is raised.
+    starts : mapping of str to int, optional
+        The frame of a camera's files that is frame 0 of the recording, where it is not the first.
     """
 
     def find(folder: Path, name: str, first: int) -> Footage | None:
         try:
-            return find_footage(folder, name, first, count)
+            found = find_footage(folder, name, first, count)
+            return found and starting_at(found, (starts or {}).get(name, 0))
         except InputError as error:
             if on_error is None:
                 raise

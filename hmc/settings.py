@@ -15,7 +15,7 @@ from hmc.errors import InputError
 
 __all__ = ["read_settings"]
 
-SETTINGS = ("name", "fps", "frames", "units", "up", "room", "persons", "subject_height_m")
+SETTINGS = ("name", "fps", "frames", "units", "up", "room", "persons", "subject_height_m", "first_frame")
 #: No room is wider (metres): beyond, it is in millimetres.
 MAX_ROOM_M = 300.0
 
@@ -59,6 +59,9 @@ def _checked(settings: Mapping[str, Any], file: Path) -> dict[str, Any]:
     for key, least in (("frames", 1), ("persons", 0)):
         value = settings.get(key)
         demand(key, isinstance(value, int) and not isinstance(value, bool) and value >= least, f"a whole number, {least} or more")
+    starts = settings.get("first_frame", {})
+    whole = isinstance(starts, dict) and all(isinstance(n, int) and not isinstance(n, bool) and n >= 0 for n in starts.values())
+    demand("first_frame", whole, "a table of cameras, each with the frame of its video that is frame 0 of the recording: { cam_00 = 12 }")
     if "subject_height_m" in settings:
         heights = settings["subject_height_m"] if isinstance(settings["subject_height_m"], list) else [settings["subject_height_m"]]
         demand("subject_height_m", all(is_number(height) and 0.3 < height < 3 for height in heights), "statures in metres, such as [1.77]")

@@ -24,12 +24,13 @@ TRACKING = FRONTEND | {"mask_store", "montecarlo", "tracking"}
 POSE = TRACKING | {"pose"}
 EVALUATION = CAMERA | {"metrics", "results", "evaluation"}
 VIEW = POSE | {"rig_picture", "view"}
-EVERYTHING = VIEW | EVALUATION | {"check", "plotting", "synthetic"}
+EVERYTHING = VIEW | EVALUATION | {"c3d", "check", "plotting", "synthetic"}
 MAY_IMPORT = {
     "errors": set(),
     "landmarks": {"errors"},
     "files": {"errors"},
     "tables": {"errors"},
+    "c3d": {"errors"},
     "settings": {"errors"},
     "journal": {"errors", "files"},
     "montecarlo": {"errors", "landmarks"},

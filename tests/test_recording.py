@@ -1,5 +1,7 @@
 """Recordings on disk: what is read, what is survived, what is refused and in which words."""
 
+import re
+import shutil
 from dataclasses import replace
 
 import cv2
@@ -377,3 +379,44 @@ def test_damaged_h264_loses_a_frame_and_keeps_the_rest_in_place(shared_data, tmp
     for frame in frames[lost[-1] + 2 : 75]:
         errors = [np.abs(frame.images[0].astype(float) - image).mean() for image in whole[frame.index - 4 : frame.index + 5]]
         assert np.argmin(errors) == 4
+
+
+def test_cameras_that_did_not_start_together(recording_folder):
+    (recording_folder / "recording.toml").write_text("first_frame = { cam_01 = 4, cam_03 = 1 }\n")
+    recording = open_recording(recording_folder)
+    assert recording.n_frames == 12  # as long as two of the cameras last
+    late = {"cam_01": 4, "cam_03": 1}
+    for frame in iterate_frames(recording, first=2, last=9):
+        for camera, image in zip(recording.rig, frame.images, strict=True):
+            index = frame.index + late.get(camera.name, 0)
+            assert (image is None) == (index >= 12)
+            assert image is None or abs(float(image[..., 1].mean()) - (40 + 5 * index)) <= 1
+    assert [frame.images[1] is None for frame in iterate_frames(recording)] == [False] * 8 + [True] * 4
+
+
+def test_numbered_images_that_did_not_start_together(recording_folder, ring):
+    shutil.rmtree(recording_folder / "videos")
+    for camera in ring:
+        write_images(recording_folder / "images" / camera.name, [k for k in range(3, 12) if k != 7], camera.size)
+    (recording_folder / "recording.toml").write_text("first_frame = { cam_00 = 2 }\n")
+    for frame in iterate_frames(open_recording(recording_folder)):
+        for camera, image in zip(ring, frame.images, strict=True):
+            number = 3 + frame.index + 2 * (camera.name == "cam_00")
+            assert (image is None) == (number == 7 or number >= 12)
+            assert image is None or abs(float(image.mean()) - (40 + 5 * number)) <= 1
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("first_frame = { cam_01 = 12 }", "cam_01.avi: has 12 frames, but `first_frame`"),
+        ("first_frame = { cam_9 = 1 }", "names 'cam_9', which is no camera"),
+        ("first_frame = { cam_01 = -1 }", "`first_frame` must be a table of cameras"),
+        ("first_frame = 3", "`first_frame` must be a table of cameras"),
+        ("first_frame = { cam_01 = 1.5 }", "`first_frame` must be a table of cameras"),
+    ],
+)
+def test_wrong_starts_are_told(recording_folder, text, words):
+    (recording_folder / "recording.toml").write_text(text + "\n")
+    with pytest.raises(InputError, match=re.escape(words)):
+        open_recording(recording_folder)

@@ -1,4 +1,4 @@
-"""``python -m hmc.experiments list | run ID... | status | merge FOLDER... | report``."""
+"""``python -m hmc.experiments list | run ID... | status | merge FOLDER... | report | humaneva FOLDER``."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def main(argv: list[str] | None = None) -> int:
 
 def _make_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m hmc.experiments", description="The papers' tables and figures, computed again.")
-    actions = parser.add_subparsers(required=True, metavar="{list,run,status,merge,report}")
+    actions = parser.add_subparsers(required=True, metavar="{list,run,status,merge,report,humaneva}")
     listing = actions.add_parser("list", help="all experiments")
     listing.set_defaults(act=_list)
     run = actions.add_parser("run", help="compute experiments and write their tables and figures")
@@ -62,6 +62,12 @@ def _make_parser() -> argparse.ArgumentParser:
         action.add_argument(
             "--recordings", type=Path, nargs="+", default=[], metavar="FOLDER", help="your recordings in place of rendered ones"
         )
+    dataset = actions.add_parser("humaneva", help="make recordings of a copy of HumanEva-I")
+    dataset.add_argument("root", type=Path, metavar="FOLDER", help="the dataset, with S1, S2 and so on in it, or one of these")
+    dataset.add_argument("--out", type=Path, default=Path("recordings"), metavar="DIR", help="where the recordings go")
+    dataset.add_argument("--only", nargs="+", default=[], metavar="NAME", help="these alone, as S1_Walking_1")
+    dataset.add_argument("--frames", type=_count, metavar="N", help="at most so many frames of each")
+    dataset.set_defaults(act=_humaneva)
     return parser
 
 
@@ -148,6 +154,19 @@ def _report(args: argparse.Namespace) -> int:
     write_booklet(booklet, rows)
     _tell(verdict_counts(rows))
     _tell(f"wrote {page} and {booklet}")
+    return 0
+
+
+def _humaneva(args: argparse.Namespace) -> int:
+    from hmc.experiments.humaneva import convert_take, find_takes
+
+    takes = {take.title: take for take in find_takes(args.root)}
+    unknown = [name for name in args.only if name not in takes]
+    if unknown:
+        raise InputError(f"--only {unknown[0]}: {args.root} has {', '.join(takes)}")
+    for name in args.only or takes:
+        folder = convert_take(takes[name], _folder(args.out), args.frames, lambda line: _tell(f"note: {line}", sys.stderr))
+        _tell(f"wrote {folder}")
     return 0
 
 
