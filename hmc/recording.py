@@ -148,7 +148,7 @@ def open_recording(path: str | Path, cameras: Sequence[str] | None = None, start
     strangers = [name for name in starts if name not in everyone]
     if strangers:
         raise InputError(
-            f"{path / 'recording.toml'}: `first_frame` names '{strangers[0]}', which is no camera of the calibration ({', '.join(everyone)})"
+            f"{path / 'recording.toml'}: `first_frame` names '{strangers[0]}', no camera of the calibration ({', '.join(everyone)})"
         )
     footage, silhouettes = find_views(path, names, everyone, starts=starts)
     both = [image or mask for image, mask in zip(footage, silhouettes, strict=True)]

@@ -14,12 +14,13 @@ import numpy as np
 import pytest
 
 from hmc.errors import InputError
-from hmc.experiments import EXPERIMENTS, Inputs, Plan, Table, find_experiment, plan_of, run_experiment
+from hmc.experiments import EXPERIMENTS, Inputs, Plan, Source, Table, find_experiment, plan_of, run_experiment
 from hmc.experiments.__main__ import main
 from hmc.experiments.ellipsoid import RADII_M, VOXEL_M, person_voxels
 from hmc.experiments.inputs import once, rendered, source_of
 from hmc.experiments.store import cell_key, cell_rng, digest, read_cell, write_cell
 from hmc.experiments.style import house_style
+from hmc.experiments.sweep import plan_for
 from hmc.experiments.writing import to_latex, write_report
 from hmc.recording import open_recording
 
@@ -239,6 +240,13 @@ def test_wrong_input_is_told_in_a_line(arguments, words, tmp_path, capsys):
     assert words in told and told.count("\n") == 1
 
 
+def test_recordings_that_change_nothing_are_told(recording_folder, tmp_path, capsys):
+    options = ["--quick", "--quiet", "--workers", "1", "--out", str(tmp_path / "out")]
+    assert main(["run", "fig-B.1", "--recordings", str(recording_folder), *options]) == 0
+    assert "--recordings changes nothing" in capsys.readouterr().err
+    assert (tmp_path / "out" / "fig-B.1-quick").is_dir()
+
+
 def test_out_that_is_a_file_is_told(tmp_path, capsys):
     (tmp_path / "file").write_text("")
     assert main(["run", "fig-4.7", "--out", str(tmp_path / "file")]) == 2
@@ -261,6 +269,18 @@ def test_grids_are_plain_and_without_doubles(name, quick):
     assert experiment.id == name and grid
     assert len({cell_key(experiment, parameters) for parameters in grid}) == len(grid)
     assert all(json.loads(json.dumps(parameters)) == parameters for parameters in grid)
+
+
+@pytest.mark.parametrize("name", EXPERIMENTS)
+def test_every_experiment_on_recordings_takes_the_users(name, tmp_path):
+    experiment = find_experiment(name)
+    bare, own = Plan(quick=True), Plan(quick=True, recordings=(Source("mine@12345678", tmp_path),))
+    if plan_for(experiment, own) is own:
+        cells = json.dumps(experiment.grid(own))
+        assert "mine@12345678" in cells
+        assert "@" not in cells.replace("mine@12345678", "") or name == "table-4.2"  # trained on rendered ones, tested on these
+    else:
+        assert plan_for(experiment, own) == bare and "@" not in json.dumps(experiment.grid(bare))
 
 
 def test_recordings_are_labelled_by_content(recording_folder, tmp_path):

@@ -410,7 +410,7 @@ def test_numbered_images_that_did_not_start_together(recording_folder, ring):
     ("text", "words"),
     [
         ("first_frame = { cam_01 = 12 }", "cam_01.avi: has 12 frames, but `first_frame`"),
-        ("first_frame = { cam_9 = 1 }", "names 'cam_9', which is no camera"),
+        ("first_frame = { cam_9 = 1 }", "names 'cam_9', no camera of"),
         ("first_frame = { cam_01 = -1 }", "`first_frame` must be a table of cameras"),
         ("first_frame = 3", "`first_frame` must be a table of cameras"),
         ("first_frame = { cam_01 = 1.5 }", "`first_frame` must be a table of cameras"),

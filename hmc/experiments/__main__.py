@@ -9,7 +9,7 @@ from pathlib import Path
 
 from hmc.errors import InputError
 from hmc.experiments.library import EXPERIMENTS, find_experiment
-from hmc.experiments.sweep import plan_of, run_experiment, stored_cells
+from hmc.experiments.sweep import plan_for, plan_of, run_experiment, stored_cells
 from hmc.experiments.writing import write_report
 
 #: What wrong input, a failed cell and an interrupt leave as exit code.
@@ -81,7 +81,7 @@ def _list(args: argparse.Namespace) -> int:
 def _run(args: argparse.Namespace) -> int:
     if (args.backend == "dask") != (args.scheduler is not None):
         raise InputError("--backend dask and --scheduler ADDRESS go together: the address is what `dask scheduler` prints")
-    plan = plan_of(args.quick, args.recordings)
+    asked = plan_of(args.quick, args.recordings)
     out = _folder(args.out)
     names = _names(args.ids)
     experiments = {name: find_experiment(name) for name in names}  # wrong ids are told before anything is computed
@@ -91,6 +91,9 @@ def _run(args: argparse.Namespace) -> int:
 
         from hmc.experiments.style import house_style
 
+        plan = plan_for(experiment, asked)
+        if plan is not asked:
+            _tell(f"{experiment.id}: is computed on no recording, so --recordings changes nothing", sys.stderr)
         with house_style(), tqdm(desc=experiment.id, unit="cell", dynamic_ncols=True, disable=args.quiet, file=sys.stderr) as bar:
 
             def show(done: int, total: int, bar=bar) -> None:
@@ -115,9 +118,10 @@ def _run(args: argparse.Namespace) -> int:
 
 
 def _status(args: argparse.Namespace) -> int:
-    plan = plan_of(args.quick, args.recordings)
+    asked = plan_of(args.quick, args.recordings)
     for name in _names(args.ids or ["all"]):
         experiment = find_experiment(name)
+        plan = plan_for(experiment, asked)
         cells = stored_cells(experiment, args.out, experiment.grid(plan))
         done = sum(cell is not None for cell in cells)
         _tell(f"{experiment.id:10} {done:5} of {len(cells):5} cells")

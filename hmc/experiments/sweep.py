@@ -14,7 +14,7 @@ import threading
 import time
 import traceback
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +25,7 @@ from hmc.experiments.inputs import Inputs, source_of
 from hmc.experiments.library import find_experiment
 from hmc.experiments.store import cell_key, cell_path, cell_rng, cell_text, read_cell, write_text
 
-__all__ = ["Outcome", "compute_cells", "plan_of", "run_experiment", "stored_cells"]
+__all__ = ["Outcome", "compute_cells", "plan_for", "plan_of", "run_experiment", "stored_cells"]
 
 Progress = Callable[[int, int], None]
 
@@ -62,6 +62,12 @@ def plan_of(quick: bool = False, recordings: list[Path] | None = None) -> Plan:
         When a folder is no recording.
     """
     return Plan(quick, tuple(source_of(folder) for folder in recordings or []))
+
+
+def plan_for(experiment: Experiment, plan: Plan) -> Plan:
+    """The plan, without the user's recordings where the experiment is computed on none and they would change nothing."""
+    bare = replace(plan, recordings=())
+    return bare if plan.recordings and experiment.grid(bare) == experiment.grid(plan) else plan
 
 
 def run_experiment(
