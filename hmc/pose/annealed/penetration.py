@@ -14,7 +14,7 @@ import numpy as np
 from hmc.pose.annealed.cone_maps import ConeMaps, cone_maps, cones_near, spread, to_cones
 from hmc.pose.body.model import PARTS, BodyModel, Cones
 
-__all__ = ["POINTS_A_CONE", "AxisPoints", "axis_points", "depths_placed", "penetration_depth", "penetration_rows"]
+__all__ = ["AxisPoints", "axis_points", "depths_placed", "penetration_depth", "penetration_rows"]
 
 #: Share of each limb part's length from which its axis is tested: what lies nearer to the joint is inside its neighbour anyway.
 _FROM = {"upper_arm": 0.6, "forearm": 0.25, "thigh": 0.6, "shank": 0.2}

@@ -83,7 +83,8 @@ class PosePreset:
     start : {"hypotheses", "neutral"}
         Several starts with a left-right test, or the thesis's neutral pose with the heading of the walk.
     models : tuple of Inclusive
-        Hierarchies for structural annealing in place of `annealed`; of several, each frame has the one that fits best. None by default.
+        Hierarchies for structural annealing in place of `annealed`; of two, each frame has the one that suits the last pose. None by
+        default.
     structural : StructuralSettings
         Where there are `models`.
     limbs : LimbSettings or None
@@ -97,8 +98,8 @@ class PosePreset:
     annealed: AnnealedSettings = field(default_factory=AnnealedSettings)
     drift_scale: float = 1.0
     motion: Literal["none", "smooth", "both"] = "none"
-    coarse_samples: int = 120
-    hull_points: int = 60
+    coarse_samples: int = 170
+    hull_points: int = 150
     surface_samples: int = 350
     fine_hull_points: int = 600
     density: float = 1.0

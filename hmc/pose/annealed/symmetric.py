@@ -15,7 +15,7 @@ from hmc.errors import InputError
 from hmc.pose.annealed.cone_maps import ConeMaps, cone_maps, cones_near
 from hmc.pose.annealed.floor import floor_gap
 from hmc.pose.annealed.hull_target import HullTarget, distance_at
-from hmc.pose.annealed.penetration import POINTS_A_CONE, AxisPoints, axis_points, depths_placed
+from hmc.pose.annealed.penetration import AxisPoints, axis_points, depths_placed
 from hmc.pose.annealed.placing import place_segments
 from hmc.pose.annealed.rays import places_and_directions, slide_to_axis
 from hmc.pose.body.flesh import SurfaceSamples, surface_samples
@@ -108,12 +108,11 @@ def body_points(body: BodyModel, coordinates: tuple[np.ndarray, np.ndarray, np.n
 
 
 def thinned(points: BodyPoints, n: int) -> BodyPoints:
-    """About `n` of the surface's points, evenly spread, and the middle one on the axis of each cone."""
+    """About `n` of the surface's points, evenly spread, and all of the axes'."""
     step = max(1, round(len(points.surface.points) / n))
-    surface, axes = points.surface, points.axes
+    surface = points.surface
     few = SurfaceSamples(*(values[::step] for values in (surface.points, surface.normals, surface.segment, surface.part)))
-    middles = AxisPoints(*(values[POINTS_A_CONE // 2 :: POINTS_A_CONE] for values in (axes.points, axes.segment, axes.against)))
-    return BodyPoints(few, middles)
+    return BodyPoints(few, points.axes)
 
 
 def outside_distance(body: BodyModel, samples: SurfaceSamples, states: np.ndarray, target: HullTarget) -> np.ndarray:
