@@ -101,14 +101,9 @@ def name_branches(shapes: Sequence[BranchShape], trunk: np.ndarray, up: np.ndarr
         stout = sorted(range(len(shapes)), key=lambda k: -shapes[k].length_m * shapes[k].area_m2)[2:]
         heads = [k for k in stout if shapes[k].area_m2 > HEAD_AREA_M2 * 0.8][:1]
     axis = up
-    limbs = [k for k, s in enumerate(shapes) if s.length_m >= LEAST_LIMB_M and k not in heads]
     if heads:
-        feet = (
-            np.mean([shapes[k].tip for k in sorted(limbs, key=lambda k: -shapes[k].area_m2 * shapes[k].length_m)[:2]], axis=0)
-            if limbs
-            else trunk
-        )
-        head = max(heads, key=lambda k: float(np.linalg.norm(shapes[k].tip - feet)))
+        # Shanks of touching knees are as stout: people are upright more often than not.
+        head = max(heads, key=lambda k: float(shapes[k].tip @ up))
         names[head] = "head"
         axis = shapes[head].tip - trunk
         axis = axis / max(float(np.linalg.norm(axis)), 1e-9)

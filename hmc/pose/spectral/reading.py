@@ -9,7 +9,7 @@ import numpy as np
 from hmc.pose.spectral.segmentation import Segmentation, SegmentationSettings, segment_body
 from hmc.pose.spectral.skeleton import SkeletonSettings, equally_spaced, extract_skeletons
 
-__all__ = ["BodyReading", "ReadingSettings", "read_body"]
+__all__ = ["BodyReading", "ReadingSettings", "cut_foot", "read_body"]
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,9 @@ class BodyReading:
     ----------
     segmentation : Segmentation
     curves : dict of str to ndarray, shape (nodes, 3)
-        Of the parts that can be trusted, metres; limbs begin at the trunk, legs end at the ankle.
+        Of the parts that can be trusted, metres; limbs begin at the trunk. ``other_1`` and so on are of branches without a name.
+    foot_m : float
+        So much of the end of a leg's curve is the foot.
     feet : ndarray, shape (k, 3)
         From heel to toe, of each foot that was seen, metres.
     left_out : tuple of str
@@ -57,6 +59,7 @@ class BodyReading:
 
     segmentation: Segmentation
     curves: dict[str, np.ndarray]
+    foot_m: float
     feet: np.ndarray
     left_out: tuple[str, ...]
     status: str
@@ -91,34 +94,30 @@ def read_body(
     settings = settings or ReadingSettings()
     segmentation = segment_body(voxels, points, voxel_size_m, settings.segmentation, votes)
     if segmentation.status != "segmented":
-        return BodyReading(segmentation, {}, np.zeros((0, 3)), (), segmentation.status)
+        return BodyReading(segmentation, {}, 0.0, np.zeros((0, 3)), (), segmentation.status)
     found = extract_skeletons(segmentation, points, settings.skeleton)
     twice = {one.partition(" and ")[0] for one in segmentation.touching if one.endswith(" and trunk")}
-    curves, feet, left_out = {}, [], []
+    curves, left_out = {}, []
     for part, curve in found.items():
         length = float(np.linalg.norm(np.diff(curve, axis=0), axis=1).sum()) / height_m
-        if part[:3] in ("arm", "leg") and "trunk" in found:
-            why = ""
+        if part[:3] in ("arm", "leg", "oth") and "trunk" in found:
             if part in twice:
                 # Its hand is at the trunk: it begins at the end that is on the limb's own side of the trunk.
                 curve = _from_base(curve, found["trunk"], part)
-            if length > settings.longest_limb:
-                why = "is too long for one limb"
-            elif length < settings.least_limb:
-                why = "is too short"
+            why = "is too long for one limb" if length > settings.longest_limb else "is too short" if length < settings.least_limb else ""
             if why:
                 left_out.append(f"{part} {why}")
                 continue
-        if part[:3] == "leg" and length > 3 * settings.foot_share:
-            curve, foot = cut_foot(curve, settings.foot_share * height_m)
-            feet.append(foot)
         curves[part] = curve
+    foot_m = settings.foot_share * height_m
+    feet = [cut_foot(curve, foot_m)[1] for part, curve in curves.items() if part[:3] == "leg"]
+    named = [part for part in curves if part[:3] != "oth"]
     status = "read"
     if "trunk" not in curves:
         status = "no trunk found"
-    elif len(curves) < settings.least_curves:
-        status = f"only {', '.join(curves)} found"
-    return BodyReading(segmentation, curves, np.array(feet).reshape(-1, 3), tuple(left_out), status)
+    elif len(named) < settings.least_curves:
+        status = f"only {', '.join(named)} found"
+    return BodyReading(segmentation, curves, foot_m, np.array(feet).reshape(-1, 3), tuple(left_out), status)
 
 
 def _from_base(curve: np.ndarray, trunk: np.ndarray, part: str) -> np.ndarray:

@@ -67,6 +67,8 @@ class Segmentation:
         Parts that touch where they should not.
     status : str
         ``"segmented"``, or why not.
+    others : tuple of ndarray of int
+        Voxels of branches that are no part by their shape and place.
     """
 
     labels: np.ndarray
@@ -77,6 +79,12 @@ class Segmentation:
     doubts: tuple[str, ...]
     touching: tuple[str, ...]
     status: str
+    others: tuple[np.ndarray, ...] = ()
+
+    @property
+    def whole(self) -> bool:
+        """Whether every part was found, and nothing else."""
+        return self.status == "segmented" and set(self.branches) == set(PART_NAMES[1:]) and not self.doubts
 
     def voxels_of(self, part: str) -> np.ndarray:
         """Rows of the voxels of a part."""
@@ -170,7 +178,8 @@ def segment_body(
         doubts = (*doubts, f"{n - len(inside)} of {n} voxels are apart from the body")
     edges = inside[graph.edges]
     moved = {names[k]: Branch(inside[branches[k].nodes], branches[k].sites) for k in known}
-    return Segmentation(out, all_places, moved, {names[k]: shapes[k] for k in known}, edges, doubts, touching, "segmented")
+    others = tuple(inside[branch.nodes] for branch, name in zip(branches, names, strict=True) if not name)
+    return Segmentation(out, all_places, moved, {names[k]: shapes[k] for k in known}, edges, doubts, touching, "segmented", others)
 
 
 def _halves(edges: np.ndarray, own: np.ndarray, points: np.ndarray, settings: SegmentationSettings) -> np.ndarray:

@@ -139,7 +139,8 @@ def extract_skeletons(segmentation: Segmentation, points: np.ndarray, settings: 
     Returns
     -------
     dict of str to ndarray, shape (nodes, 3)
-        By part. Of limbs and head, the end at the trunk comes first; of the trunk, the lower end.
+        By part; what is no part by its shape and place is ``other_1`` and so on. Of limbs and head, the end at the trunk comes first; of
+        the trunk, the lower end.
     """
     settings = settings or SkeletonSettings()
     curves: dict[str, np.ndarray] = {}
@@ -147,19 +148,20 @@ def extract_skeletons(segmentation: Segmentation, points: np.ndarray, settings: 
     straight = replace(settings, knots=0)
     trunk = segmentation.voxels_of("trunk")
     middle = points[trunk].mean(0) if len(trunk) else points.mean(0)
-    for label, part in enumerate(PART_NAMES):
-        own = segmentation.labels == label
-        rows = np.flatnonzero(own)
+    parts = {part: np.flatnonzero(segmentation.labels == label) for label, part in enumerate(PART_NAMES)}
+    parts |= {f"other_{k + 1}": rows for k, rows in enumerate(segmentation.others)}
+    for part, rows in parts.items():
         if len(rows) < settings.least_voxels:
             continue
-        number = np.cumsum(own) - 1
+        own = np.zeros(len(points), bool)
+        own[rows] = True
+        rows, number = np.flatnonzero(own), np.cumsum(own) - 1
         sites = site_values(number[segmentation.edges[own[segmentation.edges].all(1)]], len(rows))
         known = np.isfinite(sites)
         if part == "trunk":
             known &= (sites > settings.trunk_trim) & (sites < 1 - settings.trunk_trim)
-        if np.count_nonzero(known) < settings.least_voxels:
-            continue
-        curves[part] = curve_through(points[rows[known]], sites[known], straight if part in ("trunk", "head") else settings)
+        if np.count_nonzero(known) >= settings.least_voxels:
+            curves[part] = curve_through(points[rows[known]], sites[known], straight if part in ("trunk", "head") else settings)
     if "trunk" in curves:
         # The ends that were left out go straight on.
         trunk_curve = curves["trunk"]

@@ -7,16 +7,19 @@ from dataclasses import dataclass
 from itertools import permutations
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 
+from hmc.pose.spectral.reading import BodyReading, cut_foot
 from hmc.pose.spectral.skeleton import equally_spaced
 from hmc.pose.swarm.model import SkeletonModel, joint_shares, part_chains, part_lengths, segment_ends
 
-__all__ = ["MODEL_PARTS", "Observed", "best_assignments", "observe_curves", "pair_errors", "skeleton_error"]
+__all__ = ["MODEL_PARTS", "Observed", "best_assignments", "curves_near", "curves_of", "observe_curves", "pair_errors", "skeleton_error"]
 
 #: Parts of the model.
 MODEL_PARTS: tuple[str, ...] = ("torso", "head", "l_arm", "r_arm", "l_leg", "r_leg")
 #: What each part of a segmentation may be.
 KINDS: dict[str, tuple[int, ...]] = {"trunk": (0,), "head": (1,), "arm_1": (2, 3), "arm_2": (2, 3), "leg_1": (4, 5), "leg_2": (4, 5)}
+KINDS |= {part: (k,) for k, part in enumerate(MODEL_PARTS)}
 #: A curve covers at least this share of its part, however short it is.
 LEAST_SHARE = 0.3
 
@@ -93,6 +96,45 @@ def observe_curves(
             lower, upper = np.clip((at - joint) / (1 - joint), 0, 1), np.clip(at / joint, 0, 1)
             blends[q] = np.stack([1 - upper, upper - lower, lower], axis=1)
     return Observed(names, nodes, pairs, blends, best_assignments(pairs, allowed))
+
+
+def curves_of(reading: BodyReading) -> dict[str, np.ndarray]:
+    """The curves of a reading that have a name, legs up to the ankle."""
+    return {
+        part: cut_foot(curve, reading.foot_m)[0] if part[:3] == "leg" else curve for part, curve in reading.curves.items() if part in KINDS
+    }
+
+
+def curves_near(model: SkeletonModel, state: np.ndarray, reading: BodyReading, farthest_m: float) -> dict[str, np.ndarray]:
+    """The curves of a reading, named anew by the parts of a known pose that they are nearest to.
+
+    Parameters
+    ----------
+    model : SkeletonModel
+    state : ndarray, shape (23,)
+        The pose.
+    reading : BodyReading
+    farthest_m : float
+        A curve that is farther than this from every part is left out, metres.
+
+    Returns
+    -------
+    dict of str to ndarray
+        By the names of `MODEL_PARTS`, legs up to the ankle.
+    """
+    free = {part: curve for part, curve in reading.curves.items() if part != "trunk"}
+    costs = np.full((len(free), len(MODEL_PARTS)), farthest_m)
+    for k, curve in enumerate(free.values()):
+        for kind in ("head", "arm_1", "leg_1"):
+            cut = cut_foot(curve, reading.foot_m)[0] if kind == "leg_1" else curve
+            one = observe_curves(model, {kind: cut})
+            costs[k, one.pairs[:, 1]] = pair_errors(model, state[None], one)[0]
+    found = {"torso": reading.curves["trunk"]}
+    for k, part in zip(*linear_sum_assignment(costs), strict=True):
+        if costs[k, part] < farthest_m:
+            curve = list(free.values())[k]
+            found[MODEL_PARTS[part]] = cut_foot(curve, reading.foot_m)[0] if part >= 4 else curve
+    return found
 
 
 def best_assignments(pairs: np.ndarray, allowed: tuple[tuple[int, ...], ...]) -> np.ndarray:

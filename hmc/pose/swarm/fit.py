@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from hmc.pose.swarm.error import Observed, skeleton_error
+from hmc.pose.swarm.error import KINDS, Observed, skeleton_error
 from hmc.pose.swarm.model import ANGLE_INDEX, ANGLES, N_PARAMETERS, SkeletonModel
 from hmc.pose.swarm.pso import PsoSettings, pso_run
 
@@ -25,11 +25,11 @@ def _of(*prefixes: str) -> tuple[int, ...]:
 _ARMS, _LEGS = _of("l_shoulder", "r_shoulder", "l_elbow", "r_elbow"), _of("l_hip", "r_hip", "l_knee", "r_knee")
 #: Stages of Table 3-3: parameters that are free, and curves that count.
 STAGES: tuple[tuple[tuple[int, ...], tuple[str, ...]], ...] = (
-    ((0, 1, 2), ("trunk",)),
-    (_TORSO, ("trunk",)),
-    ((*_TORSO, *_of("neck")), ("trunk", "head")),
-    ((*_TORSO, *_of("neck"), *_ARMS), ("trunk", "head", "arm_1", "arm_2")),
-    (tuple(range(N_PARAMETERS)), ("trunk", "head", "arm_1", "arm_2", "leg_1", "leg_2")),
+    ((0, 1, 2), ("trunk", "torso")),
+    (_TORSO, ("trunk", "torso")),
+    ((*_TORSO, *_of("neck")), ("trunk", "torso", "head")),
+    ((*_TORSO, *_of("neck"), *_ARMS), ("trunk", "torso", "head", "arm_1", "arm_2", "l_arm", "r_arm")),
+    (tuple(range(N_PARAMETERS)), tuple(KINDS)),
 )
 #: Parameters that are tuned one after the other.
 PARTS: tuple[tuple[int, ...], ...] = (
@@ -133,6 +133,7 @@ def fit_hierarchical(
     start: np.ndarray,
     settings: FitSettings | None = None,
     spin_range: float = np.pi,
+    weight: float = 0.004,
 ) -> Fitted:
     """Fit a frame of which nothing is known but the rough place: stage by stage, each with more parameters, then fine tuning.
 
@@ -146,6 +147,8 @@ def fit_hierarchical(
     settings : FitSettings, optional
     spin_range : float
         How far from its start the spin is looked for, radians.
+    weight : float
+        How much the start counts (`Prior`).
 
     Returns
     -------
@@ -153,7 +156,7 @@ def fit_hierarchical(
     """
     settings = settings or FitSettings()
     state, evaluations = start.copy(), 0
-    prior = Prior(start)
+    prior = Prior(start, weight)
     for stage, ((free, names), (particles, iterations)) in enumerate(zip(STAGES, settings.stages, strict=True)):
         seen = observed.only(names)
         if not seen.names:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hmc.pose.spectral.reading import BodyReading
-from hmc.pose.swarm.error import Observed, observe_curves
+from hmc.pose.swarm.error import Observed, curves_near, curves_of, observe_curves, skeleton_error
 from hmc.pose.swarm.fit import FitSettings, Fitted, Prior, bounds_around, fine_tune, fit_around, fit_hierarchical, rest_state
 from hmc.pose.swarm.heading import facing_evidence, heading_of, spin_towards
 from hmc.pose.swarm.model import SkeletonModel
@@ -43,6 +43,12 @@ class SwarmSettings:
         By how much facing straight backwards raises an error, metres.
     backwards : float
         A skeleton is turned about when the evidence for its heading falls below this; two feet that point backwards are -2 a frame.
+    farthest_m : float
+        A curve that is farther than this from every part of the last pose is not taken for one, metres.
+    lost_m : float
+        A frame whose error is larger has no fit, metres.
+    last_weight : float
+        How much the last pose counts in a new start (`Prior`).
     always_check : bool
         Try a start in every frame, as the thesis does.
     """
@@ -60,6 +66,9 @@ class SwarmSettings:
     margin_m: float = 0.012
     facing_m: float = 0.02
     backwards: float = -2.5
+    farthest_m: float = 0.25
+    lost_m: float = 0.12
+    last_weight: float = 0.02
     always_check: bool = False
 
 
@@ -149,7 +158,8 @@ def start_fit(
     for spin in spins:
         start = rest.copy()
         start[6] = spin
-        found = fit_hierarchical(rng, model, observed, start, settings.fit, spin_range=1.0)
+        weight = 0.004 if last is None else settings.last_weight
+        found = fit_hierarchical(rng, model, observed, start, settings.fit, 1.0, weight)
         evaluations += found.evaluations
         wrong = 0.5 * (1 - facing_evidence(found.state, heading) / max(float(np.linalg.norm(heading)), 1e-9)) if heading is not None else 0.0
         if last is not None:
@@ -188,9 +198,9 @@ def swarm_step(
     if reading.status != "read":
         kept = None if state is None else replace(state, velocity=np.zeros_like(state.velocity), missed=state.missed + 1)
         return kept, SwarmInfo(f"no fit: {reading.status}", np.nan, False, False, 0, doubts)
-    observed = observe_curves(model, reading.curves, settings.nodes)
     heading = heading_of(reading.feet, velocity)
     if state is None:
+        observed = observe_curves(model, curves_of(reading), settings.nodes)
         found = start_fit(rng, model, observed, reading, heading, settings)
         facing = facing_evidence(found.state, heading)
         return SwarmState(found.state, np.zeros_like(found.state), found.error_m, facing), _info(found, True, False, 0, doubts)
@@ -200,6 +210,7 @@ def swarm_step(
     prior = Prior(state.state)
     low, high = bounds_around(model, state.state, metres, min(radians, np.pi))
     starts = np.stack([state.state, state.state + state.velocity])
+    observed = observe_curves(model, curves_near(model, state.state, reading, settings.farthest_m), settings.nodes)
     found = fit_around(rng, model, observed, starts, low, high, settings.fit, settings.particles, settings.iterations, prior)
     tuned = fine_tune(rng, model, observed, found.state, settings.fit, prior)
     found = replace(tuned, evaluations=found.evaluations + tuned.evaluations)
@@ -207,16 +218,23 @@ def swarm_step(
     started = turned = False
     spent = 0
     backwards = facing < settings.backwards and facing_evidence(found.state, heading) < 0
-    doubtful = found.error_m > max(settings.doubt_m, settings.doubt_ratio * state.usual_m)
-    if doubtful or backwards or settings.always_check:
-        trial = start_fit(rng, model, observed, reading, heading, settings, None if backwards else state.state)
+    named = observe_curves(model, curves_of(reading), settings.nodes)
+    # Parts that were left out because they are far away count here, where the frame shows everything.
+    error_m = float(skeleton_error(model, found.state[None], named)[0][0]) if segmentation.whole else found.error_m
+    doubtful = error_m > max(settings.doubt_m, settings.doubt_ratio * state.usual_m)
+    if ((doubtful or backwards) and segmentation.whole) or settings.always_check:
+        trial = start_fit(rng, model, named, reading, heading, settings, None if backwards else state.state)
         spent = trial.evaluations
         margin = -settings.facing_m if backwards and facing_evidence(trial.state, heading) > 0 else settings.margin_m
-        if trial.error_m < found.error_m - margin:
+        if trial.error_m < error_m - margin:
             found, started, turned = trial, True, backwards
             facing = facing_evidence(trial.state, heading)
         elif backwards:
             facing = 0.0
+    if found.error_m > settings.lost_m:
+        kept = replace(state, velocity=np.zeros_like(state.velocity), missed=state.missed + 1)
+        why = f"no fit: the nearest pose is {1000 * found.error_m:.0f} mm from the curves"
+        return kept, SwarmInfo(why, found.error_m, False, False, found.evaluations + spent, doubts)
     change = np.zeros_like(found.state) if started else (found.state - state.state) / frames
     # Sums of evidence fade, so that a wrong start can be seen after a while.
     now = SwarmState(found.state, change, 0.9 * state.usual_m + 0.1 * found.error_m, 0.97 * facing)
