@@ -38,6 +38,7 @@ from hmc.tracking.lifecycle import (
     delete,
     is_established,
     looks_like_person,
+    looks_like_thing,
     newcomers,
     one_or_two,
     propose,
@@ -248,15 +249,17 @@ def advance(
     fresh = tuple(track for track in fresh if track.person not in goes_on)
     # Where nothing is seen there is nothing to judge.
     verdicts = _by_person(state.tracks, like, supported & ~np.isin([track.person for track in state.tracks], list(up)))
+    inert = _by_person(state.tracks, looks_like_thing(owned, settings.lifecycle), supported)
     working = _by_person(state.tracks, filtered.efficiency, np.ones(len(filtered.efficiency), bool))
-    staying = delete((*followed, *fresh), frame, state.fps, observation.room, settings.lifecycle, like_person=verdicts, efficiency=working)
+    present, limits = (*followed, *fresh), settings.lifecycle
+    staying = delete(present, frame, state.fps, observation.room, limits, like_person=verdicts, like_thing=inert, efficiency=working)
     things = left_behind(state.things + left, followed, staying, observation.points[owners < 0], state.fps, settings.lifecycle)
     numbers = np.array([*(track.person for track in state.tracks), -1])
     whose = np.full(len(whole.points), -1)
     whose[kept_voxels] = numbers[owners]
     info = StepInfo((*rows, *earlier), whose, tuple(int(number) for number in numbers[:-1][shared]), filtered.color_s, filter_s)
-    present = (*staying, *(candidate.rows[-1] for candidate in candidates))
-    people, heads = (np.array(places).reshape(-1, 3) for places in ([one.position for one in present], [one.head for one in present]))
+    there: tuple[Track | Row, ...] = (*staying, *(candidate.rows[-1] for candidate in candidates))
+    people, heads = (np.array(places).reshape(-1, 3) for places in ([one.position for one in there], [one.head for one in there]))
     strange = np.zeros(len(whole.points), bool)
     strange[kept_voxels] = like_people
     furniture = learn_furniture(state.furniture, whole, people, heads, strange, state.fps)

@@ -17,6 +17,8 @@ __all__ = ["Furniture", "learn_furniture", "part_of_furniture", "without_furnitu
 
 #: Nobody whose centroid is further away than this, seen from above, fills a voxel for long: the reach of Sparse Sampling and a little.
 AWAY_M = 0.5
+#: Nor than this where somebody lies or sits on the floor, whose head is lower than `LEGS_M`.
+LYING_AWAY_M = 1.0
 #: A voxel that was filled for so long while nobody was near is furniture; seconds.
 STANDING_S = 0.6
 #: Somebody whose head's centre is so high stands, metres.
@@ -120,7 +122,9 @@ def learn_furniture(
         return furniture
     low = observation.points[:, 2, None] < LEGS_M
     near = np.where(
-        low & (heads[:, 2] >= UPRIGHT_M), _beside(observation.points, heads, STANCE_M), _beside(observation.points, people, AWAY_M)
+        low & (heads[:, 2] >= UPRIGHT_M),
+        _beside(observation.points, heads, STANCE_M),
+        _beside(observation.points, people, np.where(heads[:, 2] < LEGS_M, LYING_AWAY_M, AWAY_M)),
     )
     away = ~near.any(axis=1) & ~like_people
     places = _places(observation)
@@ -133,7 +137,7 @@ def learn_furniture(
     return Furniture(voxels[known], np.minimum(frames[known], round((STANDING_S + EMPTY_S) * fps)))
 
 
-def _beside(points: np.ndarray, people: np.ndarray, reach_m: float) -> np.ndarray:
+def _beside(points: np.ndarray, people: np.ndarray, reach_m: float | np.ndarray) -> np.ndarray:
     """Which points (n,) are within reach of which places (k,), seen from above."""
     across = points[:, None, :2] - people[None, :, :2]
     return np.einsum("nkc,nkc->nk", across, across) <= reach_m**2

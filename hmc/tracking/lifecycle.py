@@ -31,6 +31,7 @@ __all__ = [
     "delete",
     "is_established",
     "looks_like_person",
+    "looks_like_thing",
     "newcomers",
     "one_or_two",
     "propose",
@@ -82,6 +83,10 @@ class LifecycleSettings:
     established_s : float
         A track whose voxels have looked like a person for so long altogether is one, whatever they look like now: people sit on the floor,
         lie and crouch. Verdicts do not end it (beyond the thesis).
+    still_s, still_m : float
+        But it ends when what it holds has looked like a thing and has not moved by more than this for so long (beyond the thesis).
+    least_lying_m : float
+        Things that people leave behind are not as long as what is seen of somebody who lies.
     least_efficiency, efficiency_s : float
         A track is deleted when the survival rate of its filter's particles (Canton, Eq. 3.11) has been below this share for so long
         (section 4.2.3, second criterion). Of Sparse Sampling, the share of the samples that found a voxel of their own.
@@ -115,8 +120,11 @@ class LifecycleSettings:
     edge_m: float = 0.3
     unlike_s: float = 2.0
     established_s: float = 3.0
+    still_s: float = 8.0
+    still_m: float = 0.06
+    least_lying_m: float = 0.95
     least_efficiency: float = 0.05
-    efficiency_s: float = 0.5
+    efficiency_s: float = 1.0
     least_distance_m: float = 0.45
     same_place_m: float = 0.2
     same_place_s: float = 0.5
@@ -184,6 +192,10 @@ class Track:
         Frames in which they did.
     inefficient : int
         Frames in a row in which hardly any of its filter's particles survived.
+    still : int
+        Frames in a row in which what it holds looked like a thing and stayed near `rest`.
+    rest : ndarray, shape (3,)
+        Where it was when that began, world, metres.
     doubtful : tuple of Row
         Where it was in the last frames, as long as its voxels do not look like a person: told only when they do again, or when the
         track outlives the doubt.
@@ -200,6 +212,8 @@ class Track:
     unlike: int = 0
     liked: int = 0
     inefficient: int = 0
+    still: int = 0
+    rest: np.ndarray = field(default_factory=lambda: np.zeros(3))
     doubtful: tuple[Row, ...] = ()
 
 
@@ -247,6 +261,15 @@ def still_a_person(owned: Blobs, certain: Blobs, tracks: tuple[Track, ...], fps:
     low = established & (owned.volume_m3 >= LYING_SHARE * usual)
     solid = (certain.volume_m3 >= settings.keep_volume_m3) & ((certain.top_m >= settings.keep_top_m) | low)
     return (solid | looks_like_person(owned, settings)) & (owned.volume_m3 >= settings.keep_share * usual)
+
+
+def looks_like_thing(blobs: Blobs, settings: LifecycleSettings) -> np.ndarray:
+    """Which sets of voxels may be a chair or the like that somebody left behind; shape (n,) bool.
+
+    They do not look like a person and are lower than one who appears; people who sit on the floor or crouch may be so too, but they
+    move, and somebody who lies is longer.
+    """
+    return ~looks_like_person(blobs, settings) & (blobs.top_m < settings.least_top_m + 0.1) & (blobs.sides_m[:, 0] < settings.least_lying_m)
 
 
 def unowned_blobs(observation: Observation, owners: np.ndarray, settings: LifecycleSettings) -> tuple[np.ndarray, Blobs]:
@@ -440,6 +463,7 @@ def delete(
     settings: LifecycleSettings,
     *,
     like_person: Mapping[int, bool] | None = None,
+    like_thing: Mapping[int, bool] | None = None,
     efficiency: Mapping[int, float] | None = None,
 ) -> tuple[Track, ...]:
     """The tracks that stay: supported lately, not standing where an older one stands, and doing well.
@@ -455,6 +479,8 @@ def delete(
     like_person : mapping of int to bool, optional
         By person number, whether the voxels of the track looked like a person in this frame (`looks_like_person`). Who is left out is
         not judged, and keeps the count of bad frames.
+    like_thing : mapping of int to bool, optional
+        The same of `looks_like_thing`; who is left out does not.
     efficiency : mapping of int to float, optional
         By person number, the share of the filter's particles that survive, in [0, 1]; for trackers that have particles.
 
@@ -478,8 +504,12 @@ def delete(
             unlike = min(unlike, int(settings.unlike_s * fps))
         if efficiency is not None and track.person in efficiency:
             inefficient = inefficient + 1 if efficiency[track.person] < settings.least_efficiency else 0
-        if crowded <= settings.same_place_s * fps and unlike <= settings.unlike_s * fps and inefficient <= settings.efficiency_s * fps:
-            kept.append(replace(track, crowded=crowded, unlike=unlike, liked=liked, inefficient=inefficient))
+        rests = bool(like_thing and like_thing.get(track.person)) and _gap(track.position, track.rest) <= settings.still_m
+        still, rest = (track.still + 1, track.rest) if rests else (0, track.position)
+        counts = (crowded, unlike, inefficient, still)
+        limits = (settings.same_place_s, settings.unlike_s, settings.efficiency_s, settings.still_s)
+        if all(count <= limit * fps for count, limit in zip(counts, limits, strict=True)):
+            kept.append(replace(track, crowded=crowded, unlike=unlike, liked=liked, inefficient=inefficient, still=still, rest=rest))
     return tuple(kept)
 
 
