@@ -21,10 +21,10 @@ from hmc.pose.body.kinematics import landmark_masks, landmarks, segment_transfor
 from hmc.pose.body.model import PARTS, neutral_state
 from hmc.pose.scalable.limbs import LimbMemory, LimbSettings, limb_spread_deg, look_again
 from hmc.pose.scalable.methods import method_preset
-from hmc.pose.scalable.models import UNITIVE, UNITIVE_PIECES
+from hmc.pose.scalable.models import MODEL_1, MODEL_2, UNITIVE, UNITIVE_PIECES
 from hmc.pose.scalable.restrict import SymmetricData, nearest_part, part_mask, restrict_table
 from hmc.pose.scalable.scouts import limb_occupancy, scout
-from hmc.pose.scalable.step import scalable_step
+from hmc.pose.scalable.step import scalable_step, suited
 from hmc.voxels.grid import VoxelGrid
 
 ALL = np.ones(len(PARTS), bool)
@@ -209,3 +209,14 @@ def test_the_printed_test_asks_for_spread_and_occupancy(filters):
     memory = LimbMemory.of(pose.memory, filt.preset.limbs)
     assert not memory.active[[limb.name.endswith(("thigh", "shank")) for limb in UNITIVE.limbs]].any()
     assert info.missing[dof_index("r_knee_y", "l_hip_x")].all()
+
+
+def test_the_model_is_chosen_by_how_far_limbs_are_bent():
+    both = (MODEL_1, MODEL_2)
+    straight, bent = standing(), standing()
+    bent[dof_index("r_elbow_z", "l_elbow_z")] = np.radians([100.0, -100.0])
+    there = np.ones(N_DOF, bool)
+    assert suited(both, straight, there) is MODEL_1 and suited(both, bent, there) is MODEL_2
+    assert suited(both[:1], bent, there) is MODEL_1
+    there[dof_index("r_elbow_z", "l_elbow_z")] = False
+    assert suited(both, bent, there) is MODEL_1

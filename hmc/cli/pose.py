@@ -56,7 +56,7 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
         action="append",
         default=[],
         metavar="1|2|auto|FILE",
-        help="scalable body model: 1 (default; whole limbs first), 2 (upper arms and thighs first), auto (the better of both in every "
+        help="scalable body model: 1 (default; whole limbs first), 2 (upper arms and thighs first), auto (what suits the pose, frame by "
         "frame), or a TOML file; shbm-ddm-apf takes two, one of each kind",
     )
     parser.add_argument("--preset", default="default", metavar="NAME", help="default, or canton2009 or kehl2006 (smd): as printed")

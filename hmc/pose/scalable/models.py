@@ -250,23 +250,26 @@ _THIRD = ("r_shoulder_y", "r_elbow_z", "l_shoulder_y", "l_elbow_z", "r_hip_z", "
 _UPPER = ("torso", "head", "r_upper_arm", "l_upper_arm", "r_thigh", "l_thigh")
 
 
-def _shbm(name: str, second_parts: tuple[str, ...], held: Literal["last", "rest"]) -> Inclusive:
-    """Figure 7.7 with the dimensions of Eq. 7.18, the last one the whole body: 6, 16 and 27."""
+def _shbm(name: str, first_parts: tuple[str, ...]) -> Inclusive:
+    """Figure 7.7 with the dimensions of Eq. 7.18, the last one the whole body: 6, 16 and 27.
+
+    The trunk carries along the limbs that the next model moves, as they were last seen: alone it slides about in the hull (measured:
+    docs/scalable.md).
+    """
     return Inclusive(
         name,
         (
-            Model("trunk", _ROOT, ("torso",)),
-            Model("limbs", (*_ROOT, *_SECOND), second_parts),
+            Model("trunk", _ROOT, first_parts),
+            Model("limbs", (*_ROOT, *_SECOND), first_parts),
             Model("body", (*_ROOT, *_SECOND, *_THIRD, *_TRUNK), PARTS),
         ),
-        held,
     )
 
 
 #: Model 1 of Figure 7.7: whole limbs are oriented first, then bent.
-MODEL_1 = _shbm("1", PARTS, "last")
+MODEL_1 = _shbm("1", PARTS)
 #: Model 2: upper arms and thighs first, then forearms and shanks.
-MODEL_2 = _shbm("2", _UPPER, "last")
+MODEL_2 = _shbm("2", _UPPER)
 
 
 def _angles(side: str, joint: str) -> tuple[str, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,17 +25,21 @@ from hmc.pose.annealed.presets import PosePreset
 from hmc.pose.annealed.rays import points_to_explain
 from hmc.pose.annealed.scores import ScoreMaps, ScoreTable
 from hmc.pose.annealed.symmetric import POSTURE
-from hmc.pose.body.joints import N_DOF
+from hmc.pose.body.joints import N_DOF, dof_index
 from hmc.pose.body.model import PARTS
 from hmc.pose.scalable.limbs import LimbMemory, LimbSettings, limb_spread_deg, look_again
+from hmc.pose.scalable.models import Inclusive
 from hmc.pose.scalable.restrict import ScoreData, SymmetricData, nearest_part, part_mask, restrict_filter, restrict_target
 from hmc.pose.scalable.scouts import limb_occupancy, scout
 from hmc.pose.scalable.structure import structural_step
 
-__all__ = ["PoseStep", "scalable_step", "step_of"]
+__all__ = ["PoseStep", "scalable_step", "step_of", "suited"]
 
 #: All that the search for lost limbs may look for.
 _LIMB_PARTS = [part for part in PARTS if part not in ("torso", "head")]
+#: Elbows and knees; bent by more than this in the mean, degrees, is a pose of bent limbs.
+HINGES = dof_index("r_elbow_z", "l_elbow_z", "r_knee_y", "l_knee_y")
+BENT_DEG = 45.0
 #: A step of one person's filter.
 PoseStep = Callable[[np.random.Generator, PoseFilter, PoseState, HullTarget | None], tuple[PoseState, PoseInfo]]
 
@@ -159,20 +163,35 @@ def _annealed(rng, filt, state, data, there) -> _Found:
 
 
 def _structural(rng, filt, state, data, there) -> _Found:
-    """The hierarchies' filters, which share the particles; the one that explains the body best."""
-    hierarchies, refined = filt.preset.models, filt.preset.refine is not None
-    settings = replace(filt.preset.structural, gamma=filt.preset.structural.gamma / len(hierarchies))
+    """The filters of the hierarchy that suits the last pose."""
+    hierarchy = suited(filt.preset.models, state.state, there.dofs)
+    n = len(hierarchy.models)
+    likelihoods = [_likelihood(filt, data, hierarchy, level, there) for level in range(n)]
+    if filt.preset.refine is None:
+        starts = [*_threads(state, n - 1), state.particles]
+    else:
+        starts = [starting_particles(filt, state)] * n
+    group = np.where(there.dofs, hierarchy.group, n)
     low, high = filt.body.limits.low, filt.body.limits.high
-    trials = []
-    for hierarchy in hierarchies:
-        n = len(hierarchy.models)
-        likelihoods = [_likelihood(filt, data, hierarchy, level, there) for level in range(n)]
-        starts = [starting_particles(filt, state)] * n if refined else [*_threads(state, n - 1), state.particles]
-        group = np.where(there.dofs, hierarchy.group, n)
-        trials.append(structural_step(rng, starts, likelihoods, group, filt.drift, low, high, settings))
-    threads, info = max(trials, key=lambda trial: trial[1].best_log_likelihood)
-    evaluations = sum(one.evaluations for _, one in trials)
-    return _Found(threads[-1].mean, info.best, info.best_log_likelihood, threads[-1], evaluations, threads[:-1], info.estimates)
+    threads, info = structural_step(rng, starts, likelihoods, group, filt.drift, low, high, filt.preset.structural)
+    return _Found(threads[-1].mean, info.best, info.best_log_likelihood, threads[-1], info.evaluations, threads[:-1], info.estimates)
+
+
+def suited(hierarchies: Sequence[Inclusive], state: np.ndarray, there: np.ndarray) -> Inclusive:
+    """The first of two hierarchies where limbs are mostly straight, the second where they are bent (Canton, section 7.3.2.1).
+
+    Parameters
+    ----------
+    hierarchies : sequence of Inclusive
+        One, or two.
+    state : ndarray, shape (27,)
+        The last pose.
+    there : ndarray of bool, shape (27,)
+        Angles of limbs that are there: others say nothing.
+    """
+    hinges = HINGES[there[HINGES]]
+    bent = len(hinges) > 0 and np.degrees(np.abs(state[hinges])).mean() > BENT_DEG
+    return hierarchies[-1 if bent else 0]
 
 
 def _likelihood(filt, data, hierarchy, level, there):
