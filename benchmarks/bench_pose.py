@@ -12,6 +12,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import cv2
 import numpy as np
@@ -22,7 +23,7 @@ from scipy import ndimage
 from hmc.camera.model import project
 from hmc.montecarlo.filters import AnnealedSettings
 from hmc.pose.annealed.apf import PoseFilter, make_filter, pose_init, pose_step
-from hmc.pose.annealed.hull_target import HullTarget, make_target
+from hmc.pose.annealed.hull_target import FAR_M, HullTarget, make_target
 from hmc.pose.annealed.near_distance import near_distance
 from hmc.pose.annealed.presets import PRESETS
 from hmc.pose.annealed.rays import with_rays
@@ -88,7 +89,7 @@ def seconds_a_frame(filt: PoseFilter, first: np.ndarray, targets: list[HullTarge
     return pose_s / len(targets), legs_s / len(targets), evaluations / len(targets)
 
 
-def best_of(run: Callable[[], tuple[float, float, float]], rounds: int = 5) -> tuple[float, float, float]:
+def median_of(run: Callable[[], tuple[float, float, float]], rounds: int = 5) -> tuple[float, float, float]:
     """The round of the median total, after one to warm up."""
     run()
     return sorted((run() for _ in range(rounds)), key=lambda one: one[0] + one[1])[rounds // 2]
@@ -104,17 +105,16 @@ def main() -> int:
         targets = [target_of(body, pose, voxel_m) for pose in poses[1:]]
         for name, one in (("default", preset), ("default with 6 layers of 600", replace(preset, annealed=MANY))):
             filt = make_filter(body, one, FPS, voxel_m, np.asarray(ROOM))
-            pose_s, legs_s, evaluations = best_of(lambda f=filt, t=targets: seconds_a_frame(f, poses[0], t))
+            pose_s, legs_s, evaluations = median_of(partial(seconds_a_frame, filt, poses[0], targets))
             total = pose_s + legs_s
             note = (
                 f"pose {1e3 * pose_s:.1f} ms, legs {1e3 * legs_s:.1f} ms; {evaluations:.0f} evaluations, {evaluations / total:.0f} a second"
             )
             good &= report("5e", f"{name}, frames a second, {size}", 1 / total, least, at_least=True, note=note)
         tolerant = targets[0].tolerant
-        reach = int(np.ceil(0.25 / voxel_m))
-        times = interleaved(
-            {"near": lambda t=tolerant, r=reach: near_distance(t, r), "full": lambda t=tolerant: ndimage.distance_transform_edt(~t)}
-        )
+        reach = int(np.ceil(FAR_M / voxel_m))
+        full = partial(ndimage.distance_transform_edt, ~tolerant)
+        times = interleaved({"near": partial(near_distance, tolerant, reach), "full": full})
         note = f"{1e3 * times['near']:.1f} ms, {tolerant.size} voxels"
         good &= report("5f", f"distance field / full transform, {size}", times["near"] / times["full"], 0.4, note=note)
     return 0 if good else 1
