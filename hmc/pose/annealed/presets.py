@@ -80,8 +80,8 @@ class PosePreset:
         Search for a limb that got lost.
     fit_body : FitBodySettings or None
         Fit the person's dimensions over the first frames.
-    start : {"hypotheses", "neutral"}
-        Several starts with a left-right test, or the thesis's neutral pose with the heading of the walk.
+    start : {"hypotheses", "spectral", "neutral"}
+        Several starts with a left-right test, from typical poses or from the voxels' skeleton (`hmc.pose.spectral_start`), or the thesis's neutral pose with the heading of the walk.
     models : tuple of Inclusive
         Hierarchies for structural annealing in place of `annealed`; of two, each frame has the one that suits the last pose. None by
         default.
@@ -98,8 +98,8 @@ class PosePreset:
     annealed: AnnealedSettings = field(default_factory=AnnealedSettings)
     drift_scale: float = 1.0
     motion: Literal["none", "smooth", "both"] = "none"
-    coarse_samples: int = 170
-    hull_points: int = 150
+    coarse_samples: int = 350
+    hull_points: int = 250
     surface_samples: int = 350
     fine_hull_points: int = 600
     density: float = 1.0
@@ -107,13 +107,13 @@ class PosePreset:
     refine: RefineSettings | None = None
     search: SearchSettings | None = None
     fit_body: FitBodySettings | None = None
-    start: Literal["hypotheses", "neutral"] = "neutral"
+    start: Literal["hypotheses", "spectral", "neutral"] = "neutral"
     models: tuple[Inclusive, ...] = ()
     structural: StructuralSettings = field(default_factory=StructuralSettings)
     limbs: LimbSettings | None = None
 
     def __post_init__(self) -> None:
-        if self.refine is None and (self.search is not None or self.fit_body is not None or self.start == "hypotheses"):
+        if self.refine is None and (self.search is not None or self.fit_body is not None or self.start != "neutral"):
             raise InputError(f"preset '{self.name}': search, fit_body and several starts need `refine`")
         if self.refine is not None and self.likelihood != "symmetric":
             raise InputError(f"preset '{self.name}': `refine` needs the symmetric likelihood")
