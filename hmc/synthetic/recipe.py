@@ -161,6 +161,10 @@ class ActorRecipe:
     long_hair : bool
     loose_m : float
         How far clothes stand off the body, metres.
+    cube_m : float
+        Side of a cube in the right hand, metres; 0: none.
+    cube_colour : tuple of float
+        sRGB in [0, 1].
     motion : str
         One of `MOTIONS`.
     start_m : (x, y)
@@ -193,6 +197,8 @@ class ActorRecipe:
     legs: str = "long"
     long_hair: bool = False
     loose_m: float = 0.007
+    cube_m: float = 0.0
+    cube_colour: Colour = (0.15, 0.55, 0.20)
     motion: str = "walk"
     start_m: tuple[float, float] = (0.0, 0.0)
     heading_deg: float = 0.0

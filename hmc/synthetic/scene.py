@@ -10,6 +10,7 @@ from hmc.camera.model import Rig
 from hmc.errors import InputError
 from hmc.synthetic.actor import Actor, make_actor, pose_mesh
 from hmc.synthetic.clothes import Clothes
+from hmc.synthetic.held import with_cube
 from hmc.synthetic.library import make_motion
 from hmc.synthetic.markers import with_balls
 from hmc.synthetic.motions import Motion
@@ -156,7 +157,8 @@ def build_scene(recipe: Recipe, seed: int | None = None) -> Scene:
             a.shirt, a.trousers, a.skin, a.hair, a.shoes, a.pattern, a.pattern_colour, a.sleeves, a.legs, a.long_hair, a.loose_m
         )
         actor = make_actor(a.height_m, a.build, rng_actors[2 * k], a.sex, clothes, recipe.cell_m)
-        actors.append(with_balls(actor, a.pattern_colour) if a.pattern == "markers" else actor)
+        actor = with_balls(actor, a.pattern_colour) if a.pattern == "markers" else actor
+        actors.append(with_cube(actor, a.cube_m, a.cube_colour) if a.cube_m > 0 else actor)
         motions.append(make_motion(a, actor.skeleton, times, rng_actors[2 * k + 1], recipe.furniture))
         if (first := _first_in_wall(a, motions[-1], room)) is not None:
             raise InputError(

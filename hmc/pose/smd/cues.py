@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from hmc.camera.color_edges import ColorEdgeSettings
 from hmc.pose.smd.body import SolidBody
+from hmc.pose.smd.color_cue import ColorSettings
+from hmc.pose.smd.contours import Strips
+from hmc.pose.smd.edge_cue import Crop, EdgeMaps, match_edges
 from hmc.pose.smd.rows import Matches, Posed, joined
 from hmc.pose.smd.samples import SurfaceGrid, draw_samples
 from hmc.pose.smd.surface_cue import VoxelCloud, match_surface, match_voxels
+from hmc.pose.smd.views import Views
 
 __all__ = ["CueSettings", "Draw", "Observed", "draw_cues", "match_cues"]
 
@@ -28,15 +33,36 @@ class CueSettings:
         Voxels that look for the nearest part of the body; 0: none, as in the paper.
     voxel_weight : float
         Of these together.
+    circles, meridians : int
+        Strips of either kind of each limb and view; each gives two contour points.
+    edge_weight : float
+        w_e of Eq. 8, over the number of contour points; 0: no edges.
+    full_edges : bool
+        Edges count from the start, as in the paper; otherwise only where the chains are refined.
+    views : int
+        The edge cue takes so many views, those with the fewest hidden contour points.
+    reach_m : float
+        How far from a contour point edges are looked for, metres at its depth.
     width : float
         nu of the Leclerc potential, for squared distances in units of the limb's diameter.
+    edges : ColorEdgeSettings
+    colors : ColorSettings or None
+        None: a point may be matched with a voxel of any colour.
     """
 
     surface_points: tuple[int, ...] = (60, 20, 20, 20, 20, 20)
     surface_weight: float = 1.0
     voxel_points: int = 120
     voxel_weight: float = 0.5
-    width: float = 0.5
+    circles: int = 4
+    meridians: int = 1
+    edge_weight: float = 0.5
+    full_edges: bool = False
+    views: int = 3
+    reach_m: float = 0.06
+    width: float = 1.0
+    edges: ColorEdgeSettings = field(default_factory=ColorEdgeSettings)
+    colors: ColorSettings | None = field(default_factory=ColorSettings)
 
 
 @dataclass(frozen=True)
@@ -49,10 +75,16 @@ class Observed:
         Surface voxels, world, metres.
     colors : ndarray, shape (n, 3), or None
         Theirs in YUV; NaN where unknown.
+    views : Views or None
+        The cameras.
+    crops : tuple of Crop or None, one a camera
+        What they show of the person; None where a camera has no image.
     """
 
     points: np.ndarray
     colors: np.ndarray | None = None
+    views: Views | None = None
+    crops: tuple[Crop | None, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -65,37 +97,75 @@ class Draw:
         Rows of the surface grid.
     voxels : ndarray of int
         Of the cloud.
+    strips, view : ndarray of int
+        Strips, and in which of the used views.
     """
 
     surface: np.ndarray
     voxels: np.ndarray
+    strips: np.ndarray
+    view: np.ndarray
 
 
-def draw_cues(rng: np.random.Generator, grid: SurfaceGrid, cloud: VoxelCloud, settings: CueSettings, times: int = 1) -> Draw:
+def draw_cues(
+    rng: np.random.Generator,
+    grid: SurfaceGrid,
+    strips: Strips,
+    cloud: VoxelCloud,
+    n_views: int,
+    settings: CueSettings,
+    times: int = 1,
+    trunk: bool = True,
+) -> Draw:
     """Draw samples at random.
 
     Parameters
     ----------
     rng : numpy.random.Generator
     grid : SurfaceGrid
+    strips : Strips
     cloud : VoxelCloud
+    n_views : int
+        Views that are used.
     settings : CueSettings
     times : int
         So many times as many samples as the settings say.
+    trunk : bool
+        False: none on the trunk.
     """
-    surface = draw_samples(rng, grid, tuple(times * count for count in settings.surface_points))
-    return Draw(surface, rng.integers(len(cloud.points), size=times * settings.voxel_points))
+    counts = [times * count for count in settings.surface_points]
+    surface = draw_samples(rng, grid, (counts[0] * trunk, *counts[1:]))
+    voxels = rng.integers(len(cloud.points), size=times * settings.voxel_points)
+    chosen = [
+        pool[rng.random((n_views, len(pool))).argsort(axis=1)[:, : times * count]]
+        for pools, count in ((strips.circles, settings.circles), (strips.meridians, settings.meridians))
+        for pool in pools
+    ]
+    lines = np.concatenate(chosen, axis=1)
+    return Draw(surface, voxels, lines.ravel(), np.repeat(np.arange(n_views), lines.shape[1]))
 
 
-def match_cues(body: SolidBody, grid: SurfaceGrid, posed: Posed, cloud: VoxelCloud, draw: Draw, settings: CueSettings) -> Matches:
+def match_cues(
+    body: SolidBody,
+    grid: SurfaceGrid,
+    strips: Strips,
+    posed: Posed,
+    cloud: VoxelCloud,
+    maps: EdgeMaps | None,
+    draw: Draw,
+    settings: CueSettings,
+) -> Matches:
     """Match the drawn samples.
 
     Parameters
     ----------
     body : SolidBody
     grid : SurfaceGrid
+    strips : Strips
     posed : Posed
     cloud : VoxelCloud
+    maps : EdgeMaps or None
+        None: no edges.
     draw : Draw
     settings : CueSettings
     """
@@ -104,4 +174,6 @@ def match_cues(body: SolidBody, grid: SurfaceGrid, posed: Posed, cloud: VoxelClo
         # A third of the grid is dense enough to say which part is nearest.
         candidates = np.arange(0, len(grid.points), 3)
         found.append(match_voxels(body, grid, candidates, posed, cloud, draw.voxels, settings.voxel_weight))
+    if maps is not None and len(draw.strips):
+        found.append(match_edges(body, strips, posed, maps, draw.strips, draw.view, settings.reach_m, settings.edge_weight))
     return joined(found)

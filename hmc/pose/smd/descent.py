@@ -52,13 +52,16 @@ class SmdSettings:
         n of Eq. 20: states over which the moving average is taken.
     iterations : int
         Most of them, Eq. 21.
+    reach : float
+        An iteration changes a parameter by so many tolerances at most, so that no descent runs away; the paper has no such bound.
     """
 
     first_step: float = 0.5
     meta_step: float = 1.0
     memory: float = 0.3
     average: int = 3
-    iterations: int = 40
+    iterations: int = 25
+    reach: float = 20.0
 
 
 @dataclass(frozen=True)
@@ -190,7 +193,8 @@ def smd_run(
         free = np.zeros(len(at), bool)
         free[np.concatenate([group for group, moving in zip(groups, going, strict=True) if moving])] = True
         found = replace(found, gradient=np.where(free, found.gradient, 0.0))
-        state = smd_step(state, found, np.where(free, low, at), np.where(free, high, at), settings)
+        reach = np.where(free, settings.reach, 0.0) * tolerance
+        state = smd_step(state, found, np.maximum(low, at - reach), np.minimum(high, at + reach), settings)
         path.append(state.parameters)
         values.append(found.value)
         counts += going

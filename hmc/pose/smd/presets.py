@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from hmc.errors import InputError
 from hmc.pose.smd.cues import CueSettings
+from hmc.pose.smd.descent import SmdSettings
 from hmc.pose.smd.tracker import SmdPreset
 
 __all__ = ["SMD_PRESETS", "smd_preset"]
@@ -12,7 +13,14 @@ __all__ = ["SMD_PRESETS", "smd_preset"]
 #: body, and takes more iterations.
 SMD_PRESETS: dict[str, SmdPreset] = {
     "default": SmdPreset(),
-    "kehl2006": SmdPreset(cues=CueSettings(voxel_points=0), tolerance_m=0.02, tolerance_deg=2.0),
+    "kehl2006": SmdPreset(
+        cues=CueSettings(voxel_points=0, full_edges=True, width=0.5),
+        descent=SmdSettings(iterations=40),
+        tolerance_m=0.02,
+        tolerance_deg=2.0,
+        predict=0.0,
+        rescue=None,
+    ),
 }
 
 

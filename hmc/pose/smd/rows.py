@@ -16,17 +16,8 @@ from hmc.pose.body.kinematics import dof_masks, joint_twists
 from hmc.pose.smd.body import FREE, SolidBody
 
 __all__ = [
-    "Matches",
-    "Posed",
-    "joined",
-    "evaluate",
-    "gauss_newton_product",
-    "jacobian",
-    "leclerc",
-    "leclerc_slope",
-    "pose_body",
-    "point_wrenches",
-]
+    "Matches", "Posed", "evaluate", "gauss_newton_product", "jacobian", "joined", "leclerc", "leclerc_slope", "point_wrenches", "pose_body",
+]  # fmt: skip
 
 _MASKS = dof_masks()[:, FREE].astype(float)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -17,39 +17,26 @@ from hmc.pose.annealed.hull_target import HullTarget
 from hmc.pose.annealed.presets import pose_preset
 from hmc.pose.body.joints import DOF_NAMES
 from hmc.pose.body.kinematics import landmarks
-from hmc.pose.body.model import BodyModel
 from hmc.pose.sequence import PosedPeople, targets_of
-from hmc.pose.smd.body import solid_body
+from hmc.pose.smd.begin import FirstPose, begin
 from hmc.pose.smd.cues import Observed
-from hmc.pose.smd.samples import surface_grid
+from hmc.pose.smd.observe import observe_people
 from hmc.pose.smd.start import find_da_vinci
-from hmc.pose.smd.tracker import SmdPreset, SmdTracker, TrackState, track_init, track_step
+from hmc.pose.smd.tracker import SmdPreset, SmdTracker, TrackState, track_step
 from hmc.pose.start import start_person
 from hmc.recording import Recording
 from hmc.results import PoseStates, PoseTable, TrackTable
-from hmc.tracking.resumable import WARM_UP_FRAMES, observe_step, person_grid
-from hmc.tracking.tracks import person_voxels, velocities
+from hmc.tracking.resumable import WARM_UP_FRAMES, person_grid
+from hmc.tracking.tracks import velocities
 from hmc.voxels.grid import VoxelGrid
-from hmc.voxels.surface import surface
 
-__all__ = ["FirstPose", "SmdTask", "pose_by_descent"]
+__all__ = ["SmdTask", "pose_by_descent"]
 
 logger = logging.getLogger("hmc")
 
-#: How long a person is watched for the pose of da Vinci's man before a start from any other pose is made, seconds.
+#: How long a person is watched before body and first pose are decided, seconds.
 WINDOW_S = 1.5
-#: The first pose is settled by so many passes over its frame.
-SETTLE = 4
 NO_START = "no hull to start from"
-
-
-@dataclass(frozen=True)
-class FirstPose:
-    """Body and pose (27,) of one of the frames that were watched, by its place among them."""
-
-    place: int
-    body: BodyModel
-    state: np.ndarray
 
 
 #: ``start(frame_rng, targets, velocities)`` finds a first pose in hulls of consecutive frames, or None.
@@ -84,7 +71,7 @@ class SmdTask:
 
 @dataclass
 class _Person:
-    """A person while the recording is read."""
+    """A person while the recording is read: changed from frame to frame."""
 
     number: int
     frames: np.ndarray
@@ -148,58 +135,33 @@ def pose_by_descent(
     return _assemble(rows, {number: person.tracker for number, person in people.items()})
 
 
-def observe_people(recording: Recording, grid: VoxelGrid, tracks: TrackTable, hull: HullStep) -> dict[int, Observed]:
-    """What is seen of everybody in a frame: the surface of the strict hull's part that is theirs.
-
-    Parameters
-    ----------
-    recording : Recording
-    grid : VoxelGrid
-    tracks : TrackTable
-    hull : HullStep
-
-    Returns
-    -------
-    dict of int to Observed
-        Whoever has voxels.
-    """
-    rows = np.flatnonzero(tracks.frames == hull.index)
-    observation = observe_step(recording, grid, hull) if len(rows) else None
-    if observation is None:
-        return {}
-    out = {}
-    for number, voxels in zip(tracks.persons[rows].tolist(), person_voxels(observation, tracks.positions[rows]), strict=True):
-        strict = voxels[hull.strict[tuple(voxels.T)]]
-        if len(strict):
-            low = strict.min(axis=0)
-            solid = np.zeros(strict.max(axis=0) - low + 1, bool)
-            solid[tuple((strict - low).T)] = True
-            out[number] = Observed(grid.centres(surface(solid) + low))
-    return out
-
-
 def _try_start(task: SmdTask, person: _Person, grid: VoxelGrid) -> list:
-    """Start in the frame that came last if its pose is da Vinci's, at the end of the window from whatever pose there is."""
+    """When the window is over: start from the first frame whose pose is da Vinci's, or from whatever pose there is."""
     recording = task.recording
-    frame, observed, _ = person.watched[-1]
-    floor = float(recording.room[0, 2])
-    spread = None if observed is None else find_da_vinci(observed.points, grid.voxel_size_m, floor, task.height_m)
-    if spread is not None:
-        first = FirstPose(len(person.watched) - 1, spread.body, spread.state)
-    else:
-        enough = len(person.watched) >= max(3, round(WINDOW_S * recording.fps)) or frame == int(person.frames[-1])
-        if not enough:
-            return []
-        frames = [number for number, _, _ in person.watched]
+    frames = [number for number, _, _ in person.watched]
+    if len(frames) < max(3, round(WINDOW_S * recording.fps)) and frames[-1] != int(person.frames[-1]):
+        return []
+    observed, targets = [one for _, one, _ in person.watched], [target for _, _, target in person.watched]
+    first, floor = None, float(recording.room[0, 2])
+    for k, seen in enumerate(observed):
+        spread = None if seen is None else find_da_vinci(seen.points, grid.voxel_size_m, floor, task.height_m)
+        if spread is not None:
+            first = FirstPose(k, spread.body, spread.state)
+            break
+    if first is None:
         speed = person.velocities[np.searchsorted(person.frames, frames)]
         start = task.any_start or (lambda rng, targets, speed: _annealed_start(task, rng, targets, speed))
-        found = start(lambda k: task.rng(person.number, frames[k]), [target for _, _, target in person.watched], speed)
-        if found is None:
-            rows = [(frame, person.number, np.full(len(DOF_NAMES), np.nan), np.nan, NO_START) for frame in frames]
-            person.watched = []
-            return rows
-        first = found
-    return _begin(task, person, first)
+        first = start(lambda k: task.rng(person.number, frames[k]), targets, speed)
+    person.watched, watched = [], person.watched
+    if first is None:
+        return [(frame, person.number, np.full(len(DOF_NAMES), np.nan), np.nan, NO_START) for frame in frames]
+    rng = np.random.default_rng([task.seed, person.number, frames[first.place], 1])
+    person.tracker, state = begin(rng, task.preset, first, observed, targets, task.height_m is not None)
+    rows = []
+    for places in (range(first.place - 1, -1, -1), range(first.place, len(frames))):
+        person.state = state
+        rows += [_follow(task, person, watched[k][0], watched[k][1]) for k in places]
+    return rows
 
 
 def _annealed_start(task: SmdTask, rng, targets, speed) -> FirstPose | None:
@@ -212,28 +174,12 @@ def _annealed_start(task: SmdTask, rng, targets, speed) -> FirstPose | None:
     state = started.states[place].state.copy()
     state[3] += 0.5 * state[8]  # half of the waist's twist: hips and shoulders are off by as much
     state[6:9] = 0.0
-    return FirstPose(place, started.filter.body, state)
-
-
-def _begin(task: SmdTask, person: _Person, first: FirstPose) -> list:
-    """Settle in the first pose, and follow from there forwards and backwards through the frames that were watched."""
-    body = solid_body(first.body)
-    person.tracker = SmdTracker(body, surface_grid(body), task.preset)
-    frame, observed, _ = person.watched[first.place]
-    state = track_init(first.state)
-    for k in range(SETTLE):
-        state, _ = track_step(np.random.default_rng([task.seed, person.number, frame, k]), person.tracker, state, observed)
-    state = replace(state, velocity=0 * state.velocity)
-    rows = []
-    for places in (range(first.place - 1, -1, -1), range(first.place, len(person.watched))):
-        person.state = state
-        for k in places:
-            rows.append(_follow(task, person, person.watched[k][0], person.watched[k][1]))
-    person.watched = []
-    return rows
+    return FirstPose(place, started.filter.body, state, is_fitted=True)
 
 
 def _follow(task: SmdTask, person: _Person, frame: int, observed: Observed | None) -> tuple:
+    if person.tracker is None or person.state is None:
+        return frame, person.number, np.full(len(DOF_NAMES), np.nan), np.nan, NO_START
     person.state, info = track_step(task.rng(person.number, frame), person.tracker, person.state, observed)
     return frame, person.number, person.state.state, info.value, info.status
 

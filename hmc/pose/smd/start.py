@@ -1,18 +1,19 @@
 """The first pose, where somebody stands as da Vinci's man does: arms and legs spread. Kehl (2006), section 6.3.
 
-Planes sweep from below for the feet, from the sides for the hands and from above for the head; limb lengths follow by proportion. The paper takes
-the ratios from Dreyfuss (1959), which we do not have; ours are those of `hmc.pose.body.proportions`, and the arms get the length that the span
-from hand to hand says.
+Planes sweep from below for the feet, from the sides for the hands and from above for the head; limb lengths follow by proportion.
+The paper takes the ratios from Dreyfuss (1959), which we do not have; ours are those of `hmc.pose.body.proportions`, and the arms
+get the length that the span from hand to hand says.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from hmc.landmarks import LANDMARKS
 from hmc.pose.body.inverse import fit_landmarks
+from hmc.pose.body.joints import dof_index
 from hmc.pose.body.model import BodyModel, neutral_state
 from hmc.pose.body.proportions import default_body, make_body
 
@@ -77,10 +78,8 @@ def find_da_vinci(points: np.ndarray, voxel_size_m: float, floor_z: float, heigh
         forward = -forward
     left = np.array([-forward[1], forward[0]])
     along = high[:, :2] @ left
-    hands = [
-        high[along >= np.quantile(along, 1.0) - 2 * voxel_size_m].mean(axis=0),
-        high[along <= along.min() + 2 * voxel_size_m].mean(axis=0),
-    ]
+    reach = 2 * voxel_size_m
+    hands = [high[along >= along.max() - reach].mean(axis=0), high[along <= along.min() + reach].mean(axis=0)]
     span = along.max() - along.min() + (1 - 2 * _FULL_VOXELS) * voxel_size_m
     if span < _LEAST_SPAN * stature:
         return None
@@ -128,6 +127,5 @@ def _pose(body: BodyModel, feet, hands, top: float, forward: np.ndarray, left: n
         put(f"{side}_ankle", (*foot, floor_z + d["ankle_height"]))
         put(f"{side}_wrist", hand - np.append(sign * d["hand"] * left, 0.0))
     state, _ = fit_landmarks(body, goal, state)
-    held = np.array([k for k in range(6, 9)])
-    state[held] = 0.0
+    state[dof_index("torso_x", "torso_y", "torso_z")] = 0.0
     return state

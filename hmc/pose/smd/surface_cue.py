@@ -28,8 +28,8 @@ class VoxelCloud:
     middle : ndarray, shape (3,)
         Around which coordinates are small, so that single precision will do.
     system : ndarray of float32, shape (4, n)
-        Rows x, y, z from `middle`, times -2, and their squared length: the product with (x, y, z, 1) is the squared distance to a point, less
-        the point's own squared length.
+        Rows x, y, z from `middle`, times -2, and their squared length: the product with (x, y, z, 1) is the squared distance to a
+        point, less the point's own squared length.
     barred : ndarray of float32, shape (n_patches, n), or None
         0 where a voxel's colour fits a patch, else `BARRED`; None: colours do not count.
     """
@@ -71,7 +71,7 @@ def nearest_voxels(cloud: VoxelCloud, points: np.ndarray, patches: np.ndarray | 
     table = shifted @ cloud.system
     if cloud.barred is None or patches is None:
         return table.argmin(axis=1), np.ones(len(points), bool)
-    table += cloud.barred[patches]
+    table += cloud.barred.take(patches, axis=0)
     index = table.argmin(axis=1)
     return index, table[np.arange(len(points)), index] < BARRED / 2
 
@@ -140,7 +140,7 @@ def match_voxels(
     observed[:, :3] = cloud.points[voxels] - cloud.middle
     table = observed @ system
     if cloud.barred is not None:
-        table += cloud.barred[grid.patch[candidates]][:, voxels].T
+        table += cloud.barred.take(voxels, axis=1).take(grid.patch[candidates], axis=0).T
     index = table.argmin(axis=1)
     found = table[np.arange(len(voxels)), index] < BARRED / 2
     chosen, points = candidates[index], points[index]

@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from hmc.pose.smd.body import CHAINS, FREE, SolidBody
+from hmc.pose.body.joints import N_DOF
+from hmc.pose.body.model import BodyModel
+from hmc.pose.smd.body import CHAINS, FREE, SolidBody, solid_body
+from hmc.pose.smd.color_cue import ColorModel, color_fits, learn_colors, update_colors
+from hmc.pose.smd.contours import Strips, make_strips
 from hmc.pose.smd.cues import CueSettings, Draw, Observed, draw_cues, match_cues
 from hmc.pose.smd.descent import Evaluation, SmdSettings, smd_run
+from hmc.pose.smd.edge_cue import EdgeMaps, best_views, edge_maps, shown_contours
 from hmc.pose.smd.levenberg import LmSettings, lm_run
-from hmc.pose.smd.rows import Matches, evaluate, gauss_newton_product, jacobian, pose_body
-from hmc.pose.smd.samples import SurfaceGrid
-from hmc.pose.smd.surface_cue import VoxelCloud, voxel_cloud
+from hmc.pose.smd.rescue import RescueSettings, propose_limb, unexplained
+from hmc.pose.smd.rows import Matches, Posed, evaluate, gauss_newton_product, jacobian, pose_body
+from hmc.pose.smd.samples import SurfaceGrid, surface_grid
+from hmc.pose.smd.surface_cue import VoxelCloud, place, voxel_cloud
 
-__all__ = ["OPTIMISERS", "SmdPreset", "SmdTracker", "TrackInfo", "TrackState", "track_init", "track_step"]
+__all__ = [
+    "OPTIMISERS", "Scene", "SmdPreset", "SmdTracker", "TrackInfo", "TrackState", "evaluation", "make_scene", "make_tracker", "optimise",
+    "track_init", "track_step",
+]  # fmt: skip
 
 OPTIMISERS = ("smd", "deterministic", "lm")
 #: Fewer surface voxels than these say nothing of a pose.
@@ -40,6 +50,8 @@ class SmdPreset:
         epsilon_2 over epsilon_1, for the chains.
     predict : float
         Share of the last frame's change that is expected again.
+    rescue : RescueSettings or None
+        None: a limb that is lost stays so, as in the paper.
     """
 
     cues: CueSettings = field(default_factory=CueSettings)
@@ -47,10 +59,11 @@ class SmdPreset:
     levenberg: LmSettings = field(default_factory=LmSettings)
     optimiser: str = "smd"
     times: int = 1
-    tolerance_m: float = 0.004
-    tolerance_deg: float = 0.4
+    tolerance_m: float = 0.005
+    tolerance_deg: float = 0.5
     refine_share: float = 0.5
-    predict: float = 0.0
+    predict: float = 0.5
+    rescue: RescueSettings | None = field(default_factory=RescueSettings)
 
 
 @dataclass(frozen=True)
@@ -59,6 +72,7 @@ class SmdTracker:
 
     body: SolidBody
     grid: SurfaceGrid
+    strips: Strips
     preset: SmdPreset
 
 
@@ -70,10 +84,13 @@ class TrackState:
     ----------
     state, velocity : ndarray, shape (27,)
         Pose and its last change.
+    colors : ColorModel or None
+        None before the first frame, and where colours do not count.
     """
 
     state: np.ndarray
     velocity: np.ndarray
+    colors: ColorModel | None = None
 
 
 @dataclass(frozen=True)
@@ -88,11 +105,20 @@ class TrackInfo:
         The objective at the end, on the last samples.
     iterations : ndarray of int, shape (6,)
         Of the full pose and of each chain.
+    views : ndarray of int
+        In which edges were looked for.
     """
 
     status: str
     value: float
     iterations: np.ndarray
+    views: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
+
+
+def make_tracker(skeleton: BodyModel, preset: SmdPreset) -> SmdTracker:
+    """Flesh out a skeleton and lay samples on it."""
+    body = solid_body(skeleton)
+    return SmdTracker(body, surface_grid(body), make_strips(body), preset)
 
 
 def track_init(state: np.ndarray) -> TrackState:
@@ -122,46 +148,133 @@ def track_step(
         return replace(before, velocity=0 * before.velocity), TrackInfo("too little of the hull", np.nan, np.zeros(6, int))
     preset, limits = tracker.preset, tracker.body.skeleton.limits
     low, high = limits.low[FREE], limits.high[FREE]
-    cloud = voxel_cloud(observed.points)
-    start = (before.state + preset.predict * before.velocity)[FREE]
-    start = np.clip(start, low, high)
-    tolerance = np.where(FREE < 3, preset.tolerance_m, np.radians(preset.tolerance_deg))
-    whole = [np.arange(len(FREE))]
-    parameters, counts, value = start, [], np.nan
-    for groups, share in ((whole, 1.0), (list(CHAINS), preset.refine_share)):
-        parameters, iterations, value = _optimise(rng, tracker, cloud, parameters, low, high, share * tolerance, groups)
-        counts.append(iterations)
+    start = np.clip((before.state + preset.predict * before.velocity)[FREE], low, high)
+    scene = make_scene(tracker, observed, start, before.colors)
+    parameters, first, _ = optimise(rng, scene, start, [np.arange(len(FREE))])
+    parameters, second, value = optimise(rng, scene, parameters, CHAINS, preset.refine_share)
+    parameters = _rescued(rng, scene, parameters)
     state = before.state.copy()
     state[FREE] = parameters
-    return TrackState(state, state - before.state), TrackInfo("fitted", value, np.concatenate(counts))
+    info = TrackInfo("fitted", value, np.concatenate([first, second]), scene.chosen)
+    return TrackState(state, state - before.state, _new_colors(scene, observed, parameters, before.colors)), info
 
 
-def _optimise(rng, tracker, cloud, parameters, low, high, tolerance, groups) -> tuple[np.ndarray, np.ndarray, float]:
-    """Descend in some groups of parameters with the preset's optimiser."""
-    preset = tracker.preset
+def _rescued(rng: np.random.Generator, scene: Scene, parameters: np.ndarray) -> np.ndarray:
+    """The parameters with a lost limb where it explains more."""
+    tracker, settings = scene.tracker, scene.tracker.preset.rescue
+    if settings is None:
+        return parameters
 
-    def draw() -> Draw:
-        return draw_cues(rng, tracker.grid, cloud, preset.cues, preset.times)
+    def lost_at(at: np.ndarray) -> np.ndarray:
+        grid = tracker.grid
+        points = place(_posed(tracker, at), grid.points[::3], grid.segment[::3])
+        return unexplained(points, scene.cloud, settings.far_m)
 
-    first = draw()
+    lost = lost_at(parameters)
+    if len(lost) < settings.share * len(scene.cloud.points):
+        return parameters
+    found = propose_limb(rng, tracker.body, tracker.grid, scene.cloud, parameters, lost, settings)
+    if found is None:
+        return parameters
+    chain, trial = found
+    trial, _, _ = optimise(rng, scene, trial, [CHAINS[chain]], tracker.preset.refine_share)
+    return trial if len(lost_at(trial)) <= settings.gain * len(lost) else parameters
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A tracker and a frame made ready.
+
+    Parameters
+    ----------
+    tracker : SmdTracker
+    cloud : VoxelCloud
+    maps : EdgeMaps or None
+        None: no edges.
+    chosen : ndarray of int
+        Views that edges are looked for in.
+    """
+
+    tracker: SmdTracker
+    cloud: VoxelCloud
+    maps: EdgeMaps | None
+    chosen: np.ndarray
+
+    def draw(self, rng: np.random.Generator, trunk: bool) -> Draw:
+        """Samples for the whole body, or for the chains."""
+        tracker = self.tracker
+        n_views = 0 if self.maps is None or (trunk and not tracker.preset.cues.full_edges) else len(self.maps.views)
+        return draw_cues(rng, tracker.grid, tracker.strips, self.cloud, n_views, tracker.preset.cues, tracker.preset.times, trunk)
+
+    def match(self, parameters: np.ndarray, drawn: Draw) -> tuple[Matches, np.ndarray]:
+        """Matches of drawn samples at some parameters (24,), and their Jacobian."""
+        tracker = self.tracker
+        posed = _posed(tracker, parameters)
+        matches = match_cues(tracker.body, tracker.grid, tracker.strips, posed, self.cloud, self.maps, drawn, tracker.preset.cues)
+        return matches, jacobian(posed, matches)
+
+
+def make_scene(tracker: SmdTracker, observed: Observed, parameters: np.ndarray, colors: ColorModel | None = None) -> Scene:
+    """Sort out the voxels' colours, choose the views and find their edges.
+
+    Parameters
+    ----------
+    tracker : SmdTracker
+    observed : Observed
+    parameters : ndarray, shape (24,)
+        Where the body is expected.
+    colors : ColorModel, optional
+    """
+    cues = tracker.preset.cues
+    fits = None
+    if cues.colors is not None and observed.colors is not None and colors is not None:
+        fits = color_fits(colors, observed.colors, cues.colors)
+    cloud = voxel_cloud(observed.points, fits)
+    usable = np.array([crop is not None for crop in observed.crops], bool)
+    if cues.edge_weight == 0 or observed.views is None or not usable.any():
+        return Scene(tracker, cloud, None, np.zeros(0, int))
+    shown = shown_contours(tracker.body, tracker.strips, _posed(tracker, parameters), observed.views)
+    chosen = best_views(shown, usable, cues.views)
+    crops = [crop for k in chosen if (crop := observed.crops[k]) is not None]
+    return Scene(tracker, cloud, edge_maps(observed.views.select(chosen), crops, shown[chosen], cues.edges), chosen)
+
+
+def optimise(
+    rng: np.random.Generator, scene: Scene, parameters: np.ndarray, groups: Sequence[np.ndarray], tolerance_share: float = 1.0
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Descend in some groups of parameters with the preset's optimiser.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    scene : Scene
+    parameters : ndarray, shape (24,)
+    groups : sequence of ndarray of int
+        All parameters, or the chains.
+    tolerance_share : float
+        On the preset's tolerances.
+
+    Returns
+    -------
+    parameters : ndarray, shape (24,)
+    iterations : ndarray of int, one a group
+    value : float
+        Of the objective at the end, on the last samples.
+    """
+    preset, limits = scene.tracker.preset, scene.tracker.body.skeleton.limits
+    low, high = limits.low[FREE], limits.high[FREE]
+    trunk = any((group < 6).any() for group in groups)  # the chains leave it where it is
+    first = scene.draw(rng, trunk)
     if preset.optimiser == "lm":
-        return lm_run(lambda at: match_at(tracker, cloud, at, first), parameters, low, high, groups, preset.cues.width, preset.levenberg)
+        return lm_run(lambda at: scene.match(at, first), parameters, low, high, groups, preset.cues.width, preset.levenberg)
 
     def objective(at: np.ndarray, going: np.ndarray) -> Evaluation:
-        drawn = draw() if preset.optimiser == "smd" else first
-        return evaluation(*match_at(tracker, cloud, at, drawn), preset.cues.width)
+        drawn = scene.draw(rng, trunk) if preset.optimiser == "smd" else first
+        return evaluation(*scene.match(at, drawn), preset.cues.width)
 
+    tolerance = tolerance_share * np.where(FREE < 3, preset.tolerance_m, np.radians(preset.tolerance_deg))
     found, info = smd_run(objective, parameters, low, high, tolerance, preset.descent, groups)
     return found, info.iterations, float(info.values[-1])
-
-
-def match_at(tracker: SmdTracker, cloud: VoxelCloud, parameters: np.ndarray, drawn: Draw) -> tuple[Matches, np.ndarray]:
-    """Matches of drawn samples at some parameters (24,), and their Jacobian."""
-    state = np.zeros(27)
-    state[FREE] = parameters
-    posed = pose_body(tracker.body, state)
-    matches = match_cues(tracker.body, tracker.grid, posed, cloud, drawn, tracker.preset.cues)
-    return matches, jacobian(posed, matches)
 
 
 def evaluation(matches: Matches, rows: np.ndarray, width: float) -> Evaluation:
@@ -169,3 +282,20 @@ def evaluation(matches: Matches, rows: np.ndarray, width: float) -> Evaluation:
     value, gradient, slopes = evaluate(matches, rows, width)
     curvature = np.repeat(matches.weight / width, 3) @ rows.reshape(-1, rows.shape[-1]) ** 2
     return Evaluation(value, gradient, lambda vector: gauss_newton_product(rows, slopes, vector), curvature)
+
+
+def _new_colors(scene: Scene, observed: Observed, parameters: np.ndarray, colors: ColorModel | None) -> ColorModel | None:
+    """Colours of the patches after a frame."""
+    settings, tracker = scene.tracker.preset.cues.colors, scene.tracker
+    if settings is None or observed.colors is None:
+        return colors
+    posed = _posed(tracker, parameters)
+    if colors is None:
+        return learn_colors(tracker.grid, posed, scene.cloud, observed.colors, settings)
+    return update_colors(colors, tracker.grid, posed, scene.cloud, observed.colors, settings)
+
+
+def _posed(tracker: SmdTracker, parameters: np.ndarray) -> Posed:
+    state = np.zeros(N_DOF)
+    state[FREE] = parameters
+    return pose_body(tracker.body, state)
