@@ -92,9 +92,7 @@ def ends_near_origin(places: np.ndarray, edges: np.ndarray, core: np.ndarray, se
     return limb_pieces(edges, far, settings.origin_radius * trunk, settings.pieces)
 
 
-def grow_branches(
-    places: np.ndarray, pieces: Pieces | None = None, settings: GrowSettings | None = None
-) -> list[Branch]:
+def grow_branches(places: np.ndarray, pieces: Pieces | None = None, settings: GrowSettings | None = None) -> list[Branch]:
     """All branches of an embedding, the one with the farthest tip first.
 
     Parameters

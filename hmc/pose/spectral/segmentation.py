@@ -137,7 +137,9 @@ def segment_body(
     pieces = met = None
     if settings.grow.stop == "origin":
         pieces = ends_near_origin(places, graph.edges, core, settings.grow)
-        cut = np.concatenate([pieces.cut, *(_halves(graph.edges, pieces.labels == k, points[inside], settings) for k in range(pieces.count))])
+        cut = np.concatenate(
+            [pieces.cut, *(_halves(graph.edges, pieces.labels == k, points[inside], settings) for k in range(pieces.count))]
+        )
         if len(cut):
             # Without the faces over which limbs touch, each goes its own way.
             apart = without_edges(graph, cut)

@@ -43,7 +43,7 @@ class SkeletonSettings:
     least_voxels: int = 12
 
 
-def site_values(edges: np.ndarray, n: int) -> np.ndarray:
+def site_values(edges: np.ndarray, n: int, along: np.ndarray | None = None) -> np.ndarray:
     """Where along its part each voxel is, from 0 at one end to 1 at the other.
 
     The first eigenvector of a chain is a half wave of a cosine, so its arc cosine goes evenly along the chain (exactly so for a path).
@@ -54,6 +54,9 @@ def site_values(edges: np.ndarray, n: int) -> np.ndarray:
         Of the part's graph.
     n : int
         Voxels of the part.
+    along : ndarray, shape (n,), optional
+        About how far along the part each voxel is. Of the first three eigenvectors, the one that goes with it is taken: of a stout part
+        with bits of others at it, the first one may run across.
 
     Returns
     -------
@@ -67,7 +70,11 @@ def site_values(edges: np.ndarray, n: int) -> np.ndarray:
     sites = np.full(n, np.nan)
     if len(body) < 3:
         return sites
-    wave = eigenmap(csr_array(graph[body][:, body]), 1).vectors[:, 0]
+    waves = eigenmap(csr_array(graph[body][:, body]), 1 if along is None else 3).vectors
+    wave = waves[:, 0]
+    if along is not None:
+        rising = (along[body] - along[body].mean()) @ (waves - waves.mean(0)) / np.maximum(waves.std(0), 1e-300)
+        wave = waves[:, int(np.abs(rising).argmax())]
     ends = np.where(wave > 0, wave / max(wave.max(), 1e-300), wave / max(-wave.min(), 1e-300))
     sites[body] = np.arccos(np.clip(ends, -1, 1)) / np.pi
     return sites
@@ -146,6 +153,7 @@ def extract_skeletons(segmentation: Segmentation, points: np.ndarray, settings: 
     curves: dict[str, np.ndarray] = {}
     share = settings.trunk_trim / max(1 - 2 * settings.trunk_trim, 1e-9)
     straight = replace(settings, knots=0)
+    axis = _trunk_axis(segmentation)
     trunk = segmentation.voxels_of("trunk")
     middle = points[trunk].mean(0) if len(trunk) else points.mean(0)
     parts = {part: np.flatnonzero(segmentation.labels == label) for label, part in enumerate(PART_NAMES)}
@@ -156,7 +164,8 @@ def extract_skeletons(segmentation: Segmentation, points: np.ndarray, settings: 
         own = np.zeros(len(points), bool)
         own[rows] = True
         rows, number = np.flatnonzero(own), np.cumsum(own) - 1
-        sites = site_values(number[segmentation.edges[own[segmentation.edges].all(1)]], len(rows))
+        inner = number[segmentation.edges[own[segmentation.edges].all(1)]]
+        sites = site_values(inner, len(rows), points[rows] @ axis if part == "trunk" and axis is not None else None)
         known = np.isfinite(sites)
         if part == "trunk":
             known &= (sites > settings.trunk_trim) & (sites < 1 - settings.trunk_trim)
@@ -173,6 +182,15 @@ def extract_skeletons(segmentation: Segmentation, points: np.ndarray, settings: 
         if np.linalg.norm(curve[0] - start) > np.linalg.norm(curve[-1] - start):
             curves[part] = curve[::-1]
     return curves
+
+
+def _trunk_axis(segmentation: Segmentation) -> np.ndarray | None:
+    """From between the legs to the head, unit length; None where one of them is missing."""
+    legs = [segmentation.shapes[part].base for part in ("leg_1", "leg_2") if part in segmentation.shapes]
+    if len(legs) < 2 or "head" not in segmentation.shapes:
+        return None
+    axis = segmentation.shapes["head"].base - np.mean(legs, axis=0)
+    return axis / max(float(np.linalg.norm(axis)), 1e-9)
 
 
 def _lower_end(trunk: np.ndarray, segmentation: Segmentation) -> np.ndarray:

@@ -10,12 +10,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hmc.pose.spectral.reading import BodyReading
-from hmc.pose.swarm.error import Observed, curves_near, curves_of, observe_curves, skeleton_error
+from hmc.pose.swarm.error import curves_near, curves_of, observe_curves, skeleton_error
 from hmc.pose.swarm.fit import FitSettings, Fitted, Prior, bounds_around, fine_tune, fit_around, fit_hierarchical, rest_state
 from hmc.pose.swarm.heading import facing_evidence, heading_of, spin_towards
 from hmc.pose.swarm.model import SkeletonModel
 
-__all__ = ["SwarmInfo", "SwarmSettings", "SwarmState", "start_fit", "swarm_step"]
+__all__ = ["SwarmInfo", "SwarmSettings", "SwarmState", "start_fits", "swarm_step"]
 
 
 @dataclass(frozen=True)
@@ -122,56 +122,62 @@ class SwarmInfo:
     doubts: tuple[str, ...]
 
 
-def start_fit(
-    rng: np.random.Generator, model: SkeletonModel, observed: Observed, reading: BodyReading, heading: np.ndarray | None,
-    settings: SwarmSettings, last: np.ndarray | None = None,
-) -> Fitted:
-    """A pose from one frame alone; with a heading, or the last pose, the two ways round are weighed by them.
+def start_fits(
+    rng: np.random.Generator,
+    model: SkeletonModel,
+    reading: BodyReading,
+    heading: np.ndarray | None,
+    settings: SwarmSettings,
+    last: np.ndarray | None = None,
+) -> list[Fitted]:
+    """Poses from one frame alone, the likeliest first: either way round, weighed by the heading and the last pose where there are any.
 
     Parameters
     ----------
     rng : numpy.random.Generator
     model : SkeletonModel
-    observed : Observed
     reading : BodyReading
     heading : ndarray, shape (2,), or None
         As from `hmc.pose.swarm.heading.heading_of`.
     settings : SwarmSettings
     last : ndarray, shape (23,), optional
-        The last pose, where there is one: it is what is likely where curves are missing.
+        The last pose: it is what is likely where curves are missing.
     """
+    observed = observe_curves(model, curves_of(reading), settings.nodes)
     trunk = reading.curves["trunk"]
-    up = trunk[-1] - trunk[0]
-    rest = rest_state(model, trunk.mean(0), up)
+    rest = rest_state(model, trunk.mean(0), trunk[-1] - trunk[0])
+    weight = 0.004
     if last is not None:
-        rest[7:] = last[7:]
-        forward = np.array([np.cos(last[6]), np.sin(last[6])])
-        spins = [float(np.arctan2(forward[1], forward[0]))]
-        rest[6] = spins[0]
+        rest[6:], weight = last[6:], settings.last_weight
+        spins = [last[6], last[6] + np.pi]
     elif heading is not None:
-        spins = [spin_towards(rest, heading)]
+        towards = spin_towards(rest, heading)
+        spins = [towards, towards + np.pi]
     else:
-        spins = []
-    # Either way round, unless the heading leaves no doubt.
-    spins = [spins[0], spins[0] + np.pi] if spins else [0.0, np.pi / 2, np.pi, 3 * np.pi / 2]
-    fits, evaluations = [], 0
+        spins = [0.0, np.pi / 2, np.pi, 3 * np.pi / 2]
+    fits = []
     for spin in spins:
         start = rest.copy()
         start[6] = spin
-        weight = 0.004 if last is None else settings.last_weight
         found = fit_hierarchical(rng, model, observed, start, settings.fit, 1.0, weight)
-        evaluations += found.evaluations
-        wrong = 0.5 * (1 - facing_evidence(found.state, heading) / max(float(np.linalg.norm(heading)), 1e-9)) if heading is not None else 0.0
+        wrong = 0.0
+        if heading is not None:
+            wrong += 0.5 * (1 - facing_evidence(found.state, heading / np.linalg.norm(heading)))
         if last is not None:
             wrong += 0.5 * (1 - np.cos(found.state[6] - last[6]))
         fits.append((found.error_m + settings.facing_m * wrong, found))
-    best = min(fits, key=lambda pair: pair[0])[1]
-    return replace(best, evaluations=evaluations)
+    fits.sort(key=lambda pair: pair[0])
+    return [found for _, found in fits]
 
 
 def swarm_step(
-    rng: np.random.Generator, model: SkeletonModel, state: SwarmState | None, reading: BodyReading, fps: float,
-    velocity: np.ndarray | None = None, settings: SwarmSettings | None = None,
+    rng: np.random.Generator,
+    model: SkeletonModel,
+    state: SwarmState | None,
+    reading: BodyReading,
+    fps: float,
+    velocity: np.ndarray | None = None,
+    settings: SwarmSettings | None = None,
 ) -> tuple[SwarmState | None, SwarmInfo]:
     """One frame of a person.
 
@@ -200,8 +206,7 @@ def swarm_step(
         return kept, SwarmInfo(f"no fit: {reading.status}", np.nan, False, False, 0, doubts)
     heading = heading_of(reading.feet, velocity)
     if state is None:
-        observed = observe_curves(model, curves_of(reading), settings.nodes)
-        found = start_fit(rng, model, observed, reading, heading, settings)
+        found = start_fits(rng, model, reading, heading, settings)[0]
         facing = facing_evidence(found.state, heading)
         return SwarmState(found.state, np.zeros_like(found.state), found.error_m, facing), _info(found, True, False, 0, doubts)
     frames = 1 + state.missed
@@ -223,7 +228,7 @@ def swarm_step(
     error_m = float(skeleton_error(model, found.state[None], named)[0][0]) if segmentation.whole else found.error_m
     doubtful = error_m > max(settings.doubt_m, settings.doubt_ratio * state.usual_m)
     if ((doubtful or backwards) and segmentation.whole) or settings.always_check:
-        trial = start_fit(rng, model, named, reading, heading, settings, None if backwards else state.state)
+        trial = start_fits(rng, model, reading, heading, settings, None if backwards else state.state)[0]
         spent = trial.evaluations
         margin = -settings.facing_m if backwards and facing_evidence(trial.state, heading) > 0 else settings.margin_m
         if trial.error_m < error_m - margin:
