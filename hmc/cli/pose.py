@@ -21,7 +21,7 @@ from hmc.cli.track import JOURNAL, add_tracker_options, selected_tracker
 
 __all__ = ["add_parser", "run"]
 
-METHODS = ("apf", "shbm-apf", "ddm-apf", "shbm-ddm-apf", "smd", "marker-apf")
+METHODS = ("apf", "shbm-apf", "ddm-apf", "shbm-ddm-apf", "smd", "pso", "marker-apf")
 #: The journal of a run that is not finished.
 POSE_JOURNAL = ".pose.journal"
 #: Methods whose poses can be smoothed.
@@ -49,7 +49,7 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
         default="apf",
         help="apf: annealed particle filter (default); shbm-apf: by models of rising "
         "detail; ddm-apf: without the limbs that the data does not show; shbm-ddm-apf: both; smd: superellipsoids by stochastic "
-        "meta descent, the quickest; marker-apf: on markers",
+        "meta descent, the quickest; pso: spectral skeleton and particle swarm, without tracking of the pose; marker-apf: on markers",
     )
     parser.add_argument(
         "--model",
@@ -58,6 +58,12 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
         metavar="1|2|auto|FILE",
         help="scalable body model: 1 (default; whole limbs first), 2 (upper arms and thighs first), auto (what suits the pose, frame by "
         "frame), or a TOML file; shbm-ddm-apf takes two, one of each kind",
+    )
+    parser.add_argument(
+        "--init",
+        choices=("hypotheses", "spectral"),
+        help="where particle filters start, and start anew after a loss: typical poses at every heading (default), or the skeleton in the "
+        "voxels themselves",
     )
     parser.add_argument("--preset", default="default", metavar="NAME", help="default, or canton2009 or kehl2006 (smd): as printed")
     parser.add_argument("--voxel", type=positive_float, default=0.03, metavar="M", help="side of a voxel, metres (default: 0.03)")
@@ -85,6 +91,8 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
+    from dataclasses import replace
+
     import numpy as np
 
     from hmc.errors import InputError
@@ -98,6 +106,7 @@ def run(args: argparse.Namespace) -> int:
     from hmc.pose.smd.presets import smd_preset
     from hmc.pose.smd.sequence import SmdTask, pose_by_descent
     from hmc.pose.smoothing import smooth_people
+    from hmc.pose.swarm.sequence import SwarmTask, pose_by_swarm, swarm_preset, write_fits
     from hmc.results import write_joints, write_pose, write_run, write_tracks
     from hmc.tracking.resumable import person_grid, track_recording
 
@@ -106,8 +115,15 @@ def run(args: argparse.Namespace) -> int:
     recording = open_selected(args)
     if args.method == "marker-apf":
         return run_markers(args, _height(args.height, recording), recording)
-    smd = args.method == "smd"
-    preset = smd_preset(args.preset) if smd else method_preset(pose_preset(args.preset), args.method, args.model)
+    smd, pso = args.method == "smd", args.method == "pso"
+    if args.init and (smd or pso):
+        raise InputError(f"--init: not for --method {args.method}; it is for the particle filters")
+    if pso:
+        preset = swarm_preset(args.preset)
+    else:
+        preset = smd_preset(args.preset) if smd else method_preset(pose_preset(args.preset), args.method, args.model)
+    if args.init:
+        preset = replace(preset, start=args.init)
     if args.out.is_file():
         raise InputError(f"--out {args.out}: is a file; give a folder")
     height = _height(args.height, recording)
@@ -149,7 +165,20 @@ def run(args: argparse.Namespace) -> int:
         on_problem=problems.append,
         progress=lambda steps, total: progress(steps, total, "track", args.quiet),
     )
-    if smd:
+    if pso:
+        people, fits = pose_by_swarm(
+            SwarmTask(recording, preset, args.seed, height),
+            tracks,
+            args.voxel,
+            frontend=frontend,
+            journal=pose_journal,
+            masks=masks,
+            key=key,
+            on_problem=problems.append,
+            progress=lambda steps, total: progress(steps, total, "pose", args.quiet),
+        )
+        write_fits(args.out / "fits.csv", fits)
+    elif smd:
         people = pose_by_descent(
             SmdTask(recording, preset, args.seed, height),
             tracks,

@@ -22,6 +22,7 @@ from hmc.pose.annealed.limb_search import LIMBS, search_limbs
 from hmc.pose.annealed.rays import points_to_explain
 from hmc.pose.annealed.refine import refine, residual_values
 from hmc.pose.initialisation import first_poses, swapped_pose
+from hmc.pose.spectral_start import spectral_poses
 from hmc.pose.start import StartSettings, walk_factor
 
 __all__ = ["LossSettings", "LossState", "loss_init", "loss_step", "recalled", "remembered"]
@@ -183,7 +184,8 @@ def _fresh_start(rng, filt, now, target, settings) -> tuple[np.ndarray, float] |
     """The best pose that a start from this frame's hulls finds, and its cost, if that is far below the present one's."""
     preset = filt.preset
     floor_z = 0.0 if target.floor_z is None else target.floor_z
-    states, _ = first_poses(rng, filt.body, filt.samples, target, preset.symmetric, floor_z)
+    find = spectral_poses if preset.start == "spectral" else first_poses
+    states, _ = find(rng, filt.body, filt.samples, target, preset.symmetric, floor_z)
     points = points_to_explain(rng, target, preset.fine_hull_points, preset.symmetric.ray_share)
     trials = [refine(filt.body, filt.samples, one, target, points, preset.symmetric, preset.refine) for one in states]
     best, cost = min(((one, info.cost_after) for one, info in trials), key=lambda pair: pair[1])

@@ -27,6 +27,7 @@ from hmc.pose.body.model import BodyModel, neutral_state
 from hmc.pose.body.proportions import canton_body, default_body
 from hmc.pose.initialisation import first_poses, swapped_poses
 from hmc.pose.scalable.step import step_of
+from hmc.pose.spectral_start import spectral_poses
 
 __all__ = ["StartSettings", "Started", "estimate_height", "follow", "possible_heights", "start_person", "walk_factor"]
 
@@ -268,7 +269,8 @@ def _best_hypothesis(frame_rng, filt, fps, targets, usable, velocities, floor_z,
     pool = []
     for anchor in anchors:
         rng = frame_rng(anchor)
-        states, costs = first_poses(rng, body, samples, targets[anchor], preset.symmetric, floor_z)
+        find = spectral_poses if preset.start == "spectral" else first_poses
+        states, costs = find(rng, body, samples, targets[anchor], preset.symmetric, floor_z)
         costs = costs * walk_factor(states[:, 3], velocities[anchor], settings)
         pool += [(cost, anchor, state) for cost, state in zip(costs, states, strict=True)]
     pool.sort(key=lambda entry: entry[0])
