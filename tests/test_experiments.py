@@ -121,7 +121,6 @@ def test_workers_end_with_a_parent_that_is_killed(toy, tmp_path):
     deadline = time.monotonic() + 90
     while not list(out.glob("inputs/.shared.txt.lock")) and time.monotonic() < deadline:
         time.sleep(0.02)
-    time.sleep(10)  # a worker looks for its parent from its first cell on, and the second one may begin late
     os.kill(process.pid, signal.SIGKILL)
     process.communicate(timeout=40)  # ends when nobody holds the other end any more: the input alone would take a minute
     assert not (out / "inputs" / "shared.txt").exists()

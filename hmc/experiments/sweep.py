@@ -169,8 +169,8 @@ def _work(parent: int, task: Callable[[dict[str, Any]], str], parameters: dict[s
 @functools.cache
 def _end_with(parent: int) -> None:
     """Let this process end when its parent does: a parent that is killed cannot end its workers, and they would compute on."""
-    if os.getppid() != parent:
-        return  # the parent is another, or is not told
+    if os.getpid() == parent:
+        return  # joblib found no way to start workers
 
     def look() -> None:
         while os.getppid() == parent:
