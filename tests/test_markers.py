@@ -23,7 +23,7 @@ from hmc.pose.markers.likelihood import MarkerLikelihood, marker_cost, marker_vi
 from hmc.pose.markers.nearest import nearest_detections
 from hmc.pose.markers.points import find_points, triangulate
 from hmc.pose.markers.sequence import pose_from_markers
-from hmc.pose.markers.start import left_over, start_poses
+from hmc.pose.markers.start import left_over, search_near, start_poses
 from hmc.pose.markers.synthetic import SyntheticDetector, detect_synthetic, marker_visibility, seen_by_ideal_detector
 
 BODY = default_body(1.75)
@@ -161,6 +161,17 @@ def test_a_pose_begins_among_more_false_points_than_true_ones():
     state, _ = start_poses(np.random.default_rng(0), BODY, points, views)[0]
     assert np.linalg.norm(landmarks(BODY, state) - places, axis=1).mean() < 0.05
     assert left_over(BODY, state, points, views) == 0
+
+
+def test_a_lost_arm_is_found_near_the_pose():
+    truth = standing(3)
+    lost = truth.copy()
+    lost[dof_index("l_shoulder_x")] += np.radians(70)
+    places = landmarks(BODY, truth)
+    views = np.full(len(places), 5)
+    found, better = search_near(np.random.default_rng(0), BODY, places, views, lost)
+    assert better and np.linalg.norm(landmarks(BODY, found) - places, axis=1).max() < 0.03
+    assert search_near(np.random.default_rng(0), BODY, places[:3], views[:3], lost)[1] is False
 
 
 def test_markers_of_two_people_are_refused():

@@ -18,7 +18,7 @@ from hmc.pose.body.model import BodyModel
 from hmc.pose.markers.body import place_tips
 from hmc.pose.markers.likelihood import MarkerLikelihood, SeenMarkers, marker_cost
 from hmc.pose.markers.points import find_points, matched_points
-from hmc.pose.markers.start import lay_body
+from hmc.pose.markers.start import lay_body, search_near
 
 __all__ = ["MARKER_PRESETS", "MarkerFilter", "MarkerInfo", "MarkerPreset", "make_marker_filter", "marker_preset", "marker_step"]
 
@@ -192,11 +192,12 @@ def marker_step(rng: np.random.Generator, filt: MarkerFilter, state: PoseState, 
     cost, matched = _cost(body, seen, estimate, preset.likelihood)
     if preset.search and np.isnan(points[LIMBS]).any():
         found, views = find_points(seen)
-        other, _ = lay_body(body, found, estimate, SEARCH_GATES_M, views)
-        other, other_points = _refine(body, seen, other, preset.likelihood.gate_px)
-        other_cost, other_matched = _cost(body, seen, other, preset.likelihood)
-        if other_cost < cost:
-            estimate, points, cost, matched = other, other_points, other_cost, other_matched
+        near, better = search_near(rng, body, found, views, estimate)
+        for other in [lay_body(body, found, estimate, SEARCH_GATES_M, views)[0], *([near] if better else [])]:
+            other, other_points = _refine(body, seen, other, preset.likelihood.gate_px)
+            other_cost, other_matched = _cost(body, seen, other, preset.likelihood)
+            if other_cost < cost:
+                estimate, points, cost, matched = other, other_points, other_cost, other_matched
     status = "fitted" if (matched >= 2).sum() >= LEAST_MARKERS else "too few markers where the body should have them"
     info = MarkerInfo(cost, matched, points, annealed, status)
     return PoseState(estimate, estimate - state.state, particles), info

@@ -19,7 +19,7 @@ from hmc.pose.body.kinematics import landmarks
 from hmc.pose.body.model import BodyModel, neutral_state
 from hmc.pose.markers.body import place_tips
 
-__all__ = ["LEAST_POINTS", "lay_body", "left_over", "start_poses"]
+__all__ = ["LEAST_POINTS", "lay_body", "left_over", "search_near", "start_poses"]
 
 #: From fewer points than this no pose is begun.
 LEAST_POINTS = 6
@@ -28,16 +28,11 @@ HEADINGS = 12
 #: The search from each: the first layer's deviations (metres, radians), and its layers.
 SEARCH = AnnealedSettings(layers=14, particles=2000, survival_rate=0.05, spread=0.8)
 SEARCH_SD = {
-    "root_t": 0.15,
-    "root_rz": 0.3,
-    "root_r": 0.15,
-    "torso": 0.2,
-    "neck": 0.2,
-    "shoulder": 0.8,
-    "elbow": 0.8,
-    "hip": 0.4,
-    "knee": 0.5,
-}
+    "root_t": 0.15, "root_rz": 0.3, "root_r": 0.15, "torso": 0.2, "neck": 0.2, "shoulder": 0.8, "elbow": 0.8, "hip": 0.4, "knee": 0.5,
+}  # fmt: skip
+#: The search near a pose, with so many times those deviations.
+NEAR_SEARCH = AnnealedSettings(layers=8, particles=1000, survival_rate=0.05, spread=0.7)
+NEAR_SHARE = 0.5
 #: A marker without a point, and a point that must be somebody's without a marker, count as being this far apart, metres.
 SEARCH_GATE_M = 0.4
 #: What a point on which the fewest views agree counts as farther away (in squares), metres; 0 for one on which the most do.
@@ -72,16 +67,13 @@ def start_poses(rng: np.random.Generator, body: BodyModel, points: np.ndarray, v
     trust = _trust(views)
     middle = np.average(points, axis=0, weights=trust + 0.01)
     cost = _point_cost(body, points, trust)
-    low, high = body.limits.low, body.limits.high
-    sd = np.array([next(value for key, value in SEARCH_SD.items() if key in name) for name in DOF_NAMES])
     finds = []
     for heading in np.arange(HEADINGS) * 2 * np.pi / HEADINGS:
         state = neutral_state("down", body.limits)
         state[:2], state[dof_index("root_rz")] = middle[:2], heading
         state[2] += middle[2] - np.median(landmarks(body, state)[:, 2])
-        _, info = annealed_step(rng, particle_init(state[None]), lambda states: -cost(states), sd, low, high, SEARCH)
-        finds.append((info.best, info.best_log_likelihood))
-    finds.sort(key=lambda find: -find[1])
+        finds.append(_search(rng, body, cost, state, SEARCH))
+    finds.sort(key=lambda find: find[1])
     laid = np.array([lay_body(body, points, state, GATES_M, views)[0] for state, _ in finds[:PURSUED]])
     found: list[tuple[np.ndarray, float]] = []
     for state, value in sorted(zip(laid, cost(laid).tolist(), strict=True), key=lambda one: one[1]):
@@ -89,6 +81,44 @@ def start_poses(rng: np.random.Generator, body: BodyModel, points: np.ndarray, v
         if all(np.linalg.norm(landmarks(body, other) - places, axis=1).mean() > ALIKE_M for other, _ in found):
             found.append((state, value))
     return found
+
+
+def search_near(
+    rng: np.random.Generator, body: BodyModel, points: np.ndarray, views: np.ndarray, state: np.ndarray
+) -> tuple[np.ndarray, bool]:
+    """Look near a pose for one that explains points better, and lay the body into them.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    body : BodyModel
+    points : ndarray, shape (n, 3)
+    views : ndarray of int, shape (n,)
+    state : ndarray, shape (27,)
+
+    Returns
+    -------
+    state : ndarray, shape (27,)
+    better : bool
+        Whether it explains them better, at the cost of `start_poses`.
+    """
+    if len(points) < LEAST_POINTS:
+        return state, False
+    cost = _point_cost(body, points, _trust(views))
+    found, _ = _search(rng, body, cost, state, NEAR_SEARCH, NEAR_SHARE)
+    found, _ = lay_body(body, points, found, GATES_M, views)
+    before, after = cost(np.stack([state, found]))
+    return found, bool(after < before)
+
+
+def _search(
+    rng: np.random.Generator, body: BodyModel, cost, state: np.ndarray, settings: AnnealedSettings, share: float = 1.0
+) -> tuple[np.ndarray, float]:
+    """Where an annealed search from one state meets the least of a cost, and that; `share` scales its deviations."""
+    sd = share * np.array([next(value for key, value in SEARCH_SD.items() if key in name) for name in DOF_NAMES])
+    low, high = body.limits.low, body.limits.high
+    _, info = annealed_step(rng, particle_init(state[None]), lambda states: -cost(states), sd, low, high, settings)
+    return info.best, -info.best_log_likelihood
 
 
 def left_over(body: BodyModel, state: np.ndarray, points: np.ndarray, views: np.ndarray) -> int:
