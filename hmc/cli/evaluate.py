@@ -5,7 +5,9 @@ from __future__ import annotations
 import argparse
 import csv
 import math
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Literal
 
 from hmc.cli.common import whole_number
 from hmc.errors import InputError
@@ -78,8 +80,9 @@ def run(args: argparse.Namespace) -> int:
     poses: PoseEvaluation | None = None
     true_poses = None if truth_joints is None else selected(read_joints(truth_joints))
     if true_poses is not None and estimated is not None:
-        # A threshold in millimetres; "auto" stays.
-        given = [one if isinstance(one, str) else one / 1000 for one in args.threshold] if args.threshold else THRESHOLDS_M
+        given: Sequence[float | Literal["auto"]] = THRESHOLDS_M
+        if args.threshold:
+            given = ["auto" if one == "auto" else one / 1000 for one in args.threshold]
         poses = evaluate_pose(estimated, true_poses, given)
 
     images = None
