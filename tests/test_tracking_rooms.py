@@ -176,3 +176,10 @@ def test_what_an_established_person_left_behind_ends_and_who_sits_still_does_not
     assert np.count_nonzero(table.persons == sits) == n + long
     moving = [chair(0, 0) if k < 0 else capsule((0.1 * np.sin(k / 4), 0, 0), (0.1 * np.sin(k / 4), 0, 0.8), 0.24) for k in range(long)]
     assert numbers(follow([*walk((-1.2, 0), (0, 0), n), *moving], name, color), n + long - 10) == {0}  # crouches and moves
+
+
+@pytest.mark.parametrize(("gap", "persons"), [(1.2, {0}), (2.2, {0, 1})])
+def test_what_one_camera_does_not_see_is_no_newcomer_beside_somebody_whom_all_see(gap, persons):
+    solid, unseen = body(-1.2, 0), body(-1.2 + gap, 0)
+    seen = [(k, observe(GRID, solid | unseen if k > 12 else solid, solid)) for k in range(30)]
+    assert numbers(run(seen, FPS, make_tracker("naive")), 0) == persons

@@ -11,7 +11,8 @@ import numpy as np
 
 from hmc.errors import InputError
 from hmc.tracking.blobs import Observation
-from hmc.tracking.lifecycle import LifecycleSettings, Track, looks_like_person, one_or_two, unowned_blobs
+from hmc.tracking.lifecycle import LifecycleSettings, Track, looks_like_person
+from hmc.tracking.newcomers import one_or_two, unowned_blobs
 from hmc.tracking.region import person_radii, region_distance
 
 __all__ = ["FollowingSettings", "assign_voxels", "find_again", "head_centre", "let_go", "let_go_things", "locating_voxels", "predict"]

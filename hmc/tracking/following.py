@@ -39,11 +39,10 @@ from hmc.tracking.lifecycle import (
     is_established,
     looks_like_person,
     looks_like_thing,
-    newcomers,
-    one_or_two,
     propose,
     still_a_person,
 )
+from hmc.tracking.newcomers import newcomers, one_or_two
 from hmc.tracking.things import came_out, left_behind, not_things
 
 __all__ = ["Filter", "Filtered", "StepInfo", "TrackerState", "advance", "finish", "init", "original_number"]

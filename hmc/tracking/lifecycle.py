@@ -12,15 +12,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
-from hmc.tracking.blobs import Blobs, Observation, blob_features
+from hmc.tracking.blobs import Blobs
 from hmc.tracking.features import feature_matrix
-from hmc.tracking.joined import cut_between
 from hmc.tracking.person_tree import PersonTree, default_tree, predict_person, read_tree
-from hmc.voxels.components import label_voxels
 
 __all__ = [
     "Candidate",
@@ -32,10 +27,8 @@ __all__ = [
     "is_established",
     "looks_like_person",
     "looks_like_thing",
-    "newcomers",
-    "one_or_two",
     "propose",
-    "unowned_blobs",
+    "still_a_person",
 ]
 
 
@@ -270,119 +263,6 @@ def looks_like_thing(blobs: Blobs, settings: LifecycleSettings) -> np.ndarray:
     move, and somebody who lies is longer.
     """
     return ~looks_like_person(blobs, settings) & (blobs.top_m < settings.least_top_m + 0.1) & (blobs.sides_m[:, 0] < settings.least_lying_m)
-
-
-def unowned_blobs(observation: Observation, owners: np.ndarray, settings: LifecycleSettings) -> tuple[np.ndarray, Blobs]:
-    """Sets of voxels that no track owns, ready to be judged.
-
-    A component that looks like a person stands for itself; the other pieces are put together with those that stand close, seen
-    from above, because a person may come in pieces.
-
-    Parameters
-    ----------
-    observation : Observation
-    owners : ndarray of int, shape (n,)
-        Row of the track that owns each voxel, or -1.
-    settings : LifecycleSettings
-
-    Returns
-    -------
-    labels : ndarray of int, shape (n,)
-        Set of each voxel, -1 for owned ones.
-    blobs : Blobs
-    """
-    size = observation.voxel_size_m
-    labels = np.full(len(owners), -1)
-    free = owners < 0
-    if not free.any():
-        return labels, blob_features(observation.points, labels, 0, size)
-    present = np.bincount(observation.labels[free]) > 0
-    labels[free] = (np.cumsum(present) - 1)[observation.labels[free]]
-    n_pieces = int(present.sum())
-    whole = looks_like_person(blob_features(observation.points, labels, n_pieces, size), settings)
-    in_pieces = free & ~whole[labels]
-    where = observation.indices[in_pieces, :2]
-    shape = (n_pieces, *(where.max(axis=0, initial=0) + 1))
-    columns = np.unique(np.ravel_multi_index((labels[in_pieces], *where.T), shape))
-    piece, x, y = np.unravel_index(columns, shape)
-    near = cKDTree(np.column_stack([x, y])).query_pairs(settings.fragment_gap_m / size, output_type="ndarray")
-    a, b = piece[near[:, 0]], piece[near[:, 1]]
-    links = coo_array((np.ones(len(a)), (a, b)), shape=(n_pieces, n_pieces))
-    n_groups, group = connected_components(links, directed=False)
-    labels[free] = group[labels[free]]
-    return labels, blob_features(observation.points, labels, n_groups, size)
-
-
-def newcomers(observation: Observation, owners: np.ndarray, settings: LifecycleSettings) -> list[np.ndarray]:
-    """Sets of voxels that look like a person and that no track owns.
-
-    Where people stand so close that the tolerant hull joins them, the strict hull's parts are taken apart.
-
-    Parameters
-    ----------
-    observation : Observation
-    owners : ndarray of int, shape (n,)
-        Row of the track that owns each voxel, or -1.
-    settings : LifecycleSettings
-
-    Returns
-    -------
-    list of ndarray of int
-        Rows of the observation's voxels, a set each.
-    """
-    labels, blobs = unowned_blobs(observation, owners, settings)
-    likely = looks_like_person(blobs, settings)
-    large = blobs.volume_m3 > settings.least_joined_m3
-    sets = []
-    for b in np.flatnonzero(likely | large):
-        rows = np.flatnonzero(labels == b)
-        parts = _strict_parts(observation, rows[observation.certain[rows]], settings) if large[b] else []
-        if len(parts) > 1 or not likely[b]:
-            sets += parts
-        else:
-            sets.append(rows)
-    return sets
-
-
-def one_or_two(observation: Observation, rows: np.ndarray, settings: LifecycleSettings) -> list[np.ndarray]:
-    """A set of voxels, or the two people in it (`hmc.tracking.joined`), each of whom must look like a person.
-
-    Parameters
-    ----------
-    observation : Observation
-    rows : ndarray of int
-        The set's voxels.
-    settings : LifecycleSettings
-
-    Returns
-    -------
-    list of ndarray of int
-        One or two parts of `rows`.
-    """
-    sure = rows[observation.certain[rows]]
-    cut = (
-        cut_between(observation.points[sure], observation.voxel_size_m)
-        if len(sure) * observation.voxel_size_m**3 > settings.least_joined_m3
-        else None
-    )
-    if cut is None:
-        return [rows]
-    axis, limit = cut
-    second = observation.points[:, :2] @ axis > limit
-    sides = blob_features(observation.points[sure], second[sure].astype(int), 2, observation.voxel_size_m)
-    return [rows[~second[rows]], rows[second[rows]]] if looks_like_person(sides, settings).all() else [rows]
-
-
-def _strict_parts(observation: Observation, rows: np.ndarray, settings: LifecycleSettings) -> list[np.ndarray]:
-    """Components of the voxels in `rows`, each a part of `rows`, that look like people."""
-    if rows.size == 0:
-        return []
-    indices = observation.indices[rows] - observation.indices[rows].min(axis=0)
-    box = np.zeros(indices.max(axis=0) + 1, bool)
-    box[tuple(indices.T)] = True
-    labels = label_voxels(box)[1]  # rows are in C order, and so are these
-    blobs = blob_features(observation.points[rows], labels, int(labels.max()) + 1, observation.voxel_size_m)
-    return [rows[labels == b] for b in np.flatnonzero(looks_like_person(blobs, settings))]
 
 
 def propose(
