@@ -1,6 +1,6 @@
 """The skeleton model, its error and the swarm: against matrix exponentials, OpenCV, brute force and SciPy."""
 
-from itertools import permutations
+from itertools import pairwise, permutations
 
 import cv2
 import numpy as np
@@ -213,7 +213,7 @@ def test_two_runs_of_one_seed_are_the_same():
 
 
 def test_stages_keep_what_was_free_before():
-    for (before, _), (after, _) in zip(STAGES, STAGES[1:], strict=False):
+    for (before, _), (after, _) in pairwise(STAGES):
         assert set(before) < set(after)
     assert set(STAGES[-1][0]) == set(range(N_PARAMETERS))
 

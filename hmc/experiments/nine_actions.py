@@ -44,7 +44,9 @@ def nine_recipes() -> list[Recipe]:
     recipes = []
     for number, (name, (_, motion, rig)) in enumerate(NINE_ACTIONS.items()):
         start = (-0.9, -0.1) if motion == "walk" else (0.0, 0.0)
-        actor = replace(_ACTOR, motion=motion, start_m=start, heading_deg=10.0 + 37.0 * number, turn_radius_m=0.9 if motion == "walk" else 0.0)
+        actor = replace(
+            _ACTOR, motion=motion, start_m=start, heading_deg=10.0 + 37.0 * number, turn_radius_m=0.9 if motion == "walk" else 0.0
+        )
         full = Recipe(
             name,
             seed=300 + number,

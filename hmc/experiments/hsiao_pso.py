@@ -1,0 +1,144 @@
+"""Hierarchical against flat swarms, three topologies, and SciPy's global optimisers at equal evaluations. Hsiao (2008), section 3.2.2.2.
+
+Each optimiser fits the skeleton to the same curves, from the same place, with the spin unknown within a right angle; what counts is the
+error of Eq. 3-27 that it ends with, and the distance of the landmarks from the true ones. Quick: about three minutes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import matplotlib.pyplot as plt
+import numpy as np
+from scipy.optimize import differential_evolution, dual_annealing
+
+from hmc.experiments.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
+from hmc.experiments.hsiao_runs import VOXEL_M, person_hulls, sequences
+from hmc.experiments.inputs import Inputs
+from hmc.experiments.pose_runs import first_truth
+from hmc.experiments.style import COLOURS
+from hmc.pose.spectral.reading import read_body
+from hmc.pose.swarm.error import curves_of, observe_curves, skeleton_error
+from hmc.pose.swarm.fit import FitSettings, Prior, bounds_around, fit_flat, fit_hierarchical, rest_state
+from hmc.pose.swarm.heading import heading_of, spin_towards
+from hmc.pose.swarm.model import model_of_height, skeleton_landmarks
+from hmc.pose.swarm.pso import PsoSettings
+
+__all__ = ["EXPERIMENT"]
+
+METHODS = (
+    "hierarchical, global", "hierarchical, ring", "hierarchical, swarms", "flat, global", "flat, ring", "flat, swarms",
+    "differential evolution", "dual annealing",
+)  # fmt: skip
+PARTICLES, EVERY = 50, 8
+SPIN = np.pi / 2
+
+
+def grid(plan: Plan) -> list[dict]:
+    """A cell a sequence and seed."""
+    labels = [source.label for source in sequences(plan, ("s1_wave", "s3_throw_item"))]
+    return [{"recording": label, "repeat": k} for label in labels for k in range(1 if plan.quick else 5)]
+
+
+def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Results:
+    """Every optimiser on some frames whose parts were all found."""
+    recording = inputs.recording(parameters["recording"])
+    truth = first_truth(recording)
+    height = float(recording.subject_height_m[0]) if recording.subject_height_m else 1.75
+    model = model_of_height(height)
+    rows = []
+    for step, grid_, voxels, votes in person_hulls(recording):
+        if step.index % EVERY or step.index not in truth.frames:
+            continue
+        reading = read_body(voxels, grid_.centres(voxels), VOXEL_M, height, None, votes)
+        heading = heading_of(reading.feet)
+        if not reading.segmentation.whole or heading is None:
+            continue
+        true = truth.positions[truth.frames == step.index][0]
+        observed = observe_curves(model, curves_of(reading), 8)
+        trunk = reading.curves["trunk"]
+        start = rest_state(model, trunk.mean(0), trunk[-1] - trunk[0])
+        start[6] = spin_towards(start, heading)
+        budget = 0
+        for method in METHODS:
+            kind, _, topology = method.partition(", ")
+            if kind == "hierarchical":
+                found = fit_hierarchical(rng, model, observed, start, FitSettings(swarm=PsoSettings(topology=topology)), SPIN)
+                state, spent, budget = found.state, found.evaluations, max(budget, found.evaluations)
+            elif kind == "flat":
+                swarm = PsoSettings(PARTICLES, budget // PARTICLES - 1, topology=topology)
+                found = fit_flat(rng, model, observed, start, swarm, SPIN)
+                state, spent = found.state, found.evaluations
+            else:
+                state, spent = _by_scipy(rng, method, model, observed, start, budget)
+            error = 1000 * float(skeleton_error(model, state[None], observed)[0][0])
+            joints = 1000 * float(np.linalg.norm(skeleton_landmarks(model, state) - true, axis=1).mean())
+            rows.append([step.index, METHODS.index(method), error, joints, spent])
+    return {"rows": np.array(rows).reshape(-1, 5)}
+
+
+def _by_scipy(rng, method, model, observed, start, budget):
+    """The state that one of SciPy's optimisers ends with, and its evaluations."""
+    low, high = bounds_around(model, start, 0.25, 4 * np.pi)
+    low[6], high[6] = start[6] - SPIN, start[6] + SPIN
+    prior = Prior(start)
+    spent = 0
+
+    def cost(values: np.ndarray) -> np.ndarray:
+        nonlocal spent
+        states = np.atleast_2d(values.T)
+        spent += len(states)
+        errors = skeleton_error(model, states, observed)[0] + prior.weight * np.abs(states[:, 7:] - prior.state[7:]).mean(1)
+        return errors if values.ndim > 1 else float(errors[0])
+
+    bounds = list(zip(low, high, strict=True))
+    if method == "differential evolution":
+        members = 2 * len(start)
+        found = differential_evolution(
+            cost,
+            bounds,
+            maxiter=budget // members - 1,
+            popsize=2,
+            rng=rng,
+            vectorized=True,
+            updating="deferred",
+            polish=False,
+            tol=0,
+            x0=start,
+        )
+    else:
+        found = dual_annealing(cost, bounds, maxfun=budget, rng=rng, x0=start)
+    return found.x, spent
+
+
+def report(cells: Sequence[Cell], plan: Plan) -> Report:
+    """A row an optimiser."""
+    rows = np.concatenate([np.array(one.results["rows"], float).reshape(-1, 5) for one in cells])
+    table = []
+    for k, method in enumerate(METHODS):
+        own = rows[rows[:, 1] == k]
+        if len(own):
+            table.append(
+                {
+                    "optimiser": method, "fits": len(own), "median_error_mm": np.median(own[:, 2]), "worst_error_mm": own[:, 2].max(),
+                    "stuck_percent": 100 * np.mean(own[:, 2] > 80), "landmarks_mm": np.median(own[:, 3]), "evaluations": own[:, 4].mean(),
+                }
+            )  # fmt: skip
+    by = {row["optimiser"]: row for row in table}
+    flat = [row["median_error_mm"] for name, row in by.items() if not name.startswith("hier")]
+    best = min((row["median_error_mm"] for name, row in by.items() if name.startswith("hier")), default=np.inf)
+    claims = (
+        Claim(
+            "hierarchical swarms end with a smaller error than flat ones and SciPy's at equal evaluations",
+            bool(flat) and best < min(flat),
+            f"{best:.1f} mm, {min(flat, default=np.nan):.1f} mm",
+        ),
+    )
+    figure, ax = plt.subplots(figsize=(7, 3.2))
+    ax.boxplot([rows[rows[:, 1] == k, 2] for k in range(len(METHODS))], tick_labels=METHODS, medianprops={"color": COLOURS["sparse"]})
+    ax.tick_params(axis="x", rotation=30)
+    ax.set_ylabel("error (mm)")
+    return Report((Table("hsiao-pso", "Optimisers at equal evaluations.", table),), {"hsiao-pso": figure}, claims)
+
+
+EXPERIMENT = Experiment("hsiao-pso", "hierarchical against flat swarms and SciPy", "Hsiao, 3.2.2.2", grid, cell, report)

@@ -1,0 +1,96 @@
+"""What the experiments of Hsiao (2008) share: rendered sequences, their true parts, and the whole method on a recording."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from hmc.errors import InputError
+from hmc.experiments.experiment import Parameters, Plan, Results, Source
+from hmc.experiments.inputs import Inputs, rendered
+from hmc.experiments.nine_actions import NINE_ACTIONS, QUICK_SUFFIX, nine_recipes
+from hmc.experiments.pose_runs import estimate_of, first_truth
+from hmc.frontend import FrontendSettings, HullStep, stream_hulls
+from hmc.landmarks import LANDMARKS
+from hmc.pose.spectral.graph import color_votes, face_neighbours
+from hmc.pose.swarm.sequence import SwarmTask, pose_by_swarm
+from hmc.recording import Recording
+from hmc.synthetic.scene import Scene, build_scene
+from hmc.tracking.resumable import track_recording
+from hmc.voxels.components import components
+from hmc.voxels.grid import VoxelGrid
+
+__all__ = ["VOXEL_M", "limbs_apart", "person_hulls", "pose_cell", "scene_of", "sequences"]
+
+VOXEL_M, TRACK_VOXEL_M = 0.03, 0.05
+_FRONTEND = FrontendSettings(threads=1)
+
+
+def sequences(plan: Plan, names: tuple[str, ...] = tuple(NINE_ACTIONS)) -> tuple[Source, ...]:
+    """The user's recordings, or the nine rendered sequences, short in the quick mode."""
+    return plan.recordings or tuple(rendered(name + QUICK_SUFFIX * plan.quick) for name in names)
+
+
+def scene_of(label: str) -> Scene:
+    """The scene of a rendered sequence, which knows each actor's true parts.
+
+    Raises
+    ------
+    InputError
+        When the label is of a recording of the user's.
+    """
+    name = label.rpartition("@")[0]
+    for recipe in nine_recipes():
+        if recipe.name == name:
+            return build_scene(recipe)
+    raise InputError(f"{name}: the true parts of a body are known of rendered sequences only; leave --recordings out")
+
+
+def person_hulls(recording: Recording, voxel_size_m: float = VOXEL_M) -> Iterator[tuple[HullStep, VoxelGrid, np.ndarray, tuple]]:
+    """Every frame's strict hull of the only person, voxels (n, 3), with the frame, the grid and the colour votes."""
+    grid = VoxelGrid.from_room(recording.room, voxel_size_m, len(recording.rig))
+    for step in stream_hulls(recording, grid, _FRONTEND, on_problem=lambda line: None):
+        blobs = components(step.strict, grid, 20)
+        if not len(blobs):
+            continue
+        # Pieces near the largest one are the person's; what is elsewhere is noise.
+        near = np.linalg.norm(blobs.centroids[:, :2] - blobs.centroids[0, :2], axis=1) < 1.0
+        voxels = np.concatenate([blobs.of(k) for k in np.flatnonzero(near)])
+        yield step, grid, voxels, color_votes(face_neighbours(voxels), voxels, grid, recording.rig, step.images, 40.0)
+
+
+def limbs_apart(points: np.ndarray) -> bool:
+    """Whether arms and legs are apart from the trunk and from one another, by the true joints (15, 3), metres."""
+    at = dict(zip(LANDMARKS, points, strict=True))
+    axis, head = (at["pelvis"], at["neck"]), (at["neck"], at["head_top"])
+
+    def away(name: str, segment: tuple, least: float) -> bool:
+        a, b = segment
+        t = np.clip((at[name] - a) @ (b - a) / ((b - a) @ (b - a)), 0, 1)
+        return float(np.linalg.norm(at[name] - a - t * (b - a))) > least
+
+    arms = all(away(f"{s}_wrist", axis, 0.28) and away(f"{s}_elbow", axis, 0.24) and away(f"{s}_wrist", head, 0.22) for s in "lr")
+    legs = all(np.linalg.norm(at[f"l_{joint}"] - at[f"r_{joint}"]) > 0.2 for joint in ("knee", "ankle"))
+    hands = np.linalg.norm(at["l_wrist"] - at["r_wrist"]) > 0.25
+    thighs = all(np.linalg.norm(at[f"{s}_wrist"] - at[f"{t}_hip"]) > 0.25 for s in "lr" for t in "lr")
+    return bool(arms and legs and hands and thighs)
+
+
+def pose_cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Results:
+    """The whole method on a recording, from videos alone but for the stature, which the thesis knows beforehand."""
+    recording = inputs.recording(parameters["recording"])
+    truth = first_truth(recording)
+    seed = int(rng.integers(2**31))
+    tracks = track_recording(recording, TRACK_VOXEL_M, seed=seed, on_problem=lambda line: None)
+    height = float(recording.subject_height_m[0]) if recording.subject_height_m else None
+    people, rows = pose_by_swarm(SwarmTask(recording, seed=seed, height_m=height), tracks, VOXEL_M, on_problem=lambda line: None)
+    return {
+        "estimate_m": estimate_of(truth, people.poses),
+        "truth_m": truth.positions,
+        "frames": len(truth.frames),
+        "restarts": sum(row.info.started for row in rows),
+        "turned": sum(row.info.turned for row in rows),
+        "without_fit": sum(row.info.status != "fitted" for row in rows),
+        "error_mm": [1000 * row.info.error_m for row in rows if np.isfinite(row.info.error_m)],
+    }
