@@ -18,6 +18,7 @@ import numpy as np
 from hmc.errors import InputError
 from hmc.experiments.experiment import Source
 from hmc.experiments.five_actions import action_recipes
+from hmc.experiments.nine_actions import nine_recipes
 from hmc.experiments.person_data import render_brought_in, training_recipes
 from hmc.experiments.store import digest
 from hmc.frontend import FrontendSettings, HullStep, stream_hulls
@@ -181,7 +182,7 @@ class Inputs:
 
 def _recipe_of(name: str) -> tuple[Recipe, bool]:
     """A recipe, and whether its furniture comes in after the empty room was filmed."""
-    for recipe, brought_in in (*training_recipes(), *((recipe, False) for recipe in action_recipes())):
+    for recipe, brought_in in (*training_recipes(), *((recipe, False) for recipe in (*action_recipes(), *nine_recipes()))):
         if recipe.name == name:
             return recipe, brought_in
     return load_recipe(name), False
