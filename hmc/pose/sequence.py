@@ -38,6 +38,10 @@ __all__ = ["PosedPeople", "pose_recording", "targets_of"]
 
 logger = logging.getLogger("hmc")
 
+#: Of so few cameras, hulls in which one or two may miss are mostly nobody: they count only where silhouettes ask for them. Of more, they
+#: are little fatter than the strict one, and hold what furniture hides without silhouettes that would ask for it.
+FEW_CAMERAS = 4
+
 
 @dataclass(frozen=True)
 class PosedPeople:
@@ -171,8 +175,10 @@ def targets_of(recording: Recording, grid: VoxelGrid, tracks: TrackTable, hull: 
         spare, floor_z = hull.loose & ~hull.tolerant, float(recording.room[0, 2])
         tolerant = person_voxels(observation, tracks.positions[rows])
         strict = [voxels[hull.strict[tuple(voxels.T)]] for voxels in tolerant]
-        everybody = grid.centres(np.concatenate([np.zeros((0, 3), int), *strict]))
-        new = partial(explaining, recording.rig, hull.masks, everybody, spacing_m=grid.voxel_size_m)
+        new = None
+        if sum(mask is not None for mask in hull.masks) <= FEW_CAMERAS:
+            everybody = grid.centres(np.concatenate([np.zeros((0, 3), int), *strict]))
+            new = partial(explaining, recording.rig, hull.masks, everybody, spacing_m=grid.voxel_size_m)
         for k, person in enumerate(targets):
             target = make_target(grid, strict[k], tolerant[k], spare, floor_z, new)
             if target is not None:
