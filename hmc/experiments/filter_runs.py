@@ -8,27 +8,30 @@ layers.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from time import thread_time
 
 import numpy as np
 
+from hmc.camera.model import Rig
 from hmc.experiments.experiment import Parameters, Results
 from hmc.experiments.inputs import Inputs
 from hmc.experiments.markerless_runs import FRONTEND, MASKS_KEY, tracked
 from hmc.experiments.pose_runs import first_truth, standing_state
-from hmc.frontend import stream_hulls
+from hmc.frontend import MaskStep, stream_hulls, stream_masks
 from hmc.mask_store import kept_masks
-from hmc.pose.annealed.apf import make_filter, pose_init, pose_step
+from hmc.pose.annealed.apf import make_filter, pose_init
 from hmc.pose.annealed.presets import PosePreset, pose_preset
 from hmc.pose.body.inverse import fit_landmarks
-from hmc.pose.body.kinematics import landmarks
+from hmc.pose.body.kinematics import landmark_masks, landmarks
 from hmc.pose.body.proportions import canton_body
+from hmc.pose.scalable.step import step_of
 from hmc.pose.sequence import targets_of
 from hmc.results import TrackTable
 from hmc.tracking.resumable import person_grid
 
-__all__ = ["ANNEALING", "FAMILY", "cell", "filter_preset"]
+__all__ = ["ANNEALING", "FAMILY", "cell", "filter_preset", "follow_from_truth"]
 
 FAMILY = "markerless-filter"
 #: Ways of annealing, and the presets that they are taken from.
@@ -60,6 +63,33 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
     inputs : Inputs
     rng : numpy.random.Generator
     """
+    return follow_from_truth(filter_preset(parameters), parameters, inputs, rng)
+
+
+def follow_from_truth(
+    preset: PosePreset,
+    parameters: Parameters,
+    inputs: Inputs,
+    rng: np.random.Generator,
+    change: Callable[[MaskStep, Rig, np.ndarray], MaskStep] | None = None,
+) -> Results:
+    """Follow the first person from the true first pose by a preset's filter.
+
+    Parameters
+    ----------
+    preset : PosePreset
+    parameters : mapping
+        ``recording``, ``cameras``, ``frames`` and ``voxel_mm`` as in `cell`.
+    inputs : Inputs
+    rng : numpy.random.Generator
+    change : callable, optional
+        Takes a frame's silhouettes, the rig and the true joints (15, 3), and gives the silhouettes that are used.
+
+    Returns
+    -------
+    Results
+        As of `cell`; an estimate is NaN where its limb is missing.
+    """
     recording, _, masks = tracked(inputs, parameters["recording"], parameters["cameras"])
     truth = first_truth(recording)
     if parameters["frames"]:
@@ -67,20 +97,27 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
     voxel_m = parameters["voxel_mm"] / 1000
     grid = person_grid(recording, voxel_m)
     body = canton_body(float(recording.subject_height_m[0]) if recording.subject_height_m else HEIGHT_M)
-    filt = make_filter(body, filter_preset(parameters), recording.fps, voxel_m, recording.room)
+    filt = make_filter(body, preset, recording.fps, voxel_m, recording.room)
     state, _ = fit_landmarks(body, truth.positions[0], standing_state(body, truth.positions[0]))
     pose = pose_init(state)
     where = TrackTable(truth.frames, np.zeros(len(truth.frames), int), truth.positions.mean(axis=1))
     first, last = int(truth.frames[0]), int(truth.frames[-1]) + 1
     kept = kept_masks(masks, MASKS_KEY, first, last)
+    if change is not None:
+        steps = stream_masks(recording, FRONTEND, first=first, last=last, on_problem=lambda line: None) if kept is None else kept
+        joints = dict(zip(truth.frames.tolist(), truth.positions, strict=True))
+        kept = (change(one, recording.rig, joints[one.index]) for one in steps if one.index in joints)
+    step, movers = step_of(preset), landmark_masks(body)
     estimates, seconds = {}, 0.0
     for hull in stream_hulls(recording, grid, FRONTEND, first=first, last=last, masks=kept, on_problem=lambda line: None):
         target = targets_of(recording, grid, where, hull).get(0)
         before = thread_time()
         if hull.index > first:
-            pose, _ = pose_step(rng, filt, pose, target)
+            pose, info = step(rng, filt, pose, target)
         seconds += thread_time() - before
         estimates[hull.index] = landmarks(body, pose.state)
+        if hull.index > first and info.missing is not None:
+            estimates[hull.index][movers[:, info.missing].any(axis=1)] = np.nan
     missing = np.full_like(truth.positions[0], np.nan)
     estimate = np.array([estimates.get(frame, missing) for frame in truth.frames.tolist()])
     return {
