@@ -1,7 +1,8 @@
 """Everyday motions, like those of the nine sequences of Hsiao (2008), chapter 4, each a table of key poses over planted feet.
 
-A key pose is a time, both wrists (ahead, to the left, up, in arm's lengths from the shoulder, along the chest's axes), the turn and the lean of
-the trunk (radians), and how far the pelvis goes ahead and down (metres of a man of 1.75 m). Tables are repeated, each time a little differently.
+A key pose is a time, both wrists (ahead, to the left, up, in arm's lengths from the shoulder, along the chest's axes), the turn and the
+lean of the trunk (radians), and how far the pelvis goes ahead and down (metres of a man of 1.75 m). Tables are repeated, each time a
+little differently.
 """
 
 from __future__ import annotations

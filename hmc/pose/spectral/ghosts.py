@@ -1,8 +1,8 @@
 """Ghost legs: with few cameras a hull has more legs than a person. Told by silhouettes, removed by colours where these differ.
 
-A piece of the hull that no silhouette needs may be a ghost; which of several it is, silhouettes cannot say (Hsiao 2008, section 3.1.3, Figure
-3-9). A real surface has one colour in all cameras that see it; a ghost's has those of whatever is behind it in each. Where both legs and
-what is behind are alike, that does not help either, and nothing is removed.
+A piece of the hull that no silhouette needs may be a ghost; which of several it is, silhouettes cannot say (Hsiao 2008, section 3.1.3,
+Figure 3-9). A real surface has one colour in all cameras that see it; a ghost's has those of whatever is behind it in each. Where both
+legs and what is behind are alike, that does not help either, and nothing is removed.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Branches of an eigenmap, grown as splines from their tips inwards.
 
 Source: Hsiao (2008), section 3.1.4.1, steps B-1 to B-4 (Sundaresan's method: a branch ends where too many nodes are far from the spline),
-and section 3.1.4.2, steps B-1 to B-3 (the modified one: a branch ends near the origin). Distances are shares of the distance from the origin
-of the farthest node, so that settings do not depend on the number of voxels.
+and section 3.1.4.2, steps B-1 to B-3 (the modified one: a branch ends near the origin). Distances are shares of the distance from the
+origin of the farthest node, so that settings do not depend on the number of voxels.
 """
 
 from __future__ import annotations

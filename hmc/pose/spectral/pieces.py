@@ -2,7 +2,7 @@
 
 In an eigenmap, distance from the origin falls along a limb from its tip to the trunk. Taking the nodes from the farthest one on, a branch
 begins at each local maximum; two that meet have come to what they share, which is trunk. A branch that is small, or whose tip is hardly
-farther than the place where it meets another, is a bump of that other one (superlevel sets and their persistence; Edelsbrunner et al. 2002).
+farther than the place where it meets another, is a bump of that one (superlevel sets and their persistence; Edelsbrunner et al. 2002).
 Where two branches meet in a narrow place and go on apart, they only touch there: feet, or hands.
 """
 

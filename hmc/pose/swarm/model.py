@@ -1,8 +1,8 @@
 """The skeleton model: twelve segments moved by 23 parameters, with self-spin. Hsiao (2008), section 3.2.1 and Tables 3-1, 3-2 and 3-4.
 
-State: the torso's centre p0 (3) and the neck p1 (3) in the world, metres, the spin about the torso's axis, and the sixteen angles of Table 3-2,
-radians. The torso's axis turns Z onto p1 - p0, then the spin turns about that axis (Eqs. 3-22 and 3-23); only the direction of p1 counts, as
-the torso has its own length. Neutral pose: arms stretched sideways along Y, X forward, Y to the left, Z up.
+State: the torso's centre p0 (3) and the neck p1 (3) in the world, metres, the spin about the torso's axis, and the sixteen angles of Table
+3-2, radians. The torso's axis turns Z onto p1 - p0, then the spin turns about that axis (Eqs. 3-22 and 3-23); only the direction of p1
+counts, as the torso has its own length. Neutral pose: arms stretched sideways along Y, X forward, Y to the left, Z up.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from hmc.pose.body.joints import dof_index
 from hmc.pose.body.proportions import CANTON_LENGTHS, DEFAULT_LENGTHS
 
 __all__ = [
-    "ANGLES", "ANGLE_INDEX", "N_PARAMETERS", "SEGMENTS", "SkeletonModel", "default_limits", "joint_shares", "model_of_height", "part_chains",
-    "part_lengths", "segment_ends", "skeleton_landmarks", "thesis_limits", "torso_frames",
+    "ANGLES", "ANGLE_INDEX", "N_PARAMETERS", "SEGMENTS", "SkeletonModel", "default_limits", "joint_shares", "model_of_height",
+    "part_chains", "part_lengths", "segment_ends", "skeleton_landmarks", "thesis_limits", "torso_frames",
 ]  # fmt: skip
 
 #: The sixteen angles, in the order of Table 3-2 (theta 1 to 16).
