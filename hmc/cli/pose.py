@@ -118,6 +118,7 @@ def run(args: argparse.Namespace) -> int:
     smd, pso = args.method == "smd", args.method == "pso"
     if args.init and (smd or pso):
         raise InputError(f"--init: not for --method {args.method}; it is for the particle filters")
+    preset: Any
     if pso:
         preset = swarm_preset(args.preset)
     else:

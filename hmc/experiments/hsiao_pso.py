@@ -7,6 +7,7 @@ error of Eq. 3-27 that it ends with, and the distance of the landmarks from the 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -61,7 +62,8 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
         start[6] = spin_towards(start, heading)
         budget = 0
         for method in METHODS:
-            kind, _, topology = method.partition(", ")
+            kind, _, name = method.partition(", ")
+            topology: Any = name
             if kind == "hierarchical":
                 found = fit_hierarchical(rng, model, observed, start, FitSettings(swarm=PsoSettings(topology=topology)), SPIN)
                 state, spent, budget = found.state, found.evaluations, max(budget, found.evaluations)
@@ -77,21 +79,22 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
     return {"rows": np.array(rows).reshape(-1, 5)}
 
 
-def _by_scipy(rng, method, model, observed, start, budget):
+def _by_scipy(rng, method, model, observed, start, budget) -> tuple[np.ndarray, int]:
     """The state that one of SciPy's optimisers ends with, and its evaluations."""
     low, high = bounds_around(model, start, 0.25, 4 * np.pi)
     low[6], high[6] = start[6] - SPIN, start[6] + SPIN
     prior = Prior(start)
     spent = 0
 
-    def cost(values: np.ndarray) -> np.ndarray:
+    def cost(values: np.ndarray, /) -> Any:
         nonlocal spent
         states = np.atleast_2d(values.T)
         spent += len(states)
         errors = skeleton_error(model, states, observed)[0] + prior.weight * np.abs(states[:, 7:] - prior.state[7:]).mean(1)
         return errors if values.ndim > 1 else float(errors[0])
 
-    bounds = list(zip(low, high, strict=True))
+    bounds: Any = list(zip(low.tolist(), high.tolist(), strict=True))
+    found: Any
     if method == "differential evolution":
         members = 2 * len(start)
         found = differential_evolution(

@@ -30,5 +30,5 @@ def true_parts(scene: Scene, frame: int, points: np.ndarray) -> tuple[np.ndarray
     crowd = crowd_at(scene, frame)
     people = crowd.persons >= 0
     parts = np.concatenate([scene.actors[k].parts for k in np.unique(crowd.persons[people])])
-    distances, nearest = cKDTree(crowd.vertices[people]).query(points)
+    distances, nearest = map(np.asarray, cKDTree(crowd.vertices[people]).query(points))
     return parts[nearest], distances

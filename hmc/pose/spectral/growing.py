@@ -142,7 +142,7 @@ def _grow(places: np.ndarray, far: np.ndarray, free: np.ndarray, settings: GrowS
     sites = (places[nodes] - places[tip]) @ direction
     free[nodes] = False
     limit, reach = settings.outlier_error * float(np.median(far)), settings.reach * far[tip]
-    outliers = 0
+    outliers: int = 0
     while True:
         end = int(np.argmax(sites))
         here = places[nodes[end]]
@@ -157,7 +157,7 @@ def _grow(places: np.ndarray, far: np.ndarray, free: np.ndarray, settings: GrowS
         new_sites = float(sites[end]) + (places[new] - here) @ direction
         if settings.stop == "outliers":
             curve = _curve(sites[recent], places[nodes[recent]], new_sites)
-            outliers += np.count_nonzero(np.linalg.norm(places[new] - curve, axis=1) > limit)
+            outliers += int(np.count_nonzero(np.linalg.norm(places[new] - curve, axis=1) > limit))
             if outliers > settings.most_outliers:
                 break
         nodes, sites = np.concatenate([nodes, new]), np.concatenate([sites, new_sites])

@@ -13,6 +13,7 @@ from hmc.pose.spectral.eigenmap import eigenmap
 from hmc.pose.spectral.graph import GraphSettings, VoxelGraph, adjacency, build_graph, core_nodes
 from hmc.pose.spectral.growing import Branch, GrowSettings, baseline_growing, ends_near_origin, grow_branches
 from hmc.pose.spectral.parts import PART_NAMES, BranchShape, branch_shape, name_branches
+from hmc.pose.spectral.pieces import Pieces
 from hmc.pose.spectral.touching import contacts, touching_parts
 
 __all__ = ["Segmentation", "SegmentationSettings", "baseline_segmentation", "segment_body"]
@@ -134,21 +135,20 @@ def segment_body(
     graph = VoxelGraph(voxels[inside], number[graph.edges[kept]], graph.weights[kept])
     places = eigenmap(adjacency(graph), settings.dimensions).vectors
     core = core_nodes(graph.voxels, voxel_size_m, settings.graph.core_m)
-    pieces = met = None
+    limbs: Pieces | None = None
+    met: Pieces | None = None
     if settings.grow.stop == "origin":
-        pieces = ends_near_origin(places, graph.edges, core, settings.grow)
-        cut = np.concatenate(
-            [pieces.cut, *(_halves(graph.edges, pieces.labels == k, points[inside], settings) for k in range(pieces.count))]
-        )
+        limbs = ends_near_origin(places, graph.edges, core, settings.grow)
+        cut = np.concatenate([limbs.cut, *(_halves(graph.edges, limbs.labels == k, points[inside], settings) for k in range(limbs.count))])
         if len(cut):
             # Without the faces over which limbs touch, each goes its own way.
             apart = without_edges(graph, cut)
             trial = eigenmap(adjacency(apart), settings.dimensions)
             if trial.labels.max() == 0:
-                graph, places, met = apart, trial.vectors, pieces
-                pieces = ends_near_origin(places, graph.edges, core, settings.grow)
-    branches = grow_branches(places, pieces, settings.grow)
-    labels, branches = _tidy(branches, graph.edges, len(inside))
+                graph, places, met = apart, trial.vectors, limbs
+                limbs = ends_near_origin(places, graph.edges, core, settings.grow)
+    branches = grow_branches(places, limbs, settings.grow)
+    labels = _labels_of(branches, graph.edges, len(inside))
     shapes = [branch_shape(branch, points[inside], voxel_size_m) for branch in branches]
     rest = points[inside][labels < 0]
     names, doubts = name_branches(shapes, rest.mean(0) if len(rest) else points[inside].mean(0))
@@ -160,10 +160,10 @@ def segment_body(
     for place, k in enumerate(known):
         stars[labels == k] = place + 1
     touching = touching_parts(stars, graph.edges, along, ("trunk", *(names[k] for k in known)))
-    if met is not None:
+    if met is not None and names:
         found = [np.bincount(labels[(met.labels == k) & (labels >= 0)], minlength=1).argmax() for k in range(met.count)]
         touching += tuple(f"{names[found[a]]} and {names[found[b]]}" for a, b in met.touches if names[found[a]] and names[found[b]])
-    if pieces is not None:
+    if limbs is not None:
         labels = _legs_to_hips(labels, names, graph.edges, round(settings.hip_m / voxel_size_m))
     out = np.full(n, -1)
     trunk = labels < 0
@@ -242,7 +242,7 @@ def bridged(graph: VoxelGraph, points: np.ndarray, voxel_size_m: float, settings
         others = np.flatnonzero(pieces != sizes.argmax())
         if len(others) == 0:
             return joined
-        distance, nearest = cKDTree(points[body]).query(points[others], distance_upper_bound=settings.bridge_m)
+        distance, nearest = map(np.asarray, cKDTree(points[body]).query(points[others], distance_upper_bound=settings.bridge_m))
         found = np.flatnonzero(np.isfinite(distance))
         if len(found) == 0:
             return joined
@@ -255,30 +255,24 @@ def bridged(graph: VoxelGraph, points: np.ndarray, voxel_size_m: float, settings
         weights.append(np.full(len(found), 1.0))
 
 
-def _tidy(branches: list[Branch], edges: np.ndarray, n: int) -> tuple[np.ndarray, list[Branch]]:
-    """Number of the branch of each node, -1 for none, when scraps that a branch cuts off the trunk were given to that branch."""
+def _labels_of(branches: list[Branch], edges: np.ndarray, n: int) -> np.ndarray:
+    """Number of the branch of each node, -1 for none; scraps that a branch cuts off the trunk are that branch's."""
     labels = np.full(n, -1)
     for k, branch in enumerate(branches):
         labels[branch.nodes] = k
     rest = labels < 0
+    if not rest.any():
+        return labels
     a, b = edges[rest[edges].all(1)].T
     pieces = connected_components(csr_array((np.ones(len(a), np.int8), (a, b)), shape=(n, n)), directed=False)[1]
-    if not rest.any():
-        return labels, branches
-    trunk = np.bincount(pieces[rest]).argmax()
-    scraps = rest & (pieces != trunk)
-    extra: dict[int, list[int]] = {}
-    if scraps.any():
-        both = np.concatenate([edges, edges[:, ::-1]])
-        both = both[scraps[both[:, 0]] & (labels[both[:, 1]] >= 0)]
-        for piece in np.unique(pieces[scraps]):
-            neighbours = labels[both[pieces[both[:, 0]] == piece, 1]]
-            if len(neighbours):
-                owner = int(np.bincount(neighbours).argmax())
-                members = np.flatnonzero(scraps & (pieces == piece))
-                labels[members] = owner
-                extra.setdefault(owner, []).extend(members.tolist())
-    return labels, branches
+    scraps = rest & (pieces != np.bincount(pieces[rest]).argmax())
+    both = np.concatenate([edges, edges[:, ::-1]])
+    both = both[scraps[both[:, 0]] & (labels[both[:, 1]] >= 0)]
+    for piece in np.unique(pieces[scraps]):
+        neighbours = labels[both[pieces[both[:, 0]] == piece, 1]]
+        if len(neighbours):
+            labels[scraps & (pieces == piece)] = np.bincount(neighbours).argmax()
+    return labels
 
 
 def _nothing(n: int, why: str) -> Segmentation:

@@ -130,7 +130,7 @@ def curves_near(model: SkeletonModel, state: np.ndarray, reading: BodyReading, f
             one = observe_curves(model, {kind: cut})
             costs[k, one.pairs[:, 1]] = pair_errors(model, state[None], one)[0]
     found = {"torso": reading.curves["trunk"]}
-    for k, part in zip(*linear_sum_assignment(costs), strict=True):
+    for k, part in np.transpose(linear_sum_assignment(costs)).tolist():
         if costs[k, part] < farthest_m:
             curve = list(free.values())[k]
             found[MODEL_PARTS[part]] = cut_foot(curve, reading.foot_m)[0] if part >= 4 else curve

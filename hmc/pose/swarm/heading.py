@@ -6,7 +6,7 @@ import numpy as np
 
 from hmc.pose.swarm.model import torso_frames
 
-__all__ = ["facing_evidence", "heading_of", "spin_towards", "turned_about"]
+__all__ = ["facing_evidence", "heading_of", "spin_towards"]
 
 #: Slower people do not show their heading, metres a second; from here on it counts fully at twice the speed.
 WALK_M_S = 0.4
@@ -70,11 +70,3 @@ def spin_towards(state: np.ndarray, heading: np.ndarray) -> float:
     frame = torso_frames(still)
     wanted = np.array([heading[0], heading[1], 0.0]) @ frame
     return float(np.arctan2(wanted[1], wanted[0]))
-
-
-def turned_about(state: np.ndarray) -> np.ndarray:
-    """The same torso facing the other way: the spin turned by half a turn, the limbs' angles zero."""
-    out = state.copy()
-    out[6] += np.pi
-    out[7:] = 0.0
-    return out

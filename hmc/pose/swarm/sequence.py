@@ -257,7 +257,9 @@ def _start(task: SwarmTask, person: _Person, grid) -> list[FitRow]:
     feet = np.concatenate([np.zeros((0, 3)), *(r.feet for r in readings if r is not None)])
     found: dict[int, tuple[SwarmState | None, SwarmInfo]] = {}
     # At the start, the feet of the whole window say which way the person faces.
-    opening = readings[anchor] if scores[anchor] < 0 else replace(readings[anchor], feet=feet)
+    opening = readings[anchor]
+    if opening is not None and scores[anchor] > 0:
+        opening = replace(opening, feet=feet)
     found[anchor] = _step(task, person, frames[anchor], opening, None)
     for order in (range(anchor + 1, len(frames)), range(anchor - 1, -1, -1)):
         state = found[anchor][0]
@@ -290,8 +292,8 @@ def _step(task, person, frame, reading, state) -> tuple[SwarmState | None, Swarm
 
 
 def _row(person: _Person, frame: int, state: SwarmState | None, info: SwarmInfo) -> FitRow:
-    fitted = info.status == "fitted" and state is not None
-    return FitRow(frame, person.number, person.height_m, state.state if fitted else np.full(N_PARAMETERS, np.nan), info)
+    found = np.full(N_PARAMETERS, np.nan) if state is None or info.status != "fitted" else state.state
+    return FitRow(frame, person.number, person.height_m, found, info)
 
 
 def _take_up(task: SwarmTask, person: _Person, row: FitRow) -> None:
