@@ -1,7 +1,8 @@
 # Every target does its own set-up: a virtual environment in .venv, made anew when pyproject.toml changes.
 #   make demo    render a clip, find and fit the person in it, print the metrics and where the pictures are
 #   make test    the test suite            make lint    style and types
-#   make bench   measured speed            make clean   remove what the others made
+#   make bench   measured speed            make docs    pages of the functions and of the notebooks, in out/pages
+#   make clean   remove what the others made
 
 PYTHON ?= python3
 VENV ?= .venv
@@ -14,7 +15,7 @@ export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help setup demo test lint bench clean
+.PHONY: help setup demo test lint bench docs clean
 help:
 	@sed -n 's/^#   //p' Makefile
 
@@ -50,5 +51,9 @@ lint: $(READY)
 bench: $(READY)
 	@for file in benchmarks/bench_*.py; do echo "== $$file"; $(PY) $$file || exit 1; done
 
+docs: $(READY)
+	@$(PY) -m pip install -qq --root-user-action=ignore -e ".[docs]"
+	$(PY) docs/make_pages.py --out $(OUT)/pages
+
 clean:
-	rm -rf $(VENV) $(OUT)/demo* build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) $(OUT)/demo* $(OUT)/pages build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
