@@ -13,13 +13,15 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from hmc.errors import InputError
+from hmc.landmarks import landmark_index
 from hmc.pose.annealed.hull_target import FAR_M, HullTarget, distance_at, distance_gradient, make_target, sample_points
 from hmc.pose.annealed.near_distance import near_distance
 from hmc.pose.annealed.penetration import penetration_depth
-from hmc.pose.annealed.symmetric import POSTURE, SymmetricSettings, body_distance, outside_distance, symmetric_cost
+from hmc.pose.annealed.symmetric import POSTURE, SymmetricSettings, body_distance, outside_distance, posture_spread, symmetric_cost
 from hmc.pose.body.flesh import cone_distance, place_points
-from hmc.pose.body.joints import DOF_NAMES, N_DOF
-from hmc.pose.body.kinematics import segment_transforms
+from hmc.pose.body.joints import DOF_NAMES, N_DOF, dof_index
+from hmc.pose.body.kinematics import landmarks, segment_transforms
+from hmc.pose.body.model import neutral_state
 from hmc.voxels.grid import VoxelGrid
 
 GRID = VoxelGrid(np.array([-1.0, 2.0, 0.0]), 0.04, (50, 40, 60))
@@ -218,7 +220,7 @@ def test_the_cost_is_the_sum_of_its_parts(balls, settings):
         cost = np.mean([min(d, settings.cap_m) ** 2 for d in distance_at(balls, world)])
         cost += settings.explain_weight * np.mean(np.minimum(loop_body_distance(body, [state], hull), settings.cap_m) ** 2)
         cost += settings.overlap_weight * np.mean(penetration_depth(body, points.axes, rotations[None], positions[None]) ** 2)
-        rest, spread = POSTURE
+        rest, spread = POSTURE[0], posture_spread(state)
         cost += settings.posture_weight * sum(((state[d] - rest[d]) / spread[d]) ** 2 for d in range(6, N_DOF))
         assert found[n] == pytest.approx(cost, rel=1e-2)
 
@@ -233,6 +235,21 @@ def test_posture_is_free_for_the_root_and_restful_within_the_limits():
             other = DOF_NAMES.index("r_" + name[2:])
             assert spread[k] == spread[other]
             assert rest[k] == pytest.approx(rest[other] * (1 if name.endswith("_y") else -1))
+
+
+def test_crossed_legs_are_less_common_than_open_ones():
+    body, _ = body_of()
+    states = np.repeat(neutral_state("down", body.limits)[None], 2, axis=0)
+    states[:, dof_index("r_hip_x", "l_hip_x")] = np.radians([[20, -20], [-20, 20]])
+    pelvis, knees = landmark_index("pelvis"), [landmark_index("l_knee"), landmark_index("r_knee")]
+    crossed, opened = (landmarks(body, state)[knees, 1] - landmarks(body, state)[pelvis, 1] for state in states)
+    assert crossed[0] - crossed[1] < opened[0] - opened[1]
+    hips = dof_index("r_hip_x", "l_hip_x")
+    spread = posture_spread(states)
+    costs = ((states / spread) ** 2)[:, hips].sum(1)
+    assert costs[0] > 5 * costs[1]
+    others = np.delete(np.arange(N_DOF), hips)
+    assert np.array_equal(spread[:, others], np.tile(POSTURE[1][others], (2, 1)))
 
 
 def test_the_true_pose_of_a_rendered_person_costs_least():

@@ -17,7 +17,7 @@ from hmc.pose.body.model import PARTS, BodyModel, Cones
 __all__ = ["AxisPoints", "axis_points", "depths_placed", "penetration_depth", "penetration_rows"]
 
 #: Share of each limb part's length from which its axis is tested: what lies nearer to the joint is inside its neighbour anyway.
-_FROM = {"upper_arm": 0.6, "forearm": 0.25, "thigh": 0.6, "shank": 0.2}
+_FROM = {"upper_arm": 0.6, "forearm": 0.25, "thigh": 0.2, "shank": 0.2}
 #: Points on the axis of each cone.
 POINTS_A_CONE = 3
 #: Elements (pairs of a cone and a point x states) worked on at a time: what stays in the second-level cache.

@@ -18,7 +18,7 @@ from hmc.pose.annealed.floor import above_floor, lowest_support
 from hmc.pose.annealed.hull_target import HullTarget, distance_gradient
 from hmc.pose.annealed.nearest_cone import Candidates, Nearest, candidates, nearest_cones, towards
 from hmc.pose.annealed.penetration import penetration_rows
-from hmc.pose.annealed.symmetric import POSTURE, BodyPoints, SymmetricSettings
+from hmc.pose.annealed.symmetric import POSTURE, BodyPoints, SymmetricSettings, posture_spread
 from hmc.pose.body.joints import N_DOF
 from hmc.pose.body.kinematics import dof_masks, joint_twists
 from hmc.pose.body.model import BodyModel
@@ -308,6 +308,8 @@ class _Distances:
         As from `penetration_rows`.
     floor : tuple of ndarray
         As from `lowest_support`; empty where there is no floor.
+    spread : ndarray, shape (27,)
+        Of the posture (`posture_spread`), radians.
     """
 
     residuals: np.ndarray
@@ -326,6 +328,7 @@ class _Distances:
     segment: np.ndarray
     other: np.ndarray
     floor: tuple[np.ndarray, np.ndarray, np.ndarray]
+    spread: np.ndarray
 
 
 def _distances(body, samples, state, target, hull_points, settings, before=None) -> _Distances:
@@ -344,16 +347,17 @@ def _distances(body, samples, state, target, hull_points, settings, before=None)
         gap = above_floor(floor[0], target.floor_z)
     sizes = np.array([len(outside), len(nearest.distance), len(depth), 1])
     weights = np.sqrt(np.array([1, settings.explain_weight, settings.overlap_weight, settings.floor_weight]) / sizes)
+    spread = posture_spread(state)
     residuals = [
         weights[0] * np.minimum(outside, settings.cap_m),
         weights[1] * np.minimum(nearest.distance, settings.cap_m),
         weights[2] * depth,
         weights[3] * gap,
-        _posture(state, settings),
+        np.sqrt(settings.posture_weight) * (state - POSTURE[0]) / spread,
     ]
     return _Distances(
         np.concatenate(residuals), weights, axes, centres, maps, pairs, points, slope, outside, nearest, depth, outward, axis_points,
-        segment, other, floor,
+        segment, other, floor, spread,
     )  # fmt: skip
 
 
@@ -394,7 +398,7 @@ def _pulls(body: BodyModel, samples: BodyPoints, found: _Distances, settings: Sy
     jacobian = np.empty((n + N_DOF, N_DOF))
     np.matmul(wrenches, twists.T, out=jacobian[:-N_DOF])
     jacobian[:-N_DOF] *= _RELATIVE.take(np.concatenate(movers), axis=0)
-    jacobian[-N_DOF:] = np.diag(np.sqrt(settings.posture_weight) / POSTURE[1])
+    jacobian[-N_DOF:] = np.diag(np.sqrt(settings.posture_weight) / found.spread)
     return np.concatenate([*rows, len(found.residuals) - N_DOF + np.arange(N_DOF)]), jacobian
 
 
@@ -408,10 +412,6 @@ def residual_values(
 ) -> np.ndarray:
     """The residuals of `residual_rows` alone, at less of the work."""
     return _distances(body, samples, state, target, hull_points, settings).residuals
-
-
-def _posture(state: np.ndarray, settings: SymmetricSettings) -> np.ndarray:
-    return np.sqrt(settings.posture_weight) * (state - POSTURE[0]) / POSTURE[1]
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:

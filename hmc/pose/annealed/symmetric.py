@@ -30,6 +30,7 @@ __all__ = [
     "body_points",
     "cone_shapes",
     "outside_distance",
+    "posture_spread",
     "squared_distance",
     "symmetric_cost",
     "thinned",
@@ -57,6 +58,20 @@ def _posture() -> tuple[np.ndarray, np.ndarray]:
 
 #: Rest and spread of every angle, radians, each of shape (27,); the root's are free (spread infinite).
 POSTURE = _posture()
+#: Legs open widely and cross little: which way each angle crosses them, and the spread that way, radians. Hulls confuse crossed legs with
+#: legs side by side where furniture hides the thighs.
+_INWARD = np.array([{"r_hip_x": 1.0, "l_hip_x": -1.0}.get(name, 0.0) for name in DOF_NAMES])
+_INWARD_SPREAD = np.radians(8)
+
+
+def posture_spread(states: np.ndarray) -> np.ndarray:
+    """How far each angle commonly goes to the side of rest on which it is, radians, shape (..., 27): `POSTURE`, less for crossed legs.
+
+    Parameters
+    ----------
+    states : ndarray, shape (..., 27)
+    """
+    return np.where(states * _INWARD > 0, _INWARD_SPREAD, POSTURE[1])
 
 
 @dataclass(frozen=True)
@@ -76,7 +91,7 @@ class SymmetricSettings:
     overlap_weight : float
         Weight of parts that reach into one another.
     posture_weight : float
-        Square metres that an angle one `POSTURE` spread away from rest costs: it decides between poses that the hulls do not
+        Square metres that an angle one spread (`posture_spread`) away from rest costs: it decides between poses that the hulls do not
         tell apart, such as the ways to fold an arm before the chest.
     floor_weight : float
         Weight of hanging in the air or being sunk in the floor (`hmc.pose.annealed.floor`).
@@ -311,5 +326,5 @@ def symmetric_cost(
         + np.einsum("ij,ij->j", outside, outside) / len(outside)
         + settings.explain_weight / len(places) * np.einsum("ij,ij->j", unexplained, unexplained)
         + settings.overlap_weight / len(depth) * np.einsum("ij,ij->j", depth, depth)
-        + settings.posture_weight * (((states - POSTURE[0]) / POSTURE[1]) ** 2).sum(1)
+        + settings.posture_weight * (((states - POSTURE[0]) / posture_spread(states)) ** 2).sum(1)
     )
