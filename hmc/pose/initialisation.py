@@ -18,7 +18,7 @@ from hmc.pose.annealed.rays import points_to_explain
 from hmc.pose.annealed.refine import RefineSettings, refine
 from hmc.pose.annealed.symmetric import BodyPoints, SymmetricSettings, symmetric_cost
 from hmc.pose.body.inverse import fit_landmarks
-from hmc.pose.body.joints import dof_index
+from hmc.pose.body.joints import DOF_NAMES, dof_index, mirror_state
 from hmc.pose.body.kinematics import landmarks
 from hmc.pose.body.model import BodyModel, neutral_state
 
@@ -46,6 +46,9 @@ TEMPLATES: dict[str, tuple[dict[str, float], float]] = {
 
 #: Landmarks that move freely of the trunk.
 _LOOSE = {"legs": ("knee", "ankle"), "arms": ("elbow", "wrist")}
+#: Steps towards exchanged legs.
+LEG_STEPS = 8
+_LEG_ANGLES = [k for k, name in enumerate(DOF_NAMES) if name[2:-2] in ("hip", "knee")]
 
 
 def template_states(body: BodyModel, xy: np.ndarray, floor_z: float, headings: np.ndarray) -> np.ndarray:
@@ -163,7 +166,10 @@ def swapped_pose(body: BodyModel, state: np.ndarray, what: Literal["all", "legs"
     if what == "all":
         start[3] += np.pi
         start[4:] = neutral_state("down", body.limits)[4:]
-    return fit_landmarks(body, moved, start)[0]
+    if what != "legs":
+        return fit_landmarks(body, moved, start)[0]
+    start[_LEG_ANGLES] = mirror_state(state)[_LEG_ANGLES]  # nearly what is looked for, so that some steps do
+    return fit_landmarks(body, moved, start, LEG_STEPS)[0]
 
 
 def swapped_poses(body: BodyModel, state: np.ndarray) -> np.ndarray:
