@@ -76,7 +76,7 @@ def test_surface_and_colours_in_one(scene):
 
 
 def test_wrong_masks_are_refused(scene):
-    rig, _, pixels = scene
+    _, _, pixels = scene
     with pytest.raises(InputError, match="one mask a camera"):
         hull_init(pixels, [None])
     with pytest.raises(InputError, match="camera 'c0': the mask must be"):

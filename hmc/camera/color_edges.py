@@ -106,15 +106,16 @@ def color_gradient(image: np.ndarray, settings: ColorEdgeSettings | None = None)
         raise InputError(f"`image` must be (height, width, 3); got {image.shape}")
     smooth = cv2.GaussianBlur(image, (0, 0), settings.sigma_px) if settings.sigma_px > 0 else image
     planes = [np.ascontiguousarray(plane) for plane in np.moveaxis(smooth.astype(np.float32), -1, 0)]
-    square = sum(plane * plane for plane in planes)
-    bright = _brightness(sum(planes) / np.float32(3), settings)
+    blue, green, red = planes
+    square = blue * blue + green * green + red * red
+    bright = _brightness((blue + green + red) / np.float32(3), settings)
     height, width = image.shape[:2]
     out = np.zeros((4, height, width), np.float32)
     if height < 3 or width < 3:
         return out
     for k, places in enumerate(PAIRS):
         a, b = (_shifted(height, width, *place) for place in places)
-        dot = sum(plane[a] * plane[b] for plane in planes)
+        dot = blue[a] * blue[b] + green[a] * green[b] + red[a] * red[b]
         out[k, 1:-1, 1:-1] = _distance(dot, square[a], square[b], bright[a], bright[b])
     return out
 

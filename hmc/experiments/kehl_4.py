@@ -32,7 +32,7 @@ TITLES = {"colour": "colour edges", "grey": "Canny, grey"}
 
 def grid(plan: Plan) -> list[dict]:
     """One cell a recording."""
-    sources = plan.recordings or (rendered("kick_quick" if plan.quick else "box"),)
+    sources = plan.recordings or (rendered("kick_quick" if plan.quick else "kick_turn"),)
     return [{"recording": source.label, "images": 4 if plan.quick else 40} for source in sources]
 
 
@@ -76,8 +76,11 @@ def _images(recording: Recording, most: int):
             path = recording.path / "truth" / "silhouettes" / camera.name / f"{frame.index:06d}.png"
             if image is None or found >= most or not path.is_file():
                 continue
-            truth = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE) > 0
-            if truth.sum() > 500:
+            picture = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+            if picture is None:
+                continue
+            truth = picture > 0
+            if np.count_nonzero(truth) > 500:
                 found += 1
                 yield image, truth
         if found >= most:

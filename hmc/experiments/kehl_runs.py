@@ -80,8 +80,8 @@ def cell_grid(quick: bool, recordings: Sequence[Source], name: str, variants: Se
             "shown_s": [0.4] if quick else list(shown_s),
         }
         for source in sources
-        for variant in variants
         for k in range(1 if quick else repeats)
+        for variant in variants
     ]
 
 

@@ -13,19 +13,22 @@ from hmc.synthetic.skeleton import Skeleton
 
 __all__ = ["dance", "kick_turn", "pedal_arms", "play_cube"]
 
+Hands = dict[str, tuple[float, float, float]]
+#: Second, hands, turn to the left, lean forwards (radians), and where feet are that are off the floor.
+Key = tuple[float, Hands, float, float, dict[str, dict[str, float]]]
 #: Seconds for which the pose at the start is held.
 _HOLD_S = 0.6
-_SPREAD = {"left": (0.02, 0.98, 0.06), "right": (0.02, -0.98, 0.06)}
-_HIPS = {"left": (0.16, 0.26, -0.66), "right": (0.16, -0.26, -0.66)}
-_GUARD = {"left": (0.42, -0.12, 0.02), "right": (0.42, 0.12, 0.02)}
-_DOWN = {"left": (0.06, 0.18, -0.95), "right": (0.06, -0.18, -0.95)}
+_SPREAD: Hands = {"left": (0.02, 0.98, 0.06), "right": (0.02, -0.98, 0.06)}
+_HIPS: Hands = {"left": (0.16, 0.26, -0.66), "right": (0.16, -0.26, -0.66)}
+_GUARD: Hands = {"left": (0.42, -0.12, 0.02), "right": (0.42, 0.12, 0.02)}
+_DOWN: Hands = {"left": (0.06, 0.18, -0.95), "right": (0.06, -0.18, -0.95)}
 _WIDE, _STAND = 0.30, 0.13
 
 
 def kick_turn(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator) -> Motion:
     """Hands on the hips, kicks with both legs behind a guard, leaning back, and a turn to the left (section 7.3)."""
     kick = {"ahead": 0.62, "up": 0.62}
-    keys = [
+    keys: list[Key] = [
         (0.9, _HIPS, 0.0, 0.0, {}),
         (1.6, _HIPS, 0.15, 0.0, {}),
         (2.0, _GUARD, 0.1, 0.05, {}),
@@ -47,7 +50,7 @@ def kick_turn(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator) -
 
 def pedal_arms(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator) -> Motion:
     """The forearms turn round each other close to the chest, as the pedals of a bicycle, then hang and cross (sections 7.1, 7.2)."""
-    keys = []
+    keys: list[Key] = []
     for k in range(16):
         angle = k * np.pi / 2
         out, up = 0.16 * np.cos(angle), 0.16 * np.sin(angle)
@@ -67,7 +70,7 @@ def dance(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator) -> Mo
         {"left": (0.40, 0.40, 0.80), "right": (0.40, -0.40, 0.80)},
         {"left": (-0.25, 0.50, -0.75), "right": (0.85, -0.30, 0.20)},
     ]
-    keys = []
+    keys: list[Key] = []
     now = 0.9
     for k in range(8):
         keys.append((now, poses[k % 4 if k < 4 else int(rng.integers(len(poses)))], 0.3 * (-1) ** k, 0.05, {}))
@@ -93,19 +96,18 @@ def play_cube(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator) -
     return _drill(skeleton, times, [(1.2 + 0.75 * k, pose, 0.15 * (-1) ** k, 0.04, {}) for k, pose in enumerate(stages)])
 
 
-def _drill(skeleton: Skeleton, times: np.ndarray, keys: list[tuple]) -> Motion:
+def _drill(skeleton: Skeleton, times: np.ndarray, keys: list[Key]) -> Motion:
     """Through keys of (second, hands, turn to the left, lean forwards, feet off the floor), radians, from the pose at the start."""
-    spread = (_SPREAD, 0.0, 0.0, {})
-    keys = [(0.0, *spread), (_HOLD_S, *spread), *keys]
+    keys = [(0.0, _SPREAD, 0.0, 0.0, {}), (_HOLD_S, _SPREAD, 0.0, 0.0, {}), *keys]
     rows = []
     for k, (_, hands, turn, lean, lifted) in enumerate(keys):
         out = _WIDE if k < 2 else _STAND
-        feet = []
+        places = []
         for side, sign in (("left", 1.0), ("right", -1.0)):
             raised = lifted.get(side)
-            feet.append((raised["ahead"], sign * 0.10, raised["up"]) if raised else (0.0, sign * out, 0.0))
+            places.append((raised["ahead"], sign * 0.10, raised["up"]) if raised else (0.0, sign * out, 0.0))
         one_leg = 0.06 * (("right" in lifted) - ("left" in lifted))
-        rows.append(np.concatenate([hands["left"], hands["right"], *feet, [turn, lean, one_leg]]))
+        rows.append(np.concatenate([hands["left"], hands["right"], *places, [turn, lean, one_leg]]))
     curve = keyframes(times, np.array([key[0] for key in keys]), np.array(rows))
     n, size = len(times), skeleton.height_m / 1.75
     hands, steps, (turn, lean, shift) = curve[:, :6].reshape(n, 2, 3), size * curve[:, 6:12].reshape(n, 2, 3), curve[:, 12:].T

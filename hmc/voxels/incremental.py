@@ -1,9 +1,9 @@
 """The visual hull kept up to date: only voxels behind pixels that changed are looked at again. Kehl (2006), section 4.1.
 
-Each camera has a table from its pixels to the voxels whose centres fall on them. A voxel has one bit a camera, 1 where its pixel is foreground
-or the camera does not see it; it belongs to the hull when at most `tolerance` of the voting cameras' bits are 0. From frame to frame, the
-bits of the voxels behind changed pixels are turned over, and these voxels are decided again. The hull is that of `hmc.voxels.carving.carve`
-with ``outside="ignore"`` to the voxel.
+Each camera has a table from its pixels to the voxels whose centres fall on them. A voxel has one bit a camera, 1 where its pixel is
+foreground or the camera does not see it; it belongs to the hull when at most `tolerance` of the voting cameras' bits are 0. From frame to
+frame, the bits of the voxels behind changed pixels are turned over, and these voxels are decided again. The hull is that of
+`hmc.voxels.carving.carve` with ``outside="ignore"`` to the voxel.
 
 It is slower than carving each frame from scratch by blocks where much changes; it is kept as the paper's method.
 """

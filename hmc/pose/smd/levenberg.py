@@ -88,26 +88,29 @@ def lm_run(
     parameters = np.array(parameters, float)
     counts, cost = [], np.nan
     for group in groups:
-        memory: dict[bytes, tuple[np.ndarray, np.ndarray]] = {}
-
-        def both(x: np.ndarray, group=group, memory=memory) -> tuple[np.ndarray, np.ndarray]:
-            key = x.tobytes()
-            if key not in memory:
-                memory.clear()
-                at = parameters.copy()
-                at[group] = np.clip(x, low[group], high[group])
-                matches, rows = matched(at)
-                residuals, full = robust_residuals(matches, rows, width)
-                memory[key] = residuals, full[:, group] * (x == at[group])
-            residuals, full = memory[key]
-            beyond = x - np.clip(x, low[group], high[group])
-            return np.concatenate([residuals, beyond]), np.concatenate([full, np.diag((beyond != 0).astype(float))])
-
-        found = least_squares(
-            lambda x, f=both: f(x)[0], parameters[group], jac=lambda x, f=both: f(x)[1], method="lm", max_nfev=settings.evaluations,
-            xtol=settings.tolerance, ftol=settings.tolerance, gtol=settings.tolerance,
-        )  # fmt: skip
-        parameters[group] = np.clip(found.x, low[group], high[group])
-        counts.append(found.nfev)
-        cost = float(found.cost)
+        parameters[group], evaluations, cost = _minimise(matched, parameters, low, high, group, width, settings)
+        counts.append(evaluations)
     return parameters, np.array(counts), cost
+
+
+def _minimise(matched, parameters, low, high, group, width, settings) -> tuple[np.ndarray, int, float]:
+    """One group's parameters at the minimum, evaluations, and the cost there."""
+    memory: dict[bytes, tuple[np.ndarray, np.ndarray]] = {}  # MINPACK asks for residuals and Jacobian at the same place
+
+    def both(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        key = x.tobytes()
+        if key not in memory:
+            memory.clear()
+            at = parameters.copy()
+            at[group] = np.clip(x, low[group], high[group])
+            beyond = x - at[group]
+            residuals, rows = robust_residuals(*matched(at), width)
+            rows = np.concatenate([rows[:, group] * (beyond == 0), np.diag((beyond != 0).astype(float))])
+            memory[key] = np.concatenate([residuals, beyond]), rows
+        return memory[key]
+
+    found = least_squares(
+        lambda x: both(x)[0], parameters[group], jac=lambda x: both(x)[1], method="lm", max_nfev=settings.evaluations,
+        xtol=settings.tolerance, ftol=settings.tolerance, gtol=settings.tolerance,
+    )  # fmt: skip
+    return np.clip(found.x, low[group], high[group]), int(found.nfev), float(found.cost)

@@ -66,9 +66,14 @@ class Matches:
 
 def joined(matches: Sequence[Matches]) -> Matches:
     """All matches as one."""
-    fields = ("residuals", "wrenches", "segment", "group", "weight")
-    together = [np.concatenate([getattr(one, name) for one in matches]) for name in fields]
-    return Matches(*together, missing=np.sum([one.missing for one in matches], axis=0))
+    return Matches(
+        np.concatenate([one.residuals for one in matches]),
+        np.concatenate([one.wrenches for one in matches]),
+        np.concatenate([one.segment for one in matches]),
+        np.concatenate([one.group for one in matches]),
+        np.concatenate([one.weight for one in matches]),
+        np.sum([one.missing for one in matches], axis=0),
+    )
 
 
 def pose_body(body: SolidBody, state: np.ndarray) -> Posed:

@@ -109,7 +109,8 @@ def _pose(body: BodyModel, feet, hands, top: float, forward: np.ndarray, left: n
     """Inverse kinematics to the ends that were found."""
     d = body.dimensions
     state = neutral_state("sideways", body.limits)
-    feet = sorted(feet, key=lambda foot: -float(foot @ left))
+    if feet[0] @ left < feet[1] @ left:
+        feet = feet[::-1]
     middle = (feet[0] + feet[1]) / 2
     half = np.linalg.norm(feet[0] - feet[1]) / 2 - d["hip_half_width"]
     legs = d["thigh"] + d["shank"]
