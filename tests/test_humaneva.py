@@ -8,6 +8,7 @@ from conftest import write_video
 from hmc.camera.model import project
 from hmc.errors import InputError
 from hmc.experiments.__main__ import main
+from hmc.experiments.five_actions import action_title
 from hmc.experiments.humaneva import FIRST_FRAME, JOINTS, MARKERS, Sync, convert_take, find_takes, synchronise
 from hmc.landmarks import LANDMARKS
 from hmc.recording import background_frames, iterate_frames, open_recording
@@ -135,6 +136,13 @@ def test_without_truth_and_background(ring, tmp_path, capsys):
     told = capsys.readouterr().err
     assert "has no motion capture" in told and "cut from the sequence itself" in told
     assert not (tmp_path / "out" / "S1_Box_1" / "truth").exists()
+
+
+def test_actions_are_called_as_in_the_thesis():
+    names = ("Walking", "Jog", "ThrowCatch", "Gestures", "Box")
+    titles = [action_title(f"S{k}_{name}_1@12345678") for k, name in enumerate(names, 1)]
+    assert titles == ["Walking", "Jog", "Throw/Catch", "Gesture", "Box"]
+    assert action_title("S1_Combo_2@12345678") == "S1_Combo_2" and action_title("mine@12345678") == "mine"
 
 
 def test_wrong_input_is_told(release, tmp_path, capsys):

@@ -5,6 +5,7 @@ HumanEva-I is not public. The rooms, lamps and motions are those of the shipped 
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 from hmc.synthetic.recipe import ActorRecipe, Recipe, RigRecipe, load_recipe
@@ -19,6 +20,8 @@ ACTIONS = {
     "gesture": ("Gesture", "gesture"),
     "box": ("Box", "box"),
 }
+#: The actions as files of HumanEva-I bear them; a recording of it is called S1_Walking_1.
+HUMANEVA = {"Walking": "walk", "Jog": "jog", "ThrowCatch": "throw_catch", "Gestures": "gesture", "Box": "box"}
 #: The actors.
 ACTORS = {
     "man": ActorRecipe(
@@ -42,8 +45,11 @@ def action_name(action: str, actor: str, quick: bool) -> str:
 
 
 def action_title(source: str) -> str:
-    """What the thesis calls the action of a recording; the recording's own name where it is none of these."""
+    """What the thesis calls the action of a rendered recording or of one of HumanEva-I; else the recording's own name."""
     name = source.rpartition("@")[0].removesuffix(QUICK_SUFFIX)
+    dataset = re.fullmatch(r"S\d+_([A-Za-z]+)_\d+", name)
+    if dataset and dataset[1] in HUMANEVA:
+        return ACTIONS[HUMANEVA[dataset[1]]][0]
     action, _, actor = name.rpartition("_")
     return ACTIONS[action][0] if actor in ACTORS and action in ACTIONS else name
 
