@@ -27,8 +27,8 @@ def method_preset(preset: PosePreset, method: str, models: Sequence[str] = ()) -
     preset : PosePreset
     method : {"apf", "shbm-apf", "ddm-apf", "shbm-ddm-apf"}
     models : sequence of str
-        "1" (the default), "2", "auto" (in every frame the one that suits the last pose), or files of hierarchies (`read_hierarchy`): at most
-        one inclusive one, for structural annealing, and one unitive one, for missing limbs.
+        "1" (the default), "2", "auto" (in every frame the one that suits the last pose), or files of hierarchies (`read_hierarchy`): at
+        most one inclusive one, for structural annealing, and one unitive one, for missing limbs.
 
     Raises
     ------
