@@ -55,7 +55,7 @@ def test_rays_that_are_not_near_pass_farther_off_in_every_particle(deviation):
     points, directions = rng.normal(0, 0.7, (60, 3)), rng.normal(size=(60, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     directions[::4] = 0
-    near, held = cones_near(cones, maps, points, 0.06, directions)
+    near = cones_near(cones, maps, points, 0.06, directions)[0]
     assert not near.all()
     np.testing.assert_array_equal(near[:, ::4], cones_near(cones, maps, points, 0.06)[0][:, ::4])
     along = points + np.linspace(-3, 3, 601)[:, None, None] * directions
@@ -87,7 +87,7 @@ def test_of_one_pose_that_may_sway_nothing_is_lost():
     cones, state = BODY.cones, neutral_state("down")
     rng = np.random.default_rng(4)
     points = rng.normal(0, 0.4, (300, 3))
-    near, held = cones_near(cones, cone_maps(cones, place_segments(BODY, state[None], np.zeros(3))), points, 0.06, sway=0.05)
+    near = cones_near(cones, cone_maps(cones, place_segments(BODY, state[None], np.zeros(3))), points, 0.06, sway=0.05)[0]
     for _ in range(20):
         maps = cone_maps(cones, place_segments(BODY, state[None] + rng.normal(0, 0.03, 27), np.zeros(3)))
         ends = maps.start + maps.axis * cones.lengths[:, None, None]

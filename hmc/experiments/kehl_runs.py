@@ -153,12 +153,11 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
 
 def _picture(recording: Recording, seen: Observed | None, points: np.ndarray, index: int) -> dict:
     """The largest crop of a frame, and where the landmarks fall in it."""
-    crops = [] if seen is None else [(crop.image.size, k) for k, crop in enumerate(seen.crops) if crop is not None]
-    if seen is None or not crops:
+    crops = [] if seen is None else [(k, crop) for k, crop in enumerate(seen.crops) if crop is not None]
+    if not crops:
         return {"frame": index, "image": [], "uv": []}
-    camera = max(crops)[1]
-    crop = seen.crops[camera]
-    uv = project(recording.rig[camera], points)[0] - [crop.left, crop.top]
+    camera, crop = max(crops, key=lambda pair: pair[1].image.size)
+    uv = project(recording.rig[camera], points)[0] - np.array([crop.left, crop.top])
     return {"frame": index, "image": crop.image, "uv": uv}
 
 

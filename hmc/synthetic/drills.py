@@ -110,7 +110,7 @@ def _drill(skeleton: Skeleton, times: np.ndarray, keys: list[Key]) -> Motion:
         rows.append(np.concatenate([hands["left"], hands["right"], *places, [turn, lean, one_leg]]))
     curve = keyframes(times, np.array([key[0] for key in keys]), np.array(rows))
     n, size = len(times), skeleton.height_m / 1.75
-    hands, steps, (turn, lean, shift) = curve[:, :6].reshape(n, 2, 3), size * curve[:, 6:12].reshape(n, 2, 3), curve[:, 12:].T
+    wrists, steps, (turn, lean, shift) = curve[:, :6].reshape(n, 2, 3), size * curve[:, 6:12].reshape(n, 2, 3), curve[:, 12:].T
     turned = Rotation.from_rotvec(turn[:, None] * [0, 0, 1]).as_matrix()
     ankles = np.einsum("nij,nsj->nsi", turned, steps) + [0, 0, skeleton.ankle_height]
     pitch = np.clip(steps[..., 2], 0, 0.6)
@@ -126,7 +126,7 @@ def _drill(skeleton: Skeleton, times: np.ndarray, keys: list[Key]) -> Motion:
         np.zeros((n, 3)),
         np.column_stack([none, -0.8 * lean, none]),
     )
-    return assemble(skeleton, np.column_stack([xy, height]), upper, feet, arms_by_hands(skeleton, hands, elbow_out=1.1))
+    return assemble(skeleton, np.column_stack([xy, height]), upper, feet, arms_by_hands(skeleton, wrists, elbow_out=1.1))
 
 
 def _standing(feet: Feet, steps: np.ndarray, skeleton: Skeleton) -> Feet:

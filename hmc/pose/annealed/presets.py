@@ -81,7 +81,8 @@ class PosePreset:
     fit_body : FitBodySettings or None
         Fit the person's dimensions over the first frames.
     start : {"hypotheses", "spectral", "neutral"}
-        Several starts with a left-right test, from typical poses or from the voxels' skeleton (`hmc.pose.spectral_start`), or the thesis's neutral pose with the heading of the walk.
+        Several starts with a left-right test, from typical poses or from the voxels' skeleton (`hmc.pose.spectral_start`), or the thesis's
+        neutral pose with the heading of the walk.
     models : tuple of Inclusive
         Hierarchies for structural annealing in place of `annealed`; of two, each frame has the one that suits the last pose. None by
         default.

@@ -104,13 +104,20 @@ def _minimise(matched, parameters, low, high, group, width, settings) -> tuple[n
             at = parameters.copy()
             at[group] = np.clip(x, low[group], high[group])
             beyond = x - at[group]
-            residuals, rows = robust_residuals(*matched(at), width)
+            matches, derivatives = matched(at)
+            residuals, rows = robust_residuals(matches, derivatives, width)
             rows = np.concatenate([rows[:, group] * (beyond == 0), np.diag((beyond != 0).astype(float))])
             memory[key] = np.concatenate([residuals, beyond]), rows
         return memory[key]
 
+    def residuals_at(x: np.ndarray) -> np.ndarray:
+        return both(x)[0]
+
+    def jacobian(x: np.ndarray) -> np.ndarray:
+        return both(x)[1]
+
     found = least_squares(
-        lambda x: both(x)[0], parameters[group], jac=lambda x: both(x)[1], method="lm", max_nfev=settings.evaluations,
+        residuals_at, parameters[group], jac=jacobian, method="lm", max_nfev=settings.evaluations,
         xtol=settings.tolerance, ftol=settings.tolerance, gtol=settings.tolerance,
     )  # fmt: skip
     return np.clip(found.x, low[group], high[group]), int(found.nfev), float(found.cost)

@@ -114,7 +114,7 @@ def _pose(body: BodyModel, feet, hands, top: float, forward: np.ndarray, left: n
     middle = (feet[0] + feet[1]) / 2
     half = np.linalg.norm(feet[0] - feet[1]) / 2 - d["hip_half_width"]
     legs = d["thigh"] + d["shank"]
-    pelvis = floor_z + d["ankle_height"] + np.sqrt(max(legs**2 - half**2, (0.8 * legs) ** 2))
+    pelvis = floor_z + d["ankle_height"] + np.sqrt(np.maximum(legs**2 - half**2, (0.8 * legs) ** 2))
     state[:3] = (*middle, pelvis)
     state[3] = np.arctan2(forward[1], forward[0])
     goal = np.full((len(LANDMARKS), 3), np.nan)
