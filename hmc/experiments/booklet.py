@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.image import imread
 
 from hmc.experiments.page import HEADING, INTRODUCTION, verdict_counts, without_dataset
-from hmc.experiments.summary import Result, Row, StoredTable
+from hmc.experiments.summary import OURS, Result, Row, StoredTable
 from hmc.files import sibling
 
 __all__ = ["write_booklet"]
@@ -115,7 +115,8 @@ def _summary(pages: _Pages, row: Row) -> None:
     entry = row.entry
     pages.room(0.6)
     pages.text(f"{entry.id}: {entry.title}. {row.verdict.capitalize()}.", weight="bold", after=0.0)
-    pages.text(f"The paper: {entry.shows}. {without_dataset(entry).capitalize()}", 8, indent=0.2, after=0.0, color="0.3")
+    paper = "" if entry.work == OURS else "The paper: "
+    pages.text(f"{paper}{entry.shows}. {without_dataset(entry).capitalize()}", 8, indent=0.2, after=0.0, color="0.3")
     for claim in row.differing:
         pages.text(f"Differs: {claim.text}{': ' if claim.detail else ''}{claim.detail}", 8, indent=0.2, after=0.0)
     if row.differing and entry.why:

@@ -15,7 +15,7 @@ from hmc.experiments.library import EXPERIMENTS, find_experiment
 from hmc.experiments.writing import report_folder
 from hmc.results import read_run
 
-__all__ = ["DIFFERS", "MISSING", "NOT_RUN", "REPRODUCED", "SHOWN", "Result", "Row", "StoredTable", "summarise"]
+__all__ = ["DIFFERS", "MISSING", "NOT_RUN", "OURS", "REPRODUCED", "SHOWN", "Result", "Row", "StoredTable", "summarise"]
 
 REPRODUCED, DIFFERS, SHOWN = "reproduced", "differs", "shown"
 NOT_RUN, MISSING = "not computed yet", "no experiment yet"
