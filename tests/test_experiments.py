@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -17,7 +18,7 @@ from hmc.errors import InputError
 from hmc.experiments import EXPERIMENTS, Inputs, Plan, Source, Table, find_experiment, plan_of, run_experiment
 from hmc.experiments.__main__ import main
 from hmc.experiments.ellipsoid import RADII_M, VOXEL_M, person_voxels
-from hmc.experiments.inputs import once, rendered, source_of
+from hmc.experiments.inputs import _told, once, rendered, source_of
 from hmc.experiments.store import cell_key, cell_rng, digest, read_cell, write_cell
 from hmc.experiments.style import house_style
 from hmc.experiments.sweep import plan_for
@@ -413,3 +414,21 @@ def test_scores_of_several_runs_are_taken_together():
     score = scores_of(cells)
     assert score.motp_mm == pytest.approx(150) and score.mota == pytest.approx(0.8) and score.misses == pytest.approx(0.2)
     assert score.rtf == pytest.approx(20 / 4) and score.filter_s == pytest.approx(0.002)
+
+
+def test_a_recipe_s_label_is_of_what_it_tells():
+    @dataclass(frozen=True)
+    class Older:
+        name: str
+        seconds: float = 2.0
+
+    @dataclass(frozen=True)
+    class Newer:
+        name: str
+        seconds: float = 2.0
+        shaken: bool = False
+        people: tuple = field(default_factory=tuple)
+
+    assert _told(Older("a", 3.0)) == _told(Newer("a", 3.0)) == {"name": "'a'", "seconds": "3.0"}
+    others = [Newer("b", 3.0), Newer("a", 4.0), Newer("a", 3.0, True), Newer("a", 3.0, people=(Older("x"),))]
+    assert len({str(_told(one)) for one in (Newer("a", 3.0), *others)}) == 5
