@@ -73,6 +73,13 @@ def test_every_table_and_figure_has_its_row(out):
     assert without == {entry.id for entry in CATALOGUE} - set(EXPERIMENTS)
 
 
+def test_a_figure_without_an_experiment_says_so(tmp_path, monkeypatch):
+    monkeypatch.setattr("hmc.experiments.summary.EXPERIMENTS", {name: EXPERIMENTS[name] for name in ("fig-3.3", "what-each-adds")})
+    rows = {row.entry.id: row.verdict for row in summarise(tmp_path)}
+    assert rows["fig-3.3"] == rows["what-each-adds"] == NOT_RUN and rows["table-4.3"] == rows["kehl-4"] == MISSING
+    assert "no experiment yet" in to_html(summarise(tmp_path))
+
+
 def test_a_full_run_counts_before_a_quick_one_and_own_recordings_come_beside(out, tmp_path):
     for name in ("fig-4.9-quick", "fig-4.9-quick-own"):
         shutil.copytree(out / "fig-4.9-quick", tmp_path / name)
@@ -93,7 +100,7 @@ def test_page_is_whole_and_needs_nothing_beside_it(out):
     levels = [cv2.imdecode(np.frombuffer(picture, np.uint8), 0)[0, 0] for picture in pictures]
     assert levels.index(90) < levels.index(40)  # in the order of the report that drew them
     text = " ".join(page.words)
-    for words in ("faster over <the> surface: 0.61 & 0.68", "$x$ <y>", "Second & last.", "HumanEva-I", "no experiment yet", "hsiao-3.15"):
+    for words in ("faster over <the> surface: 0.61 & 0.68", "$x$ <y>", "Second & last.", "HumanEva-I", "hsiao-3.15"):
         assert words in text
     assert "left_over" not in text and "2 reproduced" not in text and "1 reproduced, 1 differ" in text
 
