@@ -432,3 +432,12 @@ def test_a_recipe_s_label_is_of_what_it_tells():
     assert _told(Older("a", 3.0)) == _told(Newer("a", 3.0)) == {"name": "'a'", "seconds": "3.0"}
     others = [Newer("b", 3.0), Newer("a", 4.0), Newer("a", 3.0, True), Newer("a", 3.0, people=(Older("x"),))]
     assert len({str(_told(one)) for one in (Newer("a", 3.0), *others)}) == 5
+
+
+def test_a_reader_that_goes_away_stops_nothing():
+    process = subprocess.Popen(
+        [sys.executable, "-m", "hmc.experiments", "list"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=Path(__file__).parent.parent
+    )
+    process.stdout.close()
+    assert process.stderr.read() == b"" and process.wait(timeout=60) == 0
+    process.stderr.close()

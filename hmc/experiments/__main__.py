@@ -197,7 +197,13 @@ def _count(text: str) -> int:
 
 
 def _tell(text: str, file=None) -> None:
-    (file or sys.stdout).write(text + "\n")
+    """A line; where the reader of a pipe went away (`| head`), the work goes on without."""
+    stream = file or sys.stdout
+    try:
+        stream.write(text + "\n")
+        stream.flush()
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 if __name__ == "__main__":
