@@ -1,7 +1,8 @@
 """First poses from the voxels themselves: spectral curves, a fitted skeleton, and from its landmarks the body of the particle filters.
 
-In place of the typical poses and headings of `hmc.pose.initialisation`: it needs no heading and works in the middle of an action. Where
-the curves say too little, those stand in; where parts are missing, they compete.
+Beside the typical poses and headings of `hmc.pose.initialisation`, it works in the middle of an action. A frame can be misread without a
+sign of it (an arm for the head, and the body stands on it), so both kinds compete by what they cost; where the curves say too little, the
+typical poses stand alone.
 """
 
 from __future__ import annotations
@@ -11,9 +12,9 @@ import numpy as np
 from hmc.pose.annealed.hull_target import HullTarget
 from hmc.pose.annealed.rays import points_to_explain
 from hmc.pose.annealed.refine import RefineSettings, refine
-from hmc.pose.annealed.symmetric import BodyPoints, SymmetricSettings
+from hmc.pose.annealed.symmetric import BodyPoints, SymmetricSettings, symmetric_cost
 from hmc.pose.body.inverse import fit_landmarks
-from hmc.pose.body.joints import N_DOF
+from hmc.pose.body.kinematics import landmarks
 from hmc.pose.body.model import BodyModel, neutral_state
 from hmc.pose.initialisation import first_poses, swapped_poses
 from hmc.pose.spectral.reading import ReadingSettings, read_body
@@ -22,6 +23,9 @@ from hmc.pose.swarm.model import model_of_height, skeleton_landmarks
 from hmc.pose.swarm.temporal import SwarmSettings, start_fits
 
 __all__ = ["body_state", "spectral_poses", "strict_voxels"]
+
+#: Poses whose landmarks are all nearer than this are the same, metres.
+SAME_M = 0.05
 
 
 def strict_voxels(target: HullTarget) -> tuple[np.ndarray, np.ndarray]:
@@ -59,7 +63,11 @@ def spectral_poses(
     floor_z: float = 0.0,
     keep: int = 6,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Candidate poses of a person in one frame, best first; arguments and result as for `hmc.pose.initialisation.first_poses`."""
+    """Candidate poses of a person in one frame, best first.
+
+    Skeletons fitted to the voxels' curves at several headings, the best of them with sides exchanged and turned about, and typical poses,
+    all refined and ranked by the symmetric cost. Arguments and result as for `hmc.pose.initialisation.first_poses`.
+    """
     voxels, points = strict_voxels(target)
     reading = read_body(voxels, points, target.voxel_size_m, body.height_m, ReadingSettings())
     if reading.status != "read":
@@ -69,17 +77,26 @@ def spectral_poses(
     trials = []
     for found in start_fits(rng, model, reading, heading, SwarmSettings()):
         trials.append(body_state(body, skeleton_landmarks(model, found.state)))
-    trials += [turned for trial in trials[:1] for turned in swapped_poses(body, trial)]
     explained = points_to_explain(rng, target, 300, cost_settings.ray_share)
-    refined = [refine(body, samples, trial, target, explained, cost_settings, RefineSettings()) for trial in trials]
-    order = np.argsort([info.cost_after for _, info in refined])
-    states = np.array([refined[k][0] for k in order]).reshape(-1, N_DOF)
-    costs = np.array([refined[k][1].cost_after for k in order])
-    upright = "head" in reading.curves and reading.curves["head"][:, 2].mean() > reading.curves["trunk"][:, 2].mean()
-    if not (reading.segmentation.whole and upright):
-        # Parts that are missing or look the wrong way up may be misread: typical poses compete.
-        others, their_costs = first_poses(rng, body, samples, target, cost_settings, floor_z, keep=keep)
-        states, costs = np.concatenate([states, others]), np.concatenate([costs, their_costs])
-        order = np.argsort(costs)
-        states, costs = states[order], costs[order]
-    return states[:keep], costs[:keep]
+    refined = [_refined(body, samples, trial, target, explained, cost_settings) for trial in trials]
+    best = min(refined, key=lambda pair: pair[0])[1]
+    refined += [_refined(body, samples, turned, target, explained, cost_settings) for turned in swapped_poses(body, best)]
+    typical = first_poses(rng, body, samples, target, cost_settings, floor_z, keep=keep)[0]
+    states = np.concatenate([[state for _, state in refined], typical])
+    # All at the same points of the hull, so that costs can be compared.
+    costs = symmetric_cost(body, samples, states, target, explained, cost_settings)
+    order = np.argsort(costs)
+    order = order[_distinct(landmarks(body, states[order]))][:keep]
+    return states[order], costs[order]
+
+
+def _refined(body, samples, state, target, explained, cost_settings) -> tuple[float, np.ndarray]:
+    """The cost of a pose after steps downhill, and the pose."""
+    state, info = refine(body, samples, state, target, explained, cost_settings, RefineSettings())
+    return info.cost_after, state
+
+
+def _distinct(points: np.ndarray) -> np.ndarray:
+    """Which poses (n, 15, 3) have a landmark farther than `SAME_M` from each one before them."""
+    moved = np.linalg.norm(points[:, None] - points[None], axis=-1).max(-1)
+    return ~np.tril(moved < SAME_M, -1).any(1)

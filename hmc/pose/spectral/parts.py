@@ -97,9 +97,10 @@ def name_branches(shapes: Sequence[BranchShape], trunk: np.ndarray, up: np.ndarr
     up = np.array([0.0, 0.0, 1.0]) if up is None else up
     heads = [k for k, s in enumerate(shapes) if s.length_m < HEAD_LENGTH_M and s.elongation < HEAD_ELONGATION and s.area_m2 > HEAD_AREA_M2]
     if not heads and len(shapes) > 4:
-        # With a shoulder or a hand at it, a head is longer; of five branches it is still the stoutest of those that are no legs.
-        stout = sorted(range(len(shapes)), key=lambda k: -shapes[k].length_m * shapes[k].area_m2)[2:]
-        heads = [k for k in stout if shapes[k].area_m2 > HEAD_AREA_M2 * 0.8][:1]
+        # With a shoulder or a hand at it, a head is longer; of five branches it is still the shortest for its width, and no leg. Volume
+        # would not tell it from an arm.
+        smaller = sorted(range(len(shapes)), key=lambda k: -shapes[k].length_m * shapes[k].area_m2)[2:]
+        heads = sorted((k for k in smaller if shapes[k].area_m2 > HEAD_AREA_M2 * 0.8), key=lambda k: shapes[k].elongation)[:1]
     axis = up
     if heads:
         # Shanks of touching knees are as stout: people are upright more often than not.
