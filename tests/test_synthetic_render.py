@@ -192,7 +192,7 @@ def test_the_shipped_recipes_cover_the_motions():
     [
         ({"secnods": 3}, "unknown key 'secnods'; did you mean 'seconds'"),
         ({"actor": [{"hieght_m": 1.7}]}, r"\[\[actor\]\] number 1: unknown key 'hieght_m'; did you mean 'height_m'"),
-        ({"rig": {"kind": "ring8"}}, "rig kind 'ring8' is unknown; did you mean 'ring7'"),
+        ({"rig": {"kind": "ring77"}}, "rig kind 'ring77' is unknown; did you mean 'ring7'"),
         ({"actor": [{"motion": "wlak"}]}, "did you mean 'walk'"),
         ({"room": {"floor": "lava"}}, "texture 'lava' is unknown; use one of"),
         ({"fps": "fast"}, "'fps' has a value of the wrong kind"),
