@@ -166,30 +166,19 @@ def run(args: argparse.Namespace) -> int:
         on_problem=problems.append,
         progress=lambda steps, total: progress(steps, total, "track", args.quiet),
     )
+    passed: dict[str, Any] = {
+        "frontend": frontend,
+        "masks": masks,
+        "key": key,
+        "on_problem": problems.append,
+        "progress": lambda steps, total: progress(steps, total, "pose", args.quiet),
+    }
     if pso:
-        people, fits = pose_by_swarm(
-            SwarmTask(recording, preset, args.seed, height),
-            tracks,
-            args.voxel,
-            frontend=frontend,
-            journal=pose_journal,
-            masks=masks,
-            key=key,
-            on_problem=problems.append,
-            progress=lambda steps, total: progress(steps, total, "pose", args.quiet),
-        )
+        swarm = SwarmTask(recording, preset, args.seed, height)
+        people, fits = pose_by_swarm(swarm, tracks, args.voxel, journal=pose_journal, **passed)
         write_fits(args.out / "fits.csv", fits)
     elif smd:
-        people = pose_by_descent(
-            SmdTask(recording, preset, args.seed, height),
-            tracks,
-            args.voxel,
-            frontend=frontend,
-            masks=masks,
-            key=key,
-            on_problem=problems.append,
-            progress=lambda steps, total: progress(steps, total, "pose", args.quiet),
-        )
+        people = pose_by_descent(SmdTask(recording, preset, args.seed, height), tracks, args.voxel, **passed)
     else:
         people = pose_recording(
             recording,
@@ -199,12 +188,8 @@ def run(args: argparse.Namespace) -> int:
             args.seed,
             height_m=height,
             settings=following,
-            frontend=frontend,
             journal=pose_journal,
-            masks=masks,
-            key=key,
-            on_problem=problems.append,
-            progress=lambda steps, total: progress(steps, total, "pose", args.quiet),
+            **passed,
         )
     if args.smooth:
         people = smooth_people(people, preset, recording.fps, args.smooth)

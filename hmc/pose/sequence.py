@@ -34,7 +34,7 @@ from hmc.tracking.resumable import WARM_UP_FRAMES, observe_step, person_grid
 from hmc.tracking.tracks import person_voxels, velocities
 from hmc.voxels.grid import VoxelGrid
 
-__all__ = ["PosedPeople", "pose_recording", "targets_of"]
+__all__ = ["PosedPeople", "frames_of_persons", "pose_recording", "targets_of", "unfitted_notes"]
 
 logger = logging.getLogger("hmc")
 
@@ -118,9 +118,8 @@ def pose_recording(
     """
     grid = person_grid(recording, voxel_size_m)
     end = recording.start + recording.n_frames
-    tracks = tracks.where((tracks.frames >= recording.start) & (tracks.frames < end))
     task = PoseTask(preset, settings or FollowSettings(), recording.fps, recording.room, voxel_size_m, seed, height_m)
-    persons = _persons(tracks, recording.fps)
+    persons = {number: PersonTask(number, *rows) for number, rows in frames_of_persons(recording, tracks).items()}
     states = dict.fromkeys(persons, PersonState())
     done: list[Decided] = []
     for decided in _decided(open_journal(journal, key), preset, journal):
@@ -188,14 +187,40 @@ def targets_of(recording: Recording, grid: VoxelGrid, tracks: TrackTable, hull: 
     return targets
 
 
-def _persons(tracks: TrackTable, fps: float) -> dict[int, PersonTask]:
-    speed = velocities(tracks, fps)
+def frames_of_persons(recording: Recording, tracks: TrackTable) -> dict[int, tuple[np.ndarray, np.ndarray]]:
+    """Everybody who is tracked in the recording's selection.
+
+    Parameters
+    ----------
+    recording : Recording
+    tracks : TrackTable
+        Rows outside of the selection do not count.
+
+    Returns
+    -------
+    dict of int to (ndarray of int of shape (n,), ndarray of shape (n, 3))
+        The frames of each person's track, rising, and the track's velocity in each, metres a second.
+    """
+    tracks = tracks.where((tracks.frames >= recording.start) & (tracks.frames < recording.start + recording.n_frames))
+    speed = velocities(tracks, recording.fps)
     persons = {}
     for number in np.unique(tracks.persons).tolist():
         rows = np.flatnonzero(tracks.persons == number)
         rows = rows[np.argsort(tracks.frames[rows])]
-        persons[number] = PersonTask(number, tracks.frames[rows], speed[rows])
+        persons[number] = tracks.frames[rows], speed[rows]
     return persons
+
+
+def unfitted_notes(persons: Iterable[int], status: Iterable[str]) -> list[str]:
+    """A line for every reason why somebody has frames without a pose.
+
+    Parameters
+    ----------
+    persons, status : iterables of one length
+        Person and status of every frame of a track; "fitted" is a pose.
+    """
+    why = Counter((int(person), str(reason)) for person, reason in zip(persons, status, strict=True) if reason != "fitted")
+    return [f"person {who}: {n} frame{'s' if n > 1 else ''} without a pose: {reason}" for (who, reason), n in sorted(why.items())]
 
 
 def _next_frame(persons: Mapping[int, PersonTask], states: Mapping[int, PersonState]) -> int | None:
@@ -237,9 +262,7 @@ def _assemble(rows: list[Decided]) -> PosedPeople:
         unknown = missing[fitted].astype(int) @ landmark_masks(body).T
         positions[fitted] = np.where(unknown[..., None] > 0, np.nan, positions[fitted])
     states = np.where(missing, np.nan, states)
-    unfitted = Counter((int(person), str(why)) for person, why in zip(persons, status, strict=True) if why != "fitted")
-    notes = [f"person {who}: {n} frame{'s' if n > 1 else ''} without a pose: {why}" for (who, why), n in sorted(unfitted.items())]
-    notes += _limb_notes(persons, missing)
+    notes = unfitted_notes(persons, status) + _limb_notes(persons, missing)
     return PosedPeople(
         PoseTable(frames, persons, positions),
         PoseStates(frames, persons, states, DOF_NAMES, {person: body.dimensions for person, body in bodies.items()}),

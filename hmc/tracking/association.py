@@ -11,17 +11,15 @@ import numpy as np
 
 from hmc.errors import InputError
 from hmc.tracking.blobs import Observation
+from hmc.tracking.furniture import LEGS_M, UPRIGHT_M
 from hmc.tracking.lifecycle import LifecycleSettings, Track, looks_like_person
 from hmc.tracking.newcomers import one_or_two, unowned_blobs
 from hmc.tracking.region import person_radii, region_distance
 
 __all__ = ["FollowingSettings", "assign_voxels", "find_again", "head_centre", "let_go", "let_go_things", "locating_voxels", "predict"]
 
-#: Somebody whose head's centre is so high stands, metres.
-UPRIGHT_M = 1.35
-#: What somebody who stands fills below the first height is within the second of the head, seen from above: arms may be stretched out,
-#: legs are not; metres.
-LEGS_M, STRIDE_M = 1.0, 0.5
+#: What somebody who stands fills below `LEGS_M` is within this of the head, seen from above, in any frame; metres.
+STRIDE_M = 0.5
 
 
 @dataclass(frozen=True)

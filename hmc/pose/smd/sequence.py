@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +16,7 @@ from hmc.pose.annealed.hull_target import HullTarget
 from hmc.pose.annealed.presets import pose_preset
 from hmc.pose.body.joints import DOF_NAMES
 from hmc.pose.body.kinematics import landmarks
-from hmc.pose.sequence import PosedPeople, targets_of
+from hmc.pose.sequence import PosedPeople, frames_of_persons, targets_of, unfitted_notes
 from hmc.pose.smd.begin import FirstPose, begin
 from hmc.pose.smd.cues import Observed
 from hmc.pose.smd.observe import observe_people
@@ -27,7 +26,6 @@ from hmc.pose.start import start_person
 from hmc.recording import Recording
 from hmc.results import PoseStates, PoseTable, TrackTable
 from hmc.tracking.resumable import WARM_UP_FRAMES, person_grid
-from hmc.tracking.tracks import velocities
 from hmc.voxels.grid import VoxelGrid
 
 __all__ = ["SmdTask", "pose_by_descent"]
@@ -111,7 +109,7 @@ def pose_by_descent(
     recording = task.recording
     grid = person_grid(recording, voxel_size_m)
     end = recording.start + recording.n_frames
-    people = _people(tracks, recording.fps)
+    people = {number: _Person(number, *rows, []) for number, rows in frames_of_persons(recording, tracks).items()}
     if not people:
         return _assemble([], {})
     rows: list[tuple[int, int, np.ndarray, float, str]] = []
@@ -184,16 +182,6 @@ def _follow(task: SmdTask, person: _Person, frame: int, observed: Observed | Non
     return frame, person.number, person.state.state, info.value, info.status
 
 
-def _people(tracks: TrackTable, fps: float) -> dict[int, _Person]:
-    speed = velocities(tracks, fps)
-    people = {}
-    for number in np.unique(tracks.persons).tolist():
-        rows = np.flatnonzero(tracks.persons == number)
-        rows = rows[np.argsort(tracks.frames[rows])]
-        people[number] = _Person(number, tracks.frames[rows], speed[rows], [])
-    return people
-
-
 def _assemble(rows: list, trackers: dict[int, SmdTracker | None]) -> PosedPeople:
     """Tables in order of frame and person."""
     rows = sorted(rows, key=lambda row: row[:2])
@@ -207,8 +195,7 @@ def _assemble(rows: list, trackers: dict[int, SmdTracker | None]) -> PosedPeople
             bodies[number] = tracker.body.skeleton.dimensions
             own = fitted & (persons == number)
             positions[own] = landmarks(tracker.body.skeleton, states[own])
-    why = Counter((row[1], row[4]) for row in rows if row[4] != "fitted")
-    notes = [f"person {who}: {n} frame{'s' if n > 1 else ''} without a pose: {reason}" for (who, reason), n in sorted(why.items())]
+    notes = unfitted_notes(persons, (row[4] for row in rows))
     return PosedPeople(
         PoseTable(frames, persons, positions), PoseStates(frames, persons, states, DOF_NAMES, bodies), np.array([row[3] for row in rows]),
         tuple(notes),

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import csv
 import logging
-from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -25,7 +24,7 @@ from hmc.mask_store import kept_masks
 from hmc.pose.annealed.hull_target import make_target
 from hmc.pose.body.joints import DOF_NAMES
 from hmc.pose.body.proportions import default_body
-from hmc.pose.sequence import PosedPeople
+from hmc.pose.sequence import PosedPeople, frames_of_persons, unfitted_notes
 from hmc.pose.spectral.graph import color_votes, face_neighbours
 from hmc.pose.spectral.reading import BodyReading, ReadingSettings, read_body
 from hmc.pose.spectral_start import body_state
@@ -35,7 +34,7 @@ from hmc.pose.swarm.temporal import SwarmInfo, SwarmSettings, SwarmState, swarm_
 from hmc.recording import Recording
 from hmc.results import PoseStates, PoseTable, TrackTable
 from hmc.tracking.resumable import WARM_UP_FRAMES, observe_step, person_grid
-from hmc.tracking.tracks import person_voxels, velocities
+from hmc.tracking.tracks import person_voxels
 
 __all__ = ["FitRow", "SwarmPreset", "SwarmTask", "pose_by_swarm", "swarm_preset", "write_fits"]
 
@@ -177,7 +176,7 @@ def pose_by_swarm(
     recording = task.recording
     grid = person_grid(recording, voxel_size_m)
     end = recording.start + recording.n_frames
-    people = _people(tracks, recording.fps)
+    people = {number: _Person(number, *rows) for number, rows in frames_of_persons(recording, tracks).items()}
     rows = [_from_record(record) for record in open_journal(journal, key)]
     for row in rows:
         _take_up(task, people[row.person], row)
@@ -198,16 +197,6 @@ def pose_by_swarm(
                             append_journal(journal, _to_record(row))
     rows.sort(key=lambda row: (row.frame, row.person))
     return _assemble(task, rows), rows
-
-
-def _people(tracks: TrackTable, fps: float) -> dict[int, _Person]:
-    speed = velocities(tracks, fps)
-    people = {}
-    for number in np.unique(tracks.persons).tolist():
-        rows = np.flatnonzero(tracks.persons == number)
-        rows = rows[np.argsort(tracks.frames[rows])]
-        people[number] = _Person(number, tracks.frames[rows], speed[rows])
-    return people
 
 
 def _seen(recording: Recording, grid, tracks: TrackTable, hull: HullStep) -> dict[int, tuple | None]:
@@ -336,8 +325,7 @@ def _assemble(task: SwarmTask, rows: Sequence[FitRow]) -> PosedPeople:
         if row.info.status == "fitted":
             positions[k] = skeleton_landmarks(model_of_height(row.height_m, task.preset.thesis), row.state)
             states[k] = body_state(bodies[row.person], positions[k])
-    unfitted = Counter((row.person, row.info.status) for row in rows if row.info.status != "fitted")
-    notes = [f"person {who}: {n} frame{'s' if n > 1 else ''}: {why}" for (who, why), n in sorted(unfitted.items())]
+    notes = unfitted_notes(persons, (row.info.status for row in rows))
     return PosedPeople(
         PoseTable(frames, persons, positions),
         PoseStates(frames, persons, states, DOF_NAMES, {person: body.dimensions for person, body in bodies.items()}),
