@@ -54,14 +54,14 @@ def report_of(name, cells):
 
 def test_every_action_is_there_by_two_actors_of_different_build():
     recipes = {recipe.name: recipe for recipe in action_recipes()}
-    assert len(recipes) == 2 * len(ACTIONS) * len(ACTORS) and len(ACTORS) == 2
+    assert len(recipes) == 3 * len(ACTIONS) * len(ACTORS) and len(ACTORS) == 2
     for action in ACTIONS:
         man, woman = (recipes[action_name(action, actor, False)] for actor in ACTORS)
         assert man.actors[0].height_m > woman.actors[0].height_m + 0.2 and man.actors[0].build != woman.actors[0].build
         assert man.actors[0].motion == woman.actors[0].motion == recipes[action_name(action, "man", True)].actors[0].motion
         assert man.seed != woman.seed
     label = rendered("throw_catch_woman_quick").label
-    assert action_title(label) == "Throw/Catch" and action_title("my_dance@12345678") == "my_dance"
+    assert action_title(label) == action_title("throw_catch_woman_quick_long@0") == "Throw/Catch" and action_title("my_dance@12345678") == "my_dance"
 
 
 def test_rows_by_action_have_known_scores_and_the_papers_beside(rng):

@@ -16,19 +16,25 @@ from hmc.experiments.experiment import Cell, Plan
 from hmc.experiments.filter_runs import ANNEALING
 from hmc.experiments.markerless_runs import action_sources
 
-__all__ = ["LAYERS", "PARTICLES", "STUDIED", "filter_grid", "grouped_rows", "layer_map", "matrix", "mmta_bar"]
+__all__ = ["LAYERS", "PARTICLES", "REPEATS", "STUDIED", "filter_grid", "grouped_rows", "layer_map", "matrix", "mmta_bar"]
 
 #: Layers and particles a layer, in full and quick; the thesis's figures show their best at 6 and 600.
 LAYERS = {False: (1, 2, 4, 6, 8), True: (2, 6)}
 PARTICLES = {False: (100, 200, 400, 600, 800), True: (100, 600)}
 #: Actions in full and quick: the thesis takes a sample of every action.
 STUDIED = {False: ("walk", "jog", "throw_catch", "gesture", "box"), True: ("walk",)}
-#: Frames of the quick mode.
-QUICK_FRAMES = 13
+#: Frames of the quick mode, and repeats in full.
+QUICK_FRAMES, REPEATS = 13, 3
 
 
-def filter_grid(plan: Plan, settings: Sequence[dict[str, Any]], actions: Mapping[bool, Sequence[str]] = STUDIED) -> list[dict[str, Any]]:
-    """Every setting with both ways of annealing on every studied action, by the actors in turn.
+def filter_grid(
+    plan: Plan,
+    settings: Sequence[dict[str, Any]],
+    actions: Mapping[bool, Sequence[str]] = STUDIED,
+    annealings: Sequence[str] = tuple(ANNEALING),
+    quick_repeats: int = 1,
+) -> list[dict[str, Any]]:
+    """Every setting with every way of annealing on every studied action, by the actors in turn.
 
     Parameters
     ----------
@@ -37,6 +43,10 @@ def filter_grid(plan: Plan, settings: Sequence[dict[str, Any]], actions: Mapping
         What differs from 7 cameras, 20 mm, the factorised likelihood, density 1, 6 layers of 600 particles.
     actions : mapping of bool to sequence of str
         By `plan.quick`.
+    annealings : sequence of str
+        Keys of `ANNEALING`.
+    quick_repeats : int
+        Repeats in the quick mode; in full there are `REPEATS`.
     """
     sources = action_sources(plan, actions[plan.quick])
     if not plan.recordings:
@@ -47,8 +57,8 @@ def filter_grid(plan: Plan, settings: Sequence[dict[str, Any]], actions: Mapping
         {"recording": source.label} | base | setting | {"annealing": annealing, "repeat": repeat}
         for source in sources
         for setting in settings
-        for annealing in ANNEALING
-        for repeat in range(1 if plan.quick else 3)
+        for annealing in annealings
+        for repeat in range(quick_repeats if plan.quick else REPEATS)
     ]
 
 

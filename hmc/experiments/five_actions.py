@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from hmc.synthetic.recipe import ActorRecipe, Recipe, RigRecipe, load_recipe
 
-__all__ = ["ACTIONS", "ACTORS", "action_name", "action_recipes", "action_title"]
+__all__ = ["ACTIONS", "ACTORS", "LONG_SUFFIX", "action_name", "action_recipes", "action_title"]
 
 #: Actions, what the thesis calls them, and the shipped recipes that they come from.
 ACTIONS = {
@@ -37,6 +37,8 @@ ACTORS = {
 SECONDS, FPS = 6.0, 30.0
 #: The quick mode's recordings: smaller images and fewer of them.
 QUICK_SUFFIX, QUICK_SECONDS, QUICK_FPS, QUICK_SIZE_PX = "_quick", 1.6, 20.0, (320, 240)
+#: The same, long enough to be lost in it and found again.
+LONG_SUFFIX, LONG_SECONDS = "_quick_long", 4.5
 
 
 def action_name(action: str, actor: str, quick: bool) -> str:
@@ -46,7 +48,7 @@ def action_name(action: str, actor: str, quick: bool) -> str:
 
 def action_title(source: str) -> str:
     """What the thesis calls the action of a rendered recording or of one of HumanEva-I; else the recording's own name."""
-    name = source.rpartition("@")[0].removesuffix(QUICK_SUFFIX)
+    name = source.rpartition("@")[0].removesuffix(LONG_SUFFIX).removesuffix(QUICK_SUFFIX)
     dataset = re.fullmatch(r"S\d+_([A-Za-z]+)_\d+", name)
     if dataset and dataset[1] in HUMANEVA:
         return ACTIONS[HUMANEVA[dataset[1]]][0]
@@ -55,7 +57,7 @@ def action_title(source: str) -> str:
 
 
 def action_recipes() -> list[Recipe]:
-    """Every action by every actor, in full and quick."""
+    """Every action by every actor, in full, quick, and quick but longer."""
     recipes = []
     for action, (_, shipped) in ACTIONS.items():
         base = load_recipe(shipped)
@@ -73,5 +75,5 @@ def action_recipes() -> list[Recipe]:
                 recipe, name=action_name(action, actor, True), seconds=QUICK_SECONDS, fps=QUICK_FPS, background_frames=10, cell_m=0.025,
                 rig=RigRecipe("ring7", size_px=QUICK_SIZE_PX),
             )  # fmt: skip
-            recipes += [recipe, quick]
+            recipes += [recipe, quick, replace(quick, name=action_name(action, actor, False) + LONG_SUFFIX, seconds=LONG_SECONDS)]
     return recipes

@@ -24,13 +24,17 @@ from hmc.recording import Recording, open_recording
 from hmc.results import TrackTable, read_tracks, write_tracks
 from hmc.tracking.resumable import track_recording
 
-__all__ = ["EVERYTHING", "FAMILY", "FRONTEND", "MASKS_KEY", "SWITCHES", "action_sources", "cell", "opened", "tracked"]
+__all__ = [
+    "EVERYTHING", "FAMILY", "FRONTEND", "MASKS_KEY", "SWITCHES", "Way", "action_sources", "cell", "opened", "pose_results",
+    "tracked",
+]  # fmt: skip
 
 FAMILY = "markerless"
 #: One thread: workers share the cores.
 FRONTEND = FrontendSettings(threads=1)
 MASKS_KEY = "experiments"
 EVERYTHING = ""
+#: A preset, settings, and a change of every frame's hulls.
 Way = tuple[PosePreset, FollowSettings, Callable[[HullStep], HullStep]]
 
 
@@ -96,9 +100,23 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
     inputs : Inputs
     rng : numpy.random.Generator
     """
-    recording, tracks, masks = tracked(inputs, parameters["recording"], parameters["cameras"])
+    way = SWITCHES[parameters["without"]](pose_preset(parameters["preset"]))
+    return pose_results(tracked(inputs, parameters["recording"], parameters["cameras"]), way, rng)
+
+
+def pose_results(seen: tuple[Recording, TrackTable, Path], way: Way, rng: np.random.Generator) -> Results:
+    """Estimate the first person's poses in one way; landmarks and truth, metres.
+
+    Parameters
+    ----------
+    seen : tuple
+        As from `tracked`.
+    way : Way
+    rng : numpy.random.Generator
+    """
+    recording, tracks, masks = seen
     truth = first_truth(recording)
-    preset, settings, change = SWITCHES[parameters["without"]](pose_preset(parameters["preset"]))
+    preset, settings, change = way
 
     def changed(steps: Iterable[HullStep], total: int) -> Iterator[HullStep]:
         return map(change, steps)
