@@ -174,6 +174,22 @@ def test_a_failed_cell_is_told_and_tried_again(toy, tmp_path, capsys):
     assert "2 cells computed, 4 found" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize("error", ["InputError('not for this')", "RuntimeError('no luck')"])
+def test_an_experiment_that_fails_does_not_stop_the_others(toy, tmp_path, capsys, error):
+    broken = tmp_path / "broken.py"
+    at = "    figure, axes = plt.subplots()\n"
+    text = TOY.replace(at, f"    raise {error}\n{at}").replace('Experiment("toy", "a toy"', 'Experiment("broken", "another"')
+    broken.write_text("from hmc.errors import InputError\n" + text)
+    options = ["--out", str(tmp_path / "out"), "--workers", "1", "--quiet", "--quick"]
+    assert main(["run", str(broken), str(toy), *options]) == 1
+    told = capsys.readouterr()
+    assert "1 of 2 experiments failed: broken" in told.err and error.partition("'")[2][:7] in told.err
+    assert "toy: 6 cells computed" in told.out and (tmp_path / "out" / "toy-quick" / "run.toml").is_file()
+    broken.write_text(TOY.replace('Experiment("toy", "a toy"', 'Experiment("broken", "another"'))
+    assert main(["run", str(broken), str(toy), *options]) == 0
+    assert capsys.readouterr().out.count("0 cells computed, 6 found") == 2
+
+
 def test_computing_again_gives_the_same(toy, tmp_path):
     run_experiment(str(toy), tmp_path)
     before = files_of(tmp_path / "cells")

@@ -5,9 +5,11 @@ from __future__ import annotations
 import argparse
 import os
 import sys
+import traceback
 from pathlib import Path
 
 from hmc.errors import InputError
+from hmc.experiments.experiment import Experiment, Plan
 from hmc.experiments.library import EXPERIMENTS, find_experiment
 from hmc.experiments.sweep import plan_for, plan_of, run_experiment, stored_cells
 from hmc.experiments.writing import write_report
@@ -85,36 +87,51 @@ def _run(args: argparse.Namespace) -> int:
     out = _folder(args.out)
     names = _names(args.ids)
     experiments = {name: find_experiment(name) for name in names}  # wrong ids are told before anything is computed
-    failed = False
+    failed = []
     for name, experiment in experiments.items():
-        from tqdm import tqdm
-
-        from hmc.experiments.style import house_style
-
-        plan = plan_for(experiment, asked)
-        if plan is not asked:
-            _tell(f"{experiment.id}: is computed on no recording, so --recordings changes nothing", sys.stderr)
-        with house_style(), tqdm(desc=experiment.id, unit="cell", dynamic_ncols=True, disable=args.quiet, file=sys.stderr) as bar:
-
-            def show(done: int, total: int, bar=bar) -> None:
-                if bar.total is None:
-                    bar.reset(total)
-                    bar.initial = bar.n = done  # found cells say nothing of the speed
-                bar.update(done - bar.n)
-
-            outcome = run_experiment(name, out, plan, args.workers, args.again, show, args.scheduler)
-            folder = write_report(out, experiment, plan, outcome.report) if outcome.report else None
-        _tell(f"{experiment.id}: {outcome.computed} cells computed, {outcome.found} found")
-        for failure in outcome.failures:
-            _tell(failure, sys.stderr)
-        if outcome.report is None:
-            failed = True
-            _tell(f"{experiment.id}: {len(outcome.failures)} cells failed; the same command tries them again", sys.stderr)
-            continue
-        for claim in outcome.report.claims:
-            _tell(f"  {'holds  ' if claim.holds else 'DIFFERS'} {claim.text}{': ' if claim.detail else ''}{claim.detail}")
-        _tell(f"  wrote {folder}")
+        try:
+            done = _run_one(name, experiment, out, asked, args)
+        except Exception as error:
+            if len(names) == 1:
+                raise
+            # One experiment that cannot be computed must not cost the rest of a night's run.
+            _tell(f"{experiment.id}: {error if isinstance(error, InputError) else traceback.format_exc()}", sys.stderr)
+            done = False
+        failed += [] if done else [experiment.id]
+    if failed and len(names) > 1:
+        _tell(f"hmc.experiments: {len(failed)} of {len(names)} experiments failed: {', '.join(failed)}", sys.stderr)
     return EXIT_FAILED if failed else 0
+
+
+def _run_one(name: str, experiment: Experiment, out: Path, asked: Plan, args: argparse.Namespace) -> bool:
+    """Compute an experiment, write its report and tell of it; False where cells failed."""
+    from tqdm import tqdm
+
+    from hmc.experiments.style import house_style
+
+    plan = plan_for(experiment, asked)
+    if plan is not asked:
+        _tell(f"{experiment.id}: is computed on no recording, so --recordings changes nothing", sys.stderr)
+    with house_style(), tqdm(desc=experiment.id, unit="cell", dynamic_ncols=True, disable=args.quiet, file=sys.stderr) as bar:
+
+        def show(done: int, total: int) -> None:
+            if bar.total is None:
+                bar.reset(total)
+                bar.initial = bar.n = done  # found cells say nothing of the speed
+            bar.update(done - bar.n)
+
+        outcome = run_experiment(name, out, plan, args.workers, args.again, show, args.scheduler)
+        folder = write_report(out, experiment, plan, outcome.report) if outcome.report else None
+    _tell(f"{experiment.id}: {outcome.computed} cells computed, {outcome.found} found")
+    for failure in outcome.failures:
+        _tell(failure, sys.stderr)
+    if outcome.report is None:
+        _tell(f"{experiment.id}: {len(outcome.failures)} cells failed; the same command tries them again", sys.stderr)
+        return False
+    for claim in outcome.report.claims:
+        _tell(f"  {'holds  ' if claim.holds else 'DIFFERS'} {claim.text}{': ' if claim.detail else ''}{claim.detail}")
+    _tell(f"  wrote {folder}")
+    return True
 
 
 def _status(args: argparse.Namespace) -> int:
