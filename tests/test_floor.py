@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 from hmc.pose.annealed.floor import HANG_M, SINK_M, floor_gap, lowest_support
 from hmc.pose.annealed.hull_target import LOOSE_M, distance_at, make_target
-from hmc.pose.annealed.refine import residual_rows
+from hmc.pose.annealed.residuals import residual_rows
 from hmc.pose.annealed.symmetric import SymmetricSettings, body_points, symmetric_cost
 from hmc.pose.body.flesh import surface_coordinates
 from hmc.pose.body.joints import dof_index

@@ -10,7 +10,9 @@ from posed import COST, body_of, true_state
 
 from hmc.landmarks import landmark_index
 from hmc.pose.annealed.limb_search import LIMBS, SearchSettings, lost_limbs, search_limbs
-from hmc.pose.annealed.refine import RefineSettings, refine, residual_values
+from hmc.pose.annealed.refine import RefineSettings, refine
+from hmc.pose.annealed.residuals import residual_values
+from hmc.pose.annealed.symmetric import body_distance, outside_distance
 from hmc.pose.body.joints import DOF_NAMES
 from hmc.pose.body.kinematics import landmarks
 
@@ -51,24 +53,40 @@ def test_limbs_share_no_degree_and_leave_the_trunk_alone():
         assert all(DOF_NAMES[d].startswith(limb[:2]) for d in own)
 
 
+def named(rng, scene, state, settings) -> list[str]:
+    """The limbs that are looked for at a state."""
+    body, points, target, hull, _, _ = scene
+    outside = outside_distance(body, points.surface, state[None], target)[0]
+    return lost_limbs(rng, points, outside, body_distance(body, state[None], hull)[0], settings)
+
+
 @pytest.mark.parametrize("limb", LIMBS)
 def test_a_limb_in_the_air_is_named(scene, limb):
-    body, points, target, hull, state, _ = scene
-    rng = np.random.default_rng(0)
-    named = lost_limbs(rng, body, points, lose(state, limb), target, hull, SearchSettings(unexplained_share=1.0))
-    assert named == [limb]
-    # The hull where the limb should be is then unexplained, and all are looked for.
-    assert lost_limbs(rng, body, points, lose(state, limb), target, hull, SearchSettings(unexplained_share=0.005)) == list(LIMBS)
+    lost = lose(scene[4], limb)
+    assert named(np.random.default_rng(0), scene, lost, SearchSettings(unexplained_share=1.0)) == [limb]
+    # The hull where the limb should be is then unexplained, and others are looked for by turns: their own may have gone there.
+    picks = [named(np.random.default_rng(k), scene, lost, SearchSettings(unexplained_share=0.005, at_once=2)) for k in range(20)]
+    assert all(len(pick) == 2 and limb in pick for pick in picks) and set().union(*picks) == set(LIMBS)
 
 
 def test_a_good_pose_has_one_limb_looked_at_by_turns(scene):
-    body, points, target, hull, state, _ = scene
     settings = SearchSettings(unexplained_share=0.5, far_m=0.08, random_share=1.0)
-    picks = [lost_limbs(np.random.default_rng(k), body, points, state, target, hull, settings) for k in range(30)]
+    picks = [named(np.random.default_rng(k), scene, scene[4], settings) for k in range(30)]
     assert {len(p) for p in picks} == {1} and {p[0] for p in picks} == set(LIMBS)
     settings = replace(settings, random_share=0.5)
-    looked = sum(bool(lost_limbs(np.random.default_rng(k), body, points, state, target, hull, settings)) for k in range(60))
+    looked = sum(bool(named(np.random.default_rng(k), scene, scene[4], settings)) for k in range(60))
     assert 20 <= looked <= 40
+
+
+def test_what_a_refinement_tells_is_what_the_search_asks(scene):
+    """The distances of a refinement are those of its pose, as far as the search looks at them."""
+    body, points, target, hull, state, _ = scene
+    found, info = refine(body, points, lose(state, "l_arm"), target, hull, COST, RefineSettings(iterations=2))
+    far = SearchSettings().far_m
+    # One reads the hull's distances between voxels, the other voxel by voxel.
+    assert_allclose(info.outside, outside_distance(body, points.surface, found[None], target)[0], atol=target.voxel_size_m)
+    assert (info.outside > far).any() and (info.unexplained > far).any()
+    np.testing.assert_array_equal(info.unexplained > far, body_distance(body, found[None], hull)[0] > far)
 
 
 @pytest.mark.parametrize("limb", LIMBS)
@@ -104,6 +122,16 @@ def test_what_is_right_stays(scene):
         )
         assert after <= cost
         assert np.linalg.norm(landmarks(body, found) - landmarks(body, state), axis=1).max() < 0.08
+
+
+def test_poses_without_promise_are_not_refined(scene):
+    body, points, target, hull, state, cost = scene
+    settings = SearchSettings(promise=0.0)
+    found, after, evaluations = search_limbs(
+        np.random.default_rng(0), body, points, state, cost, ["l_arm"], target, hull, COST, RefineSettings(), settings
+    )
+    np.testing.assert_array_equal(found, state)
+    assert after == cost and evaluations == settings.draws + 1
 
 
 def test_nothing_is_looked_for_when_nothing_is_asked(scene):

@@ -8,7 +8,8 @@ from posed import COST, body_of, crossed_arms, mean_error, true_state, with_cyli
 
 from hmc.pose.annealed.penetration import axis_points
 from hmc.pose.annealed.rays import points_to_explain
-from hmc.pose.annealed.refine import RefineSettings, refine, refine_best, residual_rows, residual_values
+from hmc.pose.annealed.refine import RefineSettings, refine, refine_all, refine_best
+from hmc.pose.annealed.residuals import residual_rows, residual_values
 from hmc.pose.annealed.symmetric import BodyPoints, SymmetricSettings, symmetric_cost, thinned
 from hmc.pose.body.joints import N_DOF, dof_index
 from hmc.pose.body.kinematics import landmarks
@@ -186,6 +187,20 @@ def test_of_several_starts_the_best_goes_to_the_end(scene):
     assert given_up.cost > info.cost and given_up.evaluations < both.evaluations
     np.testing.assert_array_equal(seen[0][0], left)
     assert seen[0][1] == pytest.approx(given_up.cost_after)
+
+
+def test_starts_that_come_to_the_same_place_are_not_refined_twice(scene):
+    body, points, target, hull, _ = scene
+    near, far = poses(scene)
+    settings = RefineSettings(iterations=12)
+    alone = [refine(body, points, start, target, hull, COST, settings) for start in (near, far)]
+    together = refine_all(body, points, [near, far, near], target, hull, COST, settings, trial_steps=5)
+    for (state, info), (expected, expected_info) in zip(together, alone, strict=False):
+        assert_allclose(state, expected, atol=0.02)
+        assert info.cost == pytest.approx(expected_info.cost, rel=0.02)
+    # The third is where the first one ended, and left there.
+    assert together[2][1].evaluations < together[0][1].evaluations
+    assert np.linalg.norm(landmarks(body, together[2][0]) - landmarks(body, together[0][0]), axis=1).max() < 0.03
 
 
 def test_thinned_points_cost_nearly_the_same(scene):

@@ -15,7 +15,8 @@ from hmc.landmarks import landmark_index
 from hmc.pose.annealed.apf import PoseFilter
 from hmc.pose.annealed.hull_target import HullTarget
 from hmc.pose.annealed.rays import points_to_explain
-from hmc.pose.annealed.refine import refine, residual_values
+from hmc.pose.annealed.refine import refine
+from hmc.pose.annealed.residuals import residual_values
 from hmc.pose.body.kinematics import landmarks
 from hmc.pose.body.model import BodyModel
 from hmc.pose.initialisation import swapped_pose

@@ -20,7 +20,8 @@ from hmc.pose.annealed.apf import PoseFilter, PoseInfo, PoseState, pose_init
 from hmc.pose.annealed.hull_target import HullTarget
 from hmc.pose.annealed.limb_search import LIMBS, search_limbs
 from hmc.pose.annealed.rays import points_to_explain
-from hmc.pose.annealed.refine import refine, residual_values
+from hmc.pose.annealed.refine import refine
+from hmc.pose.annealed.residuals import residual_values
 from hmc.pose.initialisation import first_poses, swapped_pose
 from hmc.pose.spectral_start import spectral_poses
 from hmc.pose.start import StartSettings, walk_factor

@@ -20,7 +20,8 @@ from hmc.pose.annealed.hull_target import HullTarget
 from hmc.pose.annealed.limb_search import LIMBS, search_limbs
 from hmc.pose.annealed.presets import PosePreset
 from hmc.pose.annealed.rays import points_to_explain
-from hmc.pose.annealed.refine import refine, residual_values
+from hmc.pose.annealed.refine import refine
+from hmc.pose.annealed.residuals import residual_values
 from hmc.pose.body.flesh import surface_coordinates
 from hmc.pose.body.kinematics import landmarks
 from hmc.pose.body.model import BodyModel, neutral_state

@@ -16,7 +16,7 @@ from hmc.pose.annealed.hull_target import HullTarget
 from hmc.pose.annealed.limb_search import lost_limbs, search_limbs
 from hmc.pose.annealed.presets import PosePreset, drift
 from hmc.pose.annealed.rays import points_to_explain
-from hmc.pose.annealed.refine import refine
+from hmc.pose.annealed.refine import refine_all
 from hmc.pose.annealed.scores import (
     ScoreMaps,
     ScoreTable,
@@ -252,13 +252,13 @@ def polish(
         raise ValueError(f"preset '{preset.name}' has no `refine`")
     points = points_to_explain(rng, target, preset.fine_hull_points, preset.symmetric.ray_share)
     # Each to the end: a start that has moved a limb across costs more than one that has lost it until late in the refinement.
-    trials = [refine(body, samples, start, target, points, preset.symmetric, preset.refine, anchor=anchor) for start in starts]
+    trials = refine_all(body, samples, starts, target, points, preset.symmetric, preset.refine, anchor=anchor)
     evaluations = sum(info.evaluations for _, info in trials)
     estimate, info = min(trials, key=lambda trial: trial[1].cost_after)
     cost = info.cost
     searched: list[str] = []
     if preset.search is not None:
-        searched = lost_limbs(rng, body, samples, estimate, target, points, preset.search)
+        searched = lost_limbs(rng, samples, info.outside, info.unexplained, preset.search)
         estimate, cost, more = search_limbs(
             rng, body, samples, estimate, cost, searched, target, points, preset.symmetric, preset.refine, preset.search
         )

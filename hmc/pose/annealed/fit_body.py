@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hmc.pose.annealed.hull_target import HullTarget
-from hmc.pose.annealed.refine import residual_rows, residual_values
+from hmc.pose.annealed.residuals import residual_rows, residual_values
 from hmc.pose.annealed.symmetric import SymmetricSettings, body_points
 from hmc.pose.body.joints import N_DOF
 from hmc.pose.body.model import BodyModel

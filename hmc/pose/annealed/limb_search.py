@@ -14,7 +14,7 @@ from hmc.pose.annealed.hull_target import HullTarget, sample_points
 from hmc.pose.annealed.nearest_cone import candidates, nearest_cones
 from hmc.pose.annealed.rays import places_and_directions
 from hmc.pose.annealed.refine import RefineSettings, refine_best
-from hmc.pose.annealed.symmetric import POSTURE, BodyPoints, SymmetricSettings, outside_distance, symmetric_cost
+from hmc.pose.annealed.symmetric import POSTURE, BodyPoints, SymmetricSettings, symmetric_cost
 from hmc.pose.body.joints import DOF_NAMES, dof_index
 from hmc.pose.body.kinematics import landmarks, segment_transforms
 from hmc.pose.body.model import PARTS, BodyModel
@@ -53,7 +53,9 @@ class SearchSettings:
     outside_share : float
         A limb is lost when more than this share of its surface is that far outside the tolerant hull ...
     unexplained_share : float
-        ... or when more than this share of the hull's surface is that far from the body (then every limb is looked for).
+        ... and may be when more than this share of what has to be explained is that far from the body ...
+    at_once : int
+        ... then others are looked for too, picked at random, to make up this number.
     random_share : float
         Share of the frames without a lost limb in which one picked at random is looked for.
     draws : int
@@ -62,6 +64,8 @@ class SearchSettings:
         Share of them that reach for hull points which the body does not explain, where there are any.
     gain : float
         The new pose is taken when the cost falls by at least this share.
+    promise : float
+        Poses drawn that all cost more than the present one times this, at few points, are not refined at all.
     hope : float
         A new pose that costs more than the present one times this after the first steps of its refinement is not refined further ...
     back_m : float
@@ -71,28 +75,33 @@ class SearchSettings:
     far_m: float = 0.05
     outside_share: float = 0.25
     unexplained_share: float = 0.02
+    at_once: int = 2
     random_share: float = 0.5
     draws: int = 200
     reach_share: float = 0.5
     gain: float = 0.03
+    promise: float = 1.5
     hope: float = 1.3
     back_m: float = 0.05
 
 
 def lost_limbs(
-    rng: np.random.Generator,
-    body: BodyModel,
-    samples: BodyPoints,
-    state: np.ndarray,
-    target: HullTarget,
-    hull_points: np.ndarray,
-    settings: SearchSettings,
+    rng: np.random.Generator, samples: BodyPoints, outside: np.ndarray, unexplained: np.ndarray, settings: SearchSettings
 ) -> list[str]:
-    """Limbs that the hulls contradict, and all where much of the hull is unexplained; else now and then one picked at random.
+    """Limbs that the hulls contradict, and some where much of the hull is unexplained; else now and then one picked at random.
 
     Of those that the samples have: a body may lack some (`hmc.pose.scalable`).
 
     The random one is for limbs that rest in a wrong place which is nearly as good, a folded arm before the chest say.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    samples : BodyPoints
+    outside, unexplained : ndarray
+        Distances of the samples from the tolerant hull, and of what has to be explained from the body, metres
+        (`hmc.pose.annealed.refine.RefineInfo`).
+    settings : SearchSettings
 
     Returns
     -------
@@ -100,10 +109,12 @@ def lost_limbs(
         Keys of `LIMBS`.
     """
     there = [limb for limb, parts in _PARTS.items() if np.isin(samples.surface.part, parts).any()]
-    if (_unexplained(body, state, hull_points, settings) > settings.far_m).mean() > settings.unexplained_share:
-        return there
-    outside = outside_distance(body, samples.surface, state[None], target)[0] > settings.far_m
-    lost = [limb for limb in there if outside[np.isin(samples.surface.part, _PARTS[limb])].mean() > settings.outside_share]
+    far = outside > settings.far_m
+    lost = [limb for limb in there if far[np.isin(samples.surface.part, _PARTS[limb])].mean() > settings.outside_share]
+    if (unexplained > settings.far_m).mean() > settings.unexplained_share:
+        others = [limb for limb in there if limb not in lost]
+        picked = rng.permutation(len(others))[: max(0, settings.at_once - len(lost))]
+        return lost + [others[k] for k in sorted(picked)]
     at_random = [str(rng.choice(there))] if rng.random() < settings.random_share else []
     return lost or at_random
 
@@ -146,14 +157,16 @@ def search_limbs(
     evaluations = 0
     for limb in limbs:
         dofs = LIMBS[limb]
-        trials = np.repeat(state[None], settings.draws, axis=0)
-        trials[:, dofs] = _draw(rng, settings, body, state, limb, hull_points)
-        costs = symmetric_cost(body, samples, trials, target, coarse, cost_settings)
-        evaluations += settings.draws
+        trials = np.repeat(state[None], settings.draws + 1, axis=0)
+        trials[1:, dofs] = _draw(rng, settings, body, state, limb, hull_points)
+        own, *costs = symmetric_cost(body, samples, trials, target, coarse, cost_settings)
+        evaluations += len(trials)
+        if min(costs) > settings.promise * own:
+            continue
         trial, info = refine_best(
             body,
             samples,
-            [trials[pick] for pick in np.argsort(costs)[:2]],
+            [trials[1 + pick] for pick in np.argsort(costs)[:2]],
             target,
             hull_points,
             cost_settings,

@@ -43,14 +43,18 @@ def fit_landmarks(
     low, high = body.limits.low, body.limits.high
     start = np.clip(start, low, high)
 
+    masks = _MASKS[known][:, None]
+
     def evaluate(state):
         axes, centres, rotations, positions = joint_twists(body, state)
         places = positions[_SEGMENTS] + (rotations[_SEGMENTS] @ body.tips[..., None])[..., 0]
         residual = places[known] - target
-        jacobian = np.cross(axes[None, :, :], places[known][:, None, :] - centres[None, :, :])
-        jacobian[:, :3] = np.eye(3)
-        jacobian = (jacobian * _MASKS[known][:, :, None]).transpose(0, 2, 1).reshape(-1, N_DOF)
-        return residual.ravel(), jacobian, float((residual**2).sum() + stay * ((state - start) ** 2).sum())
+        # axis x (p - centre) for all points and angles, coordinate by coordinate: `numpy.cross` takes several times as long.
+        (x, y, z), (u, v, w) = axes.T, (places[known][:, None] - centres).transpose(2, 0, 1)
+        jacobian = np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=1)
+        jacobian[:, :, :3] = np.eye(3)
+        jacobian *= masks
+        return residual.ravel(), jacobian.reshape(-1, N_DOF), float((residual**2).sum() + stay * ((state - start) ** 2).sum())
 
     state = start
     residual, jacobian, cost = evaluate(state)
