@@ -51,7 +51,7 @@ def arm_errors(targets, acted, arm, search, seed):
 
 
 def test_an_arm_that_is_lost_for_more_than_half_a_second_is_taken_back():
-    """The left arm of a man who talks, in one camera's silhouette alone for twelve frames; without the limb search it stays lost longer, if not for good."""
+    """A talking man's left arm, in one camera's silhouette alone for twelve frames; without the limb search it stays lost for longer."""
     acted, gone = act("gesture", frames=30, fps=20), (3, 15)
     arm = [landmark_index(f"l_{part}") for part in ("shoulder", "elbow", "wrist")]
     tables, targets = make_tables(acted.grid, ring()), list(acted.targets)
