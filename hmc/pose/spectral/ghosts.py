@@ -10,7 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 
+from hmc.camera.model import Camera
 from hmc.tracking.ghosts import Views
 from hmc.voxels.carving import pixel_of_voxel
 from hmc.voxels.color import visibility
@@ -138,19 +140,22 @@ def _is_needed(piece: np.ndarray, voxels: np.ndarray, grid: VoxelGrid, views: Vi
     for camera, mask in zip(views.rig, views.masks, strict=True):
         if mask is None:
             continue
-        side = max(
-            1, int(1.5 * grid.voxel_size_m * camera.matrix[0, 0] / max(np.linalg.norm(camera.centre - grid.centres(piece).mean(0)), 1.0))
-        )
-        cells = [_cells(camera, grid.centres(part), side) for part in (piece, others)]
-        alone = np.setdiff1d(cells[0], cells[1])
-        if len(alone) >= settings.needed_share * max(len(cells[0]), 1):
+        away = max(float(np.linalg.norm(camera.centre - grid.centres(piece).mean(0))), 1.0)
+        own, rest = (_pixels(camera, grid.centres(part)) for part in (piece, others))
+        if not len(own) or not len(rest):
+            continue
+        # A voxel and a half as pixels: what is nearer than that to a pixel of others is covered by them.
+        reach = 1.5 * grid.voxel_size_m * camera.matrix[0, 0] / away
+        alone = np.isinf(cKDTree(rest).query(own, distance_upper_bound=reach)[0])
+        if alone.mean() >= settings.needed_share:
             return True
     return False
 
 
-def _cells(camera, points: np.ndarray, side: int) -> np.ndarray:
+def _pixels(camera: Camera, points: np.ndarray) -> np.ndarray:
+    """Pixels in which some points are, (k, 2), each once."""
     column, row, inside = pixel_of_voxel(camera, points)
-    return np.unique((row[inside] // side) * 100000 + column[inside] // side)
+    return np.unique(np.stack([column[inside], row[inside]], axis=1), axis=0)
 
 
 def _color_spread(piece: np.ndarray, occupied: np.ndarray, grid: VoxelGrid, views: Views) -> float:

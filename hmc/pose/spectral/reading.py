@@ -8,6 +8,7 @@ import numpy as np
 
 from hmc.pose.spectral.segmentation import Segmentation, SegmentationSettings, segment_body
 from hmc.pose.spectral.skeleton import SkeletonSettings, equally_spaced, extract_skeletons
+from hmc.pose.spectral.volume import BodyVolume, observe_volume
 
 __all__ = ["BodyReading", "ReadingSettings", "cut_foot", "read_body"]
 
@@ -55,6 +56,8 @@ class BodyReading:
         Parts with a curve that is not to be trusted, and why.
     status : str
         ``"read"``, or why not.
+    volume : BodyVolume or None
+        The voxels; None where they are too few for a body.
     """
 
     segmentation: Segmentation
@@ -63,6 +66,7 @@ class BodyReading:
     feet: np.ndarray
     left_out: tuple[str, ...]
     status: str
+    volume: BodyVolume | None = None
 
 
 def read_body(
@@ -95,6 +99,9 @@ def read_body(
     segmentation = segment_body(voxels, points, voxel_size_m, settings.segmentation, votes)
     if segmentation.status != "segmented":
         return BodyReading(segmentation, {}, 0.0, np.zeros((0, 3)), (), segmentation.status)
+    # Voxels that are apart from the body are not the person's.
+    body = np.isfinite(segmentation.places).all(1)
+    volume = observe_volume(voxels[body], points[body], voxel_size_m)
     found = extract_skeletons(segmentation, points, settings.skeleton)
     twice = {one.partition(" and ")[0] for one in segmentation.touching if one.endswith(" and trunk")}
     curves, left_out = {}, []
@@ -117,7 +124,7 @@ def read_body(
         status = "no trunk found"
     elif len(named) < settings.least_curves:
         status = f"only {', '.join(named)} found"
-    return BodyReading(segmentation, curves, foot_m, np.array(feet).reshape(-1, 3), tuple(left_out), status)
+    return BodyReading(segmentation, curves, foot_m, np.array(feet).reshape(-1, 3), tuple(left_out), status, volume)
 
 
 def _from_base(curve: np.ndarray, trunk: np.ndarray, part: str) -> np.ndarray:

@@ -5,15 +5,27 @@ Source: Hsiao (2008), section 3.2.2.2, Table 3-3 and section 3.2.2.4.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from hmc.pose.swarm.error import KINDS, Observed, skeleton_error
-from hmc.pose.swarm.model import ANGLE_INDEX, ANGLES, N_PARAMETERS, SkeletonModel
+from hmc.pose.swarm.error import KINDS, Observed, error_of_chains, skeleton_error
+from hmc.pose.swarm.model import ANGLE_INDEX, ANGLES, N_PARAMETERS, SkeletonModel, part_chains, segment_ends
 from hmc.pose.swarm.pso import PsoSettings, pso_run
+from hmc.pose.swarm.volume import volume_error
 
-__all__ = ["FitSettings", "Fitted", "Prior", "bounds_around", "fine_tune", "fit_around", "fit_flat", "fit_hierarchical", "rest_state"]
+__all__ = [
+    "FitSettings",
+    "Fitted",
+    "Prior",
+    "bounds_around",
+    "fine_tune",
+    "fit_around",
+    "fit_cost",
+    "fit_flat",
+    "fit_hierarchical",
+    "rest_state",
+]
 
 _TORSO = tuple(range(7))
 
@@ -35,6 +47,12 @@ STAGES: tuple[tuple[tuple[int, ...], tuple[str, ...]], ...] = (
 PARTS: tuple[tuple[int, ...], ...] = (
     _TORSO, _of("neck"), _of("l_shoulder", "l_elbow"), _of("r_shoulder", "r_elbow"), _of("l_hip", "l_knee"), _of("r_hip", "r_knee"),
 )  # fmt: skip
+#: Beside voxels, no curve's error counts as more than this, metres; and how much the voxels' counts.
+BOUND_M, VOLUME_WEIGHT = 0.1, 1.0
+#: Of the inverse kinematics below, metres a radian.
+LIMB_DAMPING_M = 0.05
+#: Places of each limb, anywhere within its limits, that are tried in every frame.
+LIMB_TRIALS = 40
 
 
 @dataclass(frozen=True)
@@ -46,10 +64,13 @@ class Prior:
     state : ndarray, shape (23,)
     weight : float
         Metres of error a radian of mean absolute difference over the angles.
+    spin_weight : float
+        Metres of error a radian of difference of the spin.
     """
 
     state: np.ndarray
     weight: float = 0.004
+    spin_weight: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -65,17 +86,17 @@ class FitSettings:
     tune_particles, tune_iterations : int
         Of each part's fine tuning.
     tune_m, tune_rad : float
-        How far fine tuning looks for positions and angles.
+        How far the first round of fine tuning looks for positions and angles; each further one half as far.
     tune_rounds : int
     """
 
     stages: tuple[tuple[int, int], ...] = ((12, 12), (24, 20), (24, 12), (40, 40), (50, 50))
     swarm: PsoSettings = field(default_factory=lambda: PsoSettings(topology="global"))
-    tune_particles: int = 14
-    tune_iterations: int = 12
-    tune_m: float = 0.04
-    tune_rad: float = 0.3
-    tune_rounds: int = 1
+    tune_particles: int = 20
+    tune_iterations: int = 7
+    tune_m: float = 0.05
+    tune_rad: float = 0.6
+    tune_rounds: int = 2
 
 
 @dataclass(frozen=True)
@@ -87,6 +108,8 @@ class Fitted:
     state : ndarray, shape (23,)
     error_m : float
         Mean distance of corresponding nodes (Eq. 3-27), metres.
+    cost_m : float
+        What was minimised, without the prior (`fit_cost`), metres.
     parts : dict of str to str
         Which part of the model each curve is.
     evaluations : int
@@ -95,6 +118,7 @@ class Fitted:
 
     state: np.ndarray
     error_m: float
+    cost_m: float
     parts: dict[str, str]
     evaluations: int
 
@@ -124,6 +148,32 @@ def bounds_around(model: SkeletonModel, state: np.ndarray, metres: float, radian
     low, high = state - reach, state + reach
     low[7:], high[7:] = np.clip(low[7:], model.low, model.high), np.clip(high[7:], model.low, model.high)
     return low, high
+
+
+def fit_cost(model: SkeletonModel, states: np.ndarray, observed: Observed, prior: Prior | None = None) -> np.ndarray:
+    """What swarms minimise: Eq. 3-27, and with voxels beside the curves also how the skeleton lies in them.
+
+    Parameters
+    ----------
+    model : SkeletonModel
+    states : ndarray, shape (n, 23)
+    observed : Observed
+    prior : Prior, optional
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Metres.
+    """
+    starts, ends = segment_ends(model, states)
+    # Where voxels count too, they tell which curves are none of the body's.
+    costs = error_of_chains(part_chains(starts, ends), observed, None if observed.volume is None else BOUND_M)[0]
+    if observed.volume is not None:
+        costs = costs + VOLUME_WEIGHT * volume_error(model, starts, ends, observed.volume)
+    if prior is not None:
+        differ = np.abs(states[:, 6:] - prior.state[6:])
+        costs = costs + prior.weight * differ[:, 1:].mean(1) + prior.spin_weight * differ[:, 0]
+    return costs
 
 
 def fit_hierarchical(
@@ -172,7 +222,7 @@ def fit_hierarchical(
         state, more = _optimise(rng, model, seen, state, np.array(free), low, high, swarm, prior)
         evaluations += more
     tuned = fine_tune(rng, model, observed, state, settings, prior)
-    return Fitted(tuned.state, tuned.error_m, tuned.parts, evaluations + tuned.evaluations)
+    return replace(tuned, evaluations=evaluations + tuned.evaluations)
 
 
 def fit_around(
@@ -200,8 +250,56 @@ def fit_around(
     prior : Prior, optional
     """
     swarm = _sized(settings.swarm, particles, iterations)
+    starts = np.concatenate([starts, _one_part_moved(rng, starts[0], low, high, particles - len(starts))])
     state, evaluations = _optimise(rng, model, observed, starts[0], np.arange(N_PARAMETERS), low, high, swarm, prior, starts)
     return _fitted(model, observed, state, evaluations)
+
+
+def _one_part_moved(rng: np.random.Generator, state: np.ndarray, low: np.ndarray, high: np.ndarray, n: int) -> np.ndarray:
+    """States (n, 23) that differ from a known one in one part each: of places anywhere in a box of 23 dimensions, hardly any is a pose."""
+    states = np.repeat(state[None], max(n, 0), axis=0)
+    moved = rng.uniform(low, high, states.shape)
+    far = rng.random((len(states), 1))
+    for k, free in enumerate(PARTS):
+        rows = np.arange(k, len(states), len(PARTS))[:, None]
+        states[rows, free] += far[rows[:, 0]] * (moved[rows, free] - states[rows, free])
+    return states
+
+
+def free_limbs(
+    rng: np.random.Generator, model: SkeletonModel, observed: Observed, state: np.ndarray, prior: Prior | None = None
+) -> tuple[np.ndarray, int]:
+    """Try every limb anywhere within its limits, whatever it did before, and the legs exchanged: what is lost is not found nearby.
+
+    Parameters
+    ----------
+    rng, model, observed, state, prior
+        As for `fine_tune`.
+
+    Returns
+    -------
+    state : ndarray, shape (23,)
+        The given one or a better one.
+    evaluations : int
+    """
+    limbs = PARTS[2:]
+    states = np.repeat(state[None], 1 + LIMB_TRIALS * len(limbs), axis=0)
+    for k, free in enumerate(limbs):
+        rows = np.arange(1 + k * LIMB_TRIALS, 1 + (k + 1) * LIMB_TRIALS)[:, None]
+        angles = np.array(free) - 7
+        states[rows, free] = rng.uniform(model.low[angles], model.high[angles], (LIMB_TRIALS, len(free)))
+    exchanged = state.copy()
+    left, right = [list(free) for free in PARTS[-2:]]
+    exchanged[left], exchanged[right] = state[right], state[left]
+    costs = fit_cost(model, np.concatenate([states, exchanged[None]]), observed, prior)
+    if costs[-1] < costs[:-1].min():
+        return exchanged, len(costs)
+    best = state.copy()
+    for k, free in enumerate(limbs):
+        one = 1 + k * LIMB_TRIALS + int(costs[1 + k * LIMB_TRIALS : 1 + (k + 1) * LIMB_TRIALS].argmin())
+        if costs[one] < costs[0]:
+            best[list(free)] = states[one, list(free)]
+    return best, len(costs)
 
 
 def fit_flat(
@@ -220,10 +318,12 @@ def fine_tune(
     """Section 3.2.2.4: torso, head, arms and legs one after the other, near where they are."""
     evaluations = 0
     swarm = _sized(settings.swarm, settings.tune_particles, settings.tune_iterations)
-    for _ in range(settings.tune_rounds):
+    for number in range(settings.tune_rounds):
+        share = 0.5**number
         for free in PARTS:
-            low, high = bounds_around(model, state, settings.tune_m, settings.tune_rad)
-            state, more = _optimise(rng, model, observed, state, np.array(free), low, high, swarm, prior)
+            low, high = bounds_around(model, state, share * settings.tune_m, share * settings.tune_rad)
+            moves = torso_moves(model, state) if free == _TORSO else None
+            state, more = _optimise(rng, model, observed, state, np.array(free), low, high, swarm, prior, moves=moves)
             evaluations += more
     return _fitted(model, observed, state, evaluations)
 
@@ -234,26 +334,53 @@ def _sized(swarm: PsoSettings, particles: int, iterations: int) -> PsoSettings:
     )
 
 
-def _optimise(rng, model, observed, state, free, low, high, swarm, prior, starts=None):
-    """The state with some parameters optimised, and the number of evaluations."""
+def _optimise(rng, model, observed, state, free, low, high, swarm, prior, starts=None, moves=None):
+    """The state with some parameters optimised, and the number of evaluations; `moves` (k, 23): what each one moves, by default itself."""
+    moves = np.eye(N_PARAMETERS)[free] if moves is None else moves
+
+    def moved(values: np.ndarray) -> np.ndarray:
+        states = state + (values - state[free]) @ moves
+        states[:, 7:] = np.clip(states[:, 7:], model.low, model.high)
+        return states
 
     def cost(values: np.ndarray) -> np.ndarray:
-        states = np.repeat(state[None], len(values), axis=0)
-        states[:, free] = values
-        errors = skeleton_error(model, states, observed)[0]
-        if prior is not None:
-            errors = errors + prior.weight * np.abs(states[:, 7:] - prior.state[7:]).mean(1)
-        return errors
+        return fit_cost(model, moved(values), observed, prior)
 
     found = pso_run(rng, cost, low[free], high[free], swarm, (state[None] if starts is None else starts)[:, free])
-    out = state.copy()
-    out[free] = found.leader
+    out = moved(found.leader[None])[0]
     # Only the direction of the neck counts: keep it on the torso.
     axis = out[3:6] - out[:3]
     out[3:6] = out[:3] + 0.5 * model.torso * axis / max(float(np.linalg.norm(axis)), 1e-9)
     return out, found.evaluations
 
 
+def torso_moves(model: SkeletonModel, state: np.ndarray) -> np.ndarray:
+    """What turns and shifts of the torso do when head and limbs stay where they are: their angles give way.
+
+    Of a torso that takes its limbs along, any small move costs more than it gains, and a spin that is wrong stays so.
+
+    Parameters
+    ----------
+    model : SkeletonModel
+    state : ndarray, shape (23,)
+
+    Returns
+    -------
+    ndarray, shape (7, 23)
+        Change of the state with each of the torso's parameters, to first order.
+    """
+    step = 1e-4
+    starts, ends = segment_ends(model, np.concatenate([state[None], state + step * np.eye(N_PARAMETERS)]))
+    # The head's top, elbows, finger tips, knees and soles.
+    tips = np.concatenate([ends[:, 1:2], starts[:, 3::2], ends[:, 3::2]], axis=1).reshape(N_PARAMETERS + 1, -1)
+    slopes = (tips[1:] - tips[0]) / step
+    # Damped, so that a stretched limb does not swing round for what it cannot reach.
+    angles = slopes[7:]
+    give = -np.linalg.solve(angles @ angles.T + LIMB_DAMPING_M**2 * np.eye(len(angles)), angles @ slopes[:7].T)
+    return np.concatenate([np.eye(7), give.T], axis=1)
+
+
 def _fitted(model: SkeletonModel, observed: Observed, state: np.ndarray, evaluations: int) -> Fitted:
     errors, choice = skeleton_error(model, state[None], observed)
-    return Fitted(state, float(errors[0]), observed.parts_of(int(choice[0])), evaluations)
+    cost = float(fit_cost(model, state[None], observed)[0])
+    return Fitted(state, float(errors[0]), cost, observed.parts_of(int(choice[0])), evaluations)

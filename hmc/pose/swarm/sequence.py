@@ -9,7 +9,7 @@ from __future__ import annotations
 import csv
 import logging
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +30,7 @@ from hmc.pose.spectral.reading import BodyReading, ReadingSettings, read_body
 from hmc.pose.spectral_start import body_state
 from hmc.pose.start import estimate_height
 from hmc.pose.swarm.model import N_PARAMETERS, SkeletonModel, model_of_height, skeleton_landmarks
-from hmc.pose.swarm.temporal import SwarmInfo, SwarmSettings, SwarmState, swarm_step
+from hmc.pose.swarm.temporal import SwarmInfo, SwarmSettings, SwarmState, missed, swarm_step
 from hmc.recording import Recording
 from hmc.results import PoseStates, PoseTable, TrackTable
 from hmc.tracking.resumable import WARM_UP_FRAMES, observe_step, person_grid
@@ -64,7 +64,7 @@ class SwarmPreset:
 
 
 def swarm_preset(name: str) -> SwarmPreset:
-    """``"default"``, or ``"hsiao2008"``: limits and correspondences as printed, a start tried beside every frame's fit.
+    """``"default"``, or ``"hsiao2008"``: limits as printed, curves alone, a start tried beside every frame's fit.
 
     Raises
     ------
@@ -74,7 +74,7 @@ def swarm_preset(name: str) -> SwarmPreset:
     if name == "default":
         return SwarmPreset()
     if name == "hsiao2008":
-        return SwarmPreset(swarm=SwarmSettings(always_check=True), thesis=True)
+        return SwarmPreset(swarm=SwarmSettings(always_check=True, voxels=False), thesis=True)
     raise InputError(f"there is no preset '{name}' of --method pso; use default or hsiao2008")
 
 
@@ -177,9 +177,11 @@ def pose_by_swarm(
     grid = person_grid(recording, voxel_size_m)
     end = recording.start + recording.n_frames
     people = {number: _Person(number, *rows) for number, rows in frames_of_persons(recording, tracks).items()}
-    rows = [_from_record(record) for record in open_journal(journal, key)]
-    for row in rows:
-        _take_up(task, people[row.person], row)
+    rows: list[FitRow] = []
+    for record in open_journal(journal, key):
+        decided = [_from_record(one) for one in record["rows"]]
+        _take_up(task, people[record["person"]], decided, record["after"])
+        rows += decided
     left = [int(frame) for person in people.values() for frame in person.frames[person.frames > person.done_to][:1]]
     if left:
         first = min(left)
@@ -191,10 +193,11 @@ def pose_by_swarm(
             for number, seen in _seen(recording, grid, tracks, hull).items():
                 person = people[number]
                 if hull.index > person.done_to:
-                    for row in _advance(task, person, hull.index, seen, grid):
-                        rows.append(row)
-                        if journal is not None:
-                            append_journal(journal, _to_record(row))
+                    decided = _advance(task, person, hull.index, seen, grid)
+                    rows += decided
+                    if journal is not None and decided:
+                        after = None if person.state is None else asdict(person.state)
+                        append_journal(journal, {"person": number, "rows": [_to_record(row) for row in decided], "after": after})
     rows.sort(key=lambda row: (row.frame, row.person))
     return _assemble(task, rows), rows
 
@@ -273,8 +276,7 @@ def _read(task: SwarmTask, person: _Person, seen: tuple | None, voxel_size_m: fl
 
 def _step(task, person, frame, reading, state) -> tuple[SwarmState | None, SwarmInfo]:
     if reading is None:
-        kept = None if state is None else replace(state, velocity=np.zeros_like(state.velocity), missed=state.missed + 1)
-        return kept, SwarmInfo(NO_VOXELS, np.nan, False, False, 0, ())
+        return missed(state), SwarmInfo(NO_VOXELS, np.nan, False, False, 0, ())
     return swarm_step(
         task.rng(person.number, frame), person.model, state, reading, task.recording.fps, person.velocity(frame), task.preset.swarm
     )
@@ -285,18 +287,13 @@ def _row(person: _Person, frame: int, state: SwarmState | None, info: SwarmInfo)
     return FitRow(frame, person.number, person.height_m, found, info)
 
 
-def _take_up(task: SwarmTask, person: _Person, row: FitRow) -> None:
-    """A person after a row of a run that was stopped."""
+def _take_up(task: SwarmTask, person: _Person, rows: Sequence[FitRow], after: dict[str, Any] | None) -> None:
+    """A person as they were after these rows of a run that was stopped."""
     if person.model is None:
-        _set_height(task, person, row.height_m)
-    before = person.state
-    if row.info.status != "fitted":
-        person.state = None if before is None else replace(before, velocity=np.zeros_like(before.velocity), missed=before.missed + 1)
-    else:
-        usual = row.info.error_m if before is None else 0.9 * before.usual_m + 0.1 * row.info.error_m
-        change = np.zeros(N_PARAMETERS) if before is None or row.info.started else (row.state - before.state) / (1 + before.missed)
-        person.state = SwarmState(row.state, change, usual)
-    person.done_to = row.frame
+        _set_height(task, person, rows[-1].height_m)
+    if after is not None:
+        person.state = SwarmState(**after | {name: np.array(after[name], float) for name in ("state", "velocity")})
+    person.done_to = rows[-1].frame
 
 
 def _to_record(row: FitRow) -> dict[str, Any]:
@@ -305,13 +302,14 @@ def _to_record(row: FitRow) -> dict[str, Any]:
         "frame": row.frame, "person": row.person, "height_m": row.height_m, "state": None if np.isnan(row.state).any() else row.state,
         "status": info.status, "error_m": info.error_m if np.isfinite(info.error_m) else None, "started": info.started,
         "turned": info.turned, "evaluations": info.evaluations, "doubts": list(info.doubts),
+        "cost_m": info.cost_m if np.isfinite(info.cost_m) else None,
     }  # fmt: skip
 
 
 def _from_record(record: dict[str, Any]) -> FitRow:
     state = np.full(N_PARAMETERS, np.nan) if record["state"] is None else np.array(record["state"], float)
-    error = np.nan if record["error_m"] is None else record["error_m"]
-    info = SwarmInfo(record["status"], error, record["started"], record["turned"], record["evaluations"], tuple(record["doubts"]))
+    error, cost = (np.nan if record[name] is None else record[name] for name in ("error_m", "cost_m"))
+    info = SwarmInfo(record["status"], error, record["started"], record["turned"], record["evaluations"], tuple(record["doubts"]), cost)
     return FitRow(record["frame"], record["person"], record["height_m"], state, info)
 
 

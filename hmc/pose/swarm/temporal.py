@@ -10,12 +10,23 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hmc.pose.spectral.reading import BodyReading
-from hmc.pose.swarm.error import curves_near, curves_of, observe_curves, skeleton_error
-from hmc.pose.swarm.fit import FitSettings, Fitted, Prior, bounds_around, fine_tune, fit_around, fit_hierarchical, rest_state
+from hmc.pose.swarm.error import curves_near, curves_of, observe_curves
+from hmc.pose.swarm.fit import (
+    FitSettings,
+    Fitted,
+    Prior,
+    bounds_around,
+    fine_tune,
+    fit_around,
+    fit_cost,
+    fit_hierarchical,
+    free_limbs,
+    rest_state,
+)
 from hmc.pose.swarm.heading import facing_evidence, heading_of, spin_towards
 from hmc.pose.swarm.model import SkeletonModel
 
-__all__ = ["SwarmInfo", "SwarmSettings", "SwarmState", "start_fits", "swarm_step"]
+__all__ = ["SwarmInfo", "SwarmSettings", "SwarmState", "missed", "start_fits", "swarm_step"]
 
 
 @dataclass(frozen=True)
@@ -35,10 +46,10 @@ class SwarmSettings:
     particles, iterations : int
         Of the temporal swarm.
     doubt_m, doubt_ratio : float
-        A start is tried beside the temporal fit when its error is larger than the first, metres, and than the second times the error that
+        A start is tried beside the temporal fit when its cost is larger than the first, metres, and than the second times the cost that
         was usual.
     margin_m : float
-        The start is taken when its error is smaller by this, metres.
+        The start is taken when its cost is smaller by this, metres.
     facing_m : float
         By how much facing straight backwards raises an error, metres.
     backwards : float
@@ -46,11 +57,15 @@ class SwarmSettings:
     farthest_m : float
         A curve that is farther than this from every part of the last pose is not taken for one, metres.
     lost_m : float
-        A frame whose error is larger has no fit, metres.
+        A frame whose cost is larger has no fit, metres.
     last_weight : float
         How much the last pose counts in a new start (`Prior`).
+    spin_weight : float
+        How much a change of the spin from one frame to the next counts, metres a radian.
     always_check : bool
         Try a start in every frame, as the thesis does.
+    voxels : bool
+        Whether the voxels count beside their curves; the thesis fits curves alone, and has no fit where they are not those of a body.
     """
 
     fit: FitSettings = field(default_factory=FitSettings)
@@ -60,7 +75,7 @@ class SwarmSettings:
     least_reach_m: float = 0.05
     least_reach_rad: float = 0.35
     particles: int = 36
-    iterations: int = 30
+    iterations: int = 15
     doubt_m: float = 0.045
     doubt_ratio: float = 1.4
     margin_m: float = 0.012
@@ -69,7 +84,9 @@ class SwarmSettings:
     farthest_m: float = 0.25
     lost_m: float = 0.12
     last_weight: float = 0.02
+    spin_weight: float = 0.01
     always_check: bool = False
+    voxels: bool = True
 
 
 @dataclass(frozen=True)
@@ -81,7 +98,7 @@ class SwarmState:
     state, velocity : ndarray, shape (23,)
         The last fit, and its change a frame.
     usual_m : float
-        Running mean of the error, metres.
+        Running mean of the cost, metres.
     facing : float
         Sum of the evidence for the heading since the last start; negative: probably back to front.
     missed : int
@@ -112,6 +129,8 @@ class SwarmInfo:
     evaluations : int
     doubts : tuple of str
         What the segmentation says is missing, touches or is left out.
+    cost_m : float
+        What the swarms minimised, metres; NaN where they did not run.
     """
 
     status: str
@@ -120,6 +139,7 @@ class SwarmInfo:
     turned: bool
     evaluations: int
     doubts: tuple[str, ...]
+    cost_m: float = np.nan
 
 
 def start_fits(
@@ -143,7 +163,7 @@ def start_fits(
     last : ndarray, shape (23,), optional
         The last pose: it is what is likely where curves are missing.
     """
-    observed = observe_curves(model, curves_of(reading), settings.nodes)
+    observed = observe_curves(model, curves_of(reading), settings.nodes, volume=reading.volume if settings.voxels else None)
     trunk = reading.curves["trunk"]
     rest = rest_state(model, trunk.mean(0), trunk[-1] - trunk[0])
     weight = 0.004
@@ -165,7 +185,7 @@ def start_fits(
             wrong += 0.5 * (1 - facing_evidence(found.state, heading / np.linalg.norm(heading)))
         if last is not None:
             wrong += 0.5 * (1 - np.cos(found.state[6] - last[6]))
-        fits.append((found.error_m + settings.facing_m * wrong, found))
+        fits.append((found.cost_m + settings.facing_m * wrong, found))
     fits.sort(key=lambda pair: pair[0])
     return [found for _, found in fits]
 
@@ -201,50 +221,60 @@ def swarm_step(
     settings = settings or SwarmSettings()
     segmentation = reading.segmentation
     doubts = (*segmentation.doubts, *(f"{one} touch" for one in segmentation.touching), *reading.left_out)
-    if reading.status != "read":
-        kept = None if state is None else replace(state, velocity=np.zeros_like(state.velocity), missed=state.missed + 1)
-        return kept, SwarmInfo(f"no fit: {reading.status}", np.nan, False, False, 0, doubts)
+    volume = reading.volume if settings.voxels else None
+    if reading.status != "read" and (state is None or volume is None):
+        return missed(state), SwarmInfo(f"no fit: {reading.status}", np.nan, False, False, 0, doubts)
     heading = heading_of(reading.feet, velocity)
     if state is None:
         found = start_fits(rng, model, reading, heading, settings)[0]
         facing = facing_evidence(found.state, heading)
-        return SwarmState(found.state, np.zeros_like(found.state), found.error_m, facing), _info(found, True, False, 0, doubts)
+        return SwarmState(found.state, np.zeros_like(found.state), found.cost_m, facing), _info(found, True, False, 0, doubts)
     frames = 1 + state.missed
     metres = max(settings.reach_m_s * frames / fps, settings.least_reach_m)
     radians = max(settings.reach_rad_s * frames / fps, settings.least_reach_rad)
-    prior = Prior(state.state)
+    prior = Prior(state.state, spin_weight=settings.spin_weight / frames)
     low, high = bounds_around(model, state.state, metres, min(radians, np.pi))
     starts = np.stack([state.state, state.state + state.velocity])
-    observed = observe_curves(model, curves_near(model, state.state, reading, settings.farthest_m), settings.nodes)
+    near = curves_near(model, state.state, reading, settings.farthest_m)
+    observed = observe_curves(model, near, settings.nodes, volume=volume)
     found = fit_around(rng, model, observed, starts, low, high, settings.fit, settings.particles, settings.iterations, prior)
-    tuned = fine_tune(rng, model, observed, found.state, settings.fit, prior)
-    found = replace(tuned, evaluations=found.evaluations + tuned.evaluations)
+    freed, more = free_limbs(rng, model, observed, found.state, prior) if settings.voxels else (found.state, 0)
+    tuned = fine_tune(rng, model, observed, freed, settings.fit, prior)
+    found = replace(tuned, evaluations=found.evaluations + more + tuned.evaluations)
     facing = state.facing + facing_evidence(found.state, heading)
     started = turned = False
     spent = 0
     backwards = facing < settings.backwards and facing_evidence(found.state, heading) < 0
-    named = observe_curves(model, curves_of(reading), settings.nodes)
+    whole = segmentation.whole and reading.status == "read"
     # Parts that were left out because they are far away count here, where the frame shows everything.
-    error_m = float(skeleton_error(model, found.state[None], named)[0][0]) if segmentation.whole else found.error_m
-    doubtful = error_m > max(settings.doubt_m, settings.doubt_ratio * state.usual_m)
-    if ((doubtful or backwards) and segmentation.whole) or settings.always_check:
+    cost_m = found.cost_m
+    if whole:
+        cost_m = float(fit_cost(model, found.state[None], observe_curves(model, curves_of(reading), settings.nodes, volume=volume))[0])
+    doubtful = cost_m > max(settings.doubt_m, settings.doubt_ratio * state.usual_m)
+    if reading.status == "read" and (((doubtful or backwards) and whole) or settings.always_check):
         trial = start_fits(rng, model, reading, heading, settings, None if backwards else state.state)[0]
         spent = trial.evaluations
         margin = -settings.facing_m if backwards and facing_evidence(trial.state, heading) > 0 else settings.margin_m
-        if trial.error_m < error_m - margin:
+        if trial.cost_m < cost_m - margin:
             found, started, turned = trial, True, backwards
             facing = facing_evidence(trial.state, heading)
         elif backwards:
             facing = 0.0
-    if found.error_m > settings.lost_m:
-        kept = replace(state, velocity=np.zeros_like(state.velocity), missed=state.missed + 1)
-        why = f"no fit: the nearest pose is {1000 * found.error_m:.0f} mm from the curves"
-        return kept, SwarmInfo(why, found.error_m, False, False, found.evaluations + spent, doubts)
+    if found.cost_m > settings.lost_m:
+        read = reading.status == "read"
+        why = "the nearest pose is too far from the curves" if read else reading.status
+        error_m = found.error_m if read else np.nan
+        return missed(state), SwarmInfo(f"no fit: {why}", error_m, False, False, found.evaluations + spent, doubts, found.cost_m)
     change = np.zeros_like(found.state) if started else (found.state - state.state) / frames
     # Sums of evidence fade, so that a wrong start can be seen after a while.
-    now = SwarmState(found.state, change, 0.9 * state.usual_m + 0.1 * found.error_m, 0.97 * facing)
+    now = SwarmState(found.state, change, 0.9 * state.usual_m + 0.1 * found.cost_m, 0.97 * facing)
     return now, _info(found, started, turned, spent, doubts)
 
 
+def missed(state: SwarmState | None) -> SwarmState | None:
+    """The state after a frame without a fit: it stays where it was."""
+    return None if state is None else replace(state, velocity=np.zeros_like(state.velocity), missed=state.missed + 1)
+
+
 def _info(found: Fitted, started: bool, turned: bool, spent: int, doubts: tuple[str, ...]) -> SwarmInfo:
-    return SwarmInfo("fitted", found.error_m, started, turned, found.evaluations + spent, doubts)
+    return SwarmInfo("fitted", found.error_m, started, turned, found.evaluations + spent, doubts, found.cost_m)
