@@ -4,6 +4,7 @@ import base64
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import cv2
@@ -12,7 +13,7 @@ import pytest
 
 from hmc.experiments import EXPERIMENTS
 from hmc.experiments.__main__ import main
-from hmc.experiments.catalogue import CATALOGUE
+from hmc.experiments.catalogue import CATALOGUE, UNKNOWN
 from hmc.experiments.page import to_html
 from hmc.experiments.summary import DIFFERS, MISSING, NOT_RUN, REPRODUCED, summarise
 from hmc.files import write_toml
@@ -68,6 +69,8 @@ def test_every_table_and_figure_has_its_row(out):
     rows = {row.entry.id: row for row in summarise(out)}
     assert list(rows) == [entry.id for entry in CATALOGUE] + [name for name in EXPERIMENTS if name not in {e.id for e in CATALOGUE}]
     assert rows["fig-B.1"].verdict == REPRODUCED and rows["fig-4.9"].verdict == DIFFERS and rows["fig-4.7"].verdict == NOT_RUN
+    assert rows["fig-4.9"].why == UNKNOWN and rows["fig-B.1"].why == rows["fig-4.7"].why == ""
+    assert replace(rows["fig-4.9"], entry=rows["table-4.3"].entry).why == rows["table-4.3"].entry.why != ""
     assert [claim.text for claim in rows["fig-4.9"].differing] == ["faster over <the> surface"]
     without = {name for name, row in rows.items() if row.verdict == MISSING}
     assert without == {entry.id for entry in CATALOGUE} - set(EXPERIMENTS)

@@ -119,8 +119,8 @@ def _summary(pages: _Pages, row: Row) -> None:
     pages.text(f"{paper}{entry.shows}. {without_dataset(entry).capitalize()}", 8, indent=0.2, after=0.0, color="0.3")
     for claim in row.differing:
         pages.text(f"Differs: {claim.text}{': ' if claim.detail else ''}{claim.detail}", 8, indent=0.2, after=0.0)
-    if row.differing and entry.why:
-        pages.text(entry.why, 8, indent=0.2, after=0.0, style="italic")
+    if row.why:
+        pages.text(row.why, 8, indent=0.2, after=0.0, style="italic")
     pages.top -= 0.07
 
 
@@ -128,8 +128,8 @@ def _detail(pages: _Pages, row: Row) -> None:
     entry = row.entry
     pages.text(f"{entry.id}: {entry.title}", 13, "bold")
     pages.text(f"{row.verdict.capitalize()}. {entry.work}: {entry.shows}.")
-    if row.differing and entry.why:
-        pages.text(f"Why it differs, as far as known: {entry.why}")
+    if row.why:
+        pages.text(f"Why it differs, as far as known: {row.why}")
     for result in row.results:
         _run(pages, result)
 

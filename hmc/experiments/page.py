@@ -90,8 +90,8 @@ def _overview(rows: Sequence[Row]) -> str:
         name = f'<a href="#{_anchor(entry.id)}">{escape(entry.id)}</a>' if row.results else escape(entry.id)
         here = [_chip(row.verdict)]
         here += [f"<p>{escape(_how(claim.text, claim.detail))}</p>" for claim in row.differing]
-        if row.differing and entry.why:
-            here.append(f'<p class="small">{escape(entry.why)}</p>')
+        if row.why:
+            here.append(f'<p class="small">{escape(row.why)}</p>')
         paper = escape(entry.shows)
         if entry.dataset:
             paper += f'<br><span class="small">{escape(without_dataset(entry))}</span>'
@@ -103,8 +103,8 @@ def _section(row: Row) -> str:
     entry = row.entry
     lines = [f'<section class="experiment" id="{_anchor(entry.id)}">', f"<h3>{escape(entry.id)}: {escape(entry.title)}</h3>"]
     lines.append(f"<p>{_chip(row.verdict)} {escape(entry.work)}: {escape(entry.shows)}</p>")
-    if row.differing and entry.why:
-        lines.append(f"<p><b>Why it differs, as far as known:</b> {escape(entry.why)}</p>")
+    if row.why:
+        lines.append(f"<p><b>Why it differs, as far as known:</b> {escape(row.why)}</p>")
     for result in row.results:
         lines += _run(entry.id, result)
     return "\n".join([*lines, "</section>"])

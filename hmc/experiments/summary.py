@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from hmc.errors import InputError
-from hmc.experiments.catalogue import CATALOGUE, Entry
+from hmc.experiments.catalogue import CATALOGUE, OWN_REASONS, UNKNOWN, Entry
 from hmc.experiments.experiment import Claim, Plan, Source
 from hmc.experiments.library import EXPERIMENTS, find_experiment
 from hmc.experiments.writing import report_folder
@@ -80,6 +80,11 @@ class Row:
         """Claims of the paper's that do not hold in the run that counts."""
         return tuple(claim for claim in self.results[0].claims if not claim.holds) if self.results else ()
 
+    @property
+    def why(self) -> str:
+        """Why it differs, as far as known; empty where it does not."""
+        return (self.entry.why or UNKNOWN) if self.differing else ""
+
 
 def summarise(out: Path) -> list[Row]:
     """All rows, in the order of the papers.
@@ -105,7 +110,7 @@ def summarise(out: Path) -> list[Row]:
 
 def _own_entry(name: str) -> Entry:
     experiment = find_experiment(name)
-    return Entry(name, OURS, experiment.title, experiment.source)
+    return Entry(name, OURS, experiment.title, experiment.source, why=OWN_REASONS.get(name, ""))
 
 
 def _row(out: Path, entry: Entry) -> Row:
