@@ -6,12 +6,13 @@ import pytest
 from posed import body_of
 
 from hmc.camera.model import project
-from hmc.experiments import Inputs, Plan, find_experiment, scalable_runs
+from hmc.experiments import Inputs, Plan, find_experiment, hiding, scalable_runs
 from hmc.experiments.experiment import Cell
-from hmc.experiments.fig_7_15 import ENDS, hidden_and_shown, waits
+from hmc.experiments.hiding import ENDS, LimbViews, hidden_and_shown, rest_of, waits
 from hmc.experiments.removal import remover
 from hmc.experiments.style import house_style
-from hmc.frontend import MaskStep
+from hmc.frontend import HullStep, MaskStep
+from hmc.landmarks import LANDMARKS
 from hmc.pose.body.flesh import flesh_points, place_points
 from hmc.pose.body.kinematics import landmarks, segment_transforms
 from hmc.pose.body.model import neutral_state
@@ -118,27 +119,83 @@ def test_waits_are_counted_from_the_first_frame_of_each_stretch():
     assert waits(since, reached) == [2, 2, 0]
 
 
-def test_limbs_that_are_dropped_too_late_fail_the_claim():
+def test_the_rest_has_no_landmark_of_a_hidden_limb():
+    hidden = np.zeros((2, len(ENDS)), bool)
+    hidden[0, list(ENDS).index("r_thigh")] = True
+    hidden[1, list(ENDS).index("l_forearm")] = True
+    assert [[name for name, there in zip(LANDMARKS, row, strict=True) if not there] for row in rest_of(hidden)] == [
+        ["r_knee", "r_ankle"],
+        ["l_wrist"],
+    ]
+
+
+def test_limbs_that_are_dropped_too_late_or_wrongly_fail_the_claim():
     assert [limb.name for limb in UNITIVE_PIECES.limbs] == list(ENDS)
-    n = 40
+    n, shank, forearm = 40, list(ENDS).index("r_shank"), list(ENDS).index("l_forearm")
     truth = np.repeat(walking()[:1], n, axis=0)
     occupancy = np.ones((n, len(ENDS)))
-    occupancy[10:30, 5] = 0.0  # the right shank
+    occupancy[10:30, shank] = 0.0
     hidden, shown = hidden_and_shown(occupancy)
     assert hidden.sum() == 20 and shown.sum() == n * len(ENDS) - 20
+    cameras = np.where(hidden, 3, 5)
+    off_m = np.full((n, len(LANDMARKS), 1), 0.03)
+    off_m[10:30, LANDMARKS.index("r_ankle")] = 0.3
 
-    def cell(method, first, last):
-        estimate = truth + 0.03
-        if first is not None:
-            estimate[first:last, -1] = np.nan
-        results = {"frames": np.arange(n), "fps": 30.0, "estimate_m": estimate, "truth_m": truth, "occupancy": occupancy}
-        return Cell({"recording": "mine@0", "method": method}, results)
+    def cell(method, *gone):
+        estimate = truth + off_m / np.sqrt(3)
+        for landmark, first, last in gone:
+            estimate[first:last, LANDMARKS.index(landmark)] = np.nan
+        results = {"frames": np.arange(n), "fps": 30.0, "estimate_m": estimate, "truth_m": truth}
+        return Cell({"recording": "mine@0", "method": method}, results | {"occupancy": occupancy, "cameras": cameras})
 
-    experiment = find_experiment("fig-7.15")
-    with house_style():
-        report = experiment.report([cell("APF", None, None), cell("DDM-APF", 14, 35), cell("SHBM-DDM-APF", 24, 35)], Plan(quick=True))
-        plt.close("all")
-    assert [claim.holds for claim in report.claims] == [True, False], report.claims
-    row = report.tables[0].rows[1]
+    def report(*cells):
+        with house_style():
+            made_of_it = find_experiment("fig-7.15").report(cells, Plan(quick=True))
+            plt.close("all")
+        return made_of_it
+
+    apf = cell("APF")
+    exact = report(apf, cell("DDM-APF", ("r_ankle", 14, 35)), cell("SHBM-DDM-APF", ("r_ankle", 24, 35)))
+    assert [claim.holds for claim in exact.claims] == [True, False], exact.claims
+    row = exact.tables[0].rows[1]
     assert (row["frames_to_drop"], row["frames_to_take_back"]) == (4, 5)
     assert row["of_these_dropped_percent"] == pytest.approx(80)
+    assert row["rest_mm"] == pytest.approx(30) and exact.tables[0].rows[0]["rest_mm"] == pytest.approx(30)
+    limbs = {(one["method"], one["limb"]): one for one in exact.tables[1].rows}
+    assert set(limbs) == {(method, "r_shank") for method in ("APF", "DDM-APF", "SHBM-DDM-APF")}
+    one = limbs["DDM-APF", "r_shank"]
+    assert (one["hidden_frames"], one["frames_to_drop"], one["frames_to_take_back"], one["of_these_dropped_wrongly"]) == (20, 4, 5, 5)
+    assert one["cameras_that_see_it_then"] == 3
+    assert limbs["APF", "r_shank"]["invented_mm"] == pytest.approx(300) and limbs["APF", "r_shank"]["frames_to_drop"] == 20
+    wrong = report(apf, cell("DDM-APF", ("r_ankle", 14, 35), *[("l_wrist", k, k + 9) for k in (0, 10, 20, 30)]))
+    assert [claim.holds for claim in wrong.claims] == [False]
+    assert {one["limb"]: one["of_these_dropped_wrongly"] for one in wrong.tables[1].rows if one["method"] == "DDM-APF"} == {
+        "r_shank": 5,
+        "l_forearm": 36,
+    }
+    assert shown[:, forearm].all()
+
+
+def test_what_cameras_and_hulls_show_of_limbs_is_kept_beside_the_recording(tmp_path, monkeypatch):
+    views = LimbViews(np.ones((2, 8)), np.full((2, 8), 4.0))
+    asked = []
+    monkeypatch.setattr(hiding, "_limb_views", lambda inputs, label: asked.append(label) or views)
+    for _ in range(2):
+        kept = hiding.limb_views(Inputs(tmp_path), "mine@0")
+        np.testing.assert_array_equal(kept.occupancy, views.occupancy)
+        np.testing.assert_array_equal(kept.cameras, views.cameras)
+    assert asked == ["mine@0"] and (tmp_path / "mine@0" / "limbs.npz").is_file()
+
+
+def test_a_silhouette_s_share_of_points_is_that_of_a_loop(ring):
+    rng = np.random.default_rng(5)
+    points = rng.uniform([-1, -1, 0], [1, 1, 2], (50, 3))
+    masks = [None] + [rng.random(camera.size[::-1]) < 0.5 for camera in ring][1:]
+    expected = []
+    for camera, mask in list(zip(ring, masks, strict=True))[1:]:
+        uv, valid = project(camera, points)
+        inside = [ok and 0 <= round(u) < camera.size[0] and 0 <= round(v) < camera.size[1] for (u, v), ok in zip(uv, valid, strict=True)]
+        expected.append(sum(ok and mask[round(v), round(u)] for (u, v), ok in zip(uv, inside, strict=True)) / 50)
+    nothing = (None,) * len(masks)
+    hull = HullStep(0, nothing, tuple(masks), nothing, np.zeros(0), np.zeros(0), np.zeros(0))
+    assert list(hiding._shares(ring, hull, points)) == pytest.approx(expected)

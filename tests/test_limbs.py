@@ -10,10 +10,11 @@ from numpy.testing import assert_allclose, assert_array_equal
 from posed import body_of
 
 from hmc.errors import InputError
+from hmc.landmarks import LANDMARKS
 from hmc.pose.annealed.apf import make_filter, pose_init, score_maps
 from hmc.pose.annealed.hull_target import make_target
 from hmc.pose.annealed.presets import PRESETS
-from hmc.pose.annealed.scores import scores
+from hmc.pose.annealed.scores import make_score_table, scores
 from hmc.pose.annealed.symmetric import symmetric_cost
 from hmc.pose.body.flesh import cone_distance, flesh_points, place_points
 from hmc.pose.body.joints import N_DOF, dof_index
@@ -22,8 +23,8 @@ from hmc.pose.body.model import PARTS, neutral_state
 from hmc.pose.scalable.limbs import LimbMemory, LimbSettings, limb_spread_deg, look_again
 from hmc.pose.scalable.methods import method_preset
 from hmc.pose.scalable.models import MODEL_1, MODEL_2, UNITIVE, UNITIVE_PIECES
-from hmc.pose.scalable.restrict import SymmetricData, nearest_part, part_mask, restrict_table
-from hmc.pose.scalable.scouts import limb_occupancy, scout
+from hmc.pose.scalable.restrict import SymmetricData, coarser_table, nearest_part, part_mask, restrict_table
+from hmc.pose.scalable.scouts import in_doubt, limb_occupancy, scout
 from hmc.pose.scalable.step import scalable_step, suited
 from hmc.voxels.grid import VoxelGrid
 
@@ -77,19 +78,35 @@ def test_scores_of_kept_parts_are_those_of_the_whole_body(filters):
     assert not scores(restrict_table(table, alone), states, maps)[..., 1].any()
 
 
+@pytest.mark.parametrize("every", [2, 3])
+def test_a_coarser_table_is_that_of_fewer_points(filters, every):
+    table = filters["default"].table
+    flesh = table.flesh
+    order = np.lexsort((flesh.segment, ~flesh.is_surface, flesh.part))
+    rows = np.sort(np.concatenate([order[start:stop:every] for *_, start, stop in table.blocks]))
+    few = replace(flesh, **{name: getattr(flesh, name)[rows] for name in ("points", "segment", "part", "is_surface")})
+    expected = make_score_table(table.body, few)
+    coarse = coarser_table(table, every)
+    assert_array_equal(coarse.counts, expected.counts)
+    states = standing() + np.random.default_rng(4).normal(0, 0.1, (5, N_DOF))
+    maps = score_maps(hull_of(standing()), None)
+    assert_array_equal(scores(coarse, states, maps)[..., [0, 2, 3]], scores(expected, states, maps)[..., [0, 2, 3]])
+    assert_array_equal(scores(coarse, states, maps)[..., 1], scores(table, states, maps)[..., 1])
+
+
 def test_the_likelihood_of_some_parts_does_not_know_the_others(filters):
     filt, target = filters["default"], hull_of(standing())
     data = SymmetricData(target, target.surface, nearest_part(filt.body, standing(), target.surface))
     rng = np.random.default_rng(1)
     states = standing() + rng.normal(0, 0.05, (6, N_DOF))
-    whole = data.log_likelihood(filt, states, ALL)
+    whole = data.likelihood(filt, ALL)(states)
     assert_array_equal(whole, -symmetric_cost(filt.body, filt.samples, states, target, target.surface, filt.preset.symmetric))
     keep = without("r_thigh", "r_shank")
     moved = states.copy()
     moved[:, dof_index("r_hip_x", "r_hip_y", "r_hip_z", "r_knee_y")] += rng.normal(0, 0.5, (6, 4))
     rest = replace(filt, preset=replace(filt.preset, symmetric=replace(filt.preset.symmetric, posture_weight=0.0)))
-    assert_allclose(data.log_likelihood(rest, moved, keep), data.log_likelihood(rest, states, keep), rtol=1e-4)
-    assert np.all(np.abs(data.log_likelihood(rest, moved, ALL) - data.log_likelihood(rest, states, ALL)) > 1e-6)
+    assert_allclose(data.likelihood(rest, keep)(moved), data.likelihood(rest, keep)(states), rtol=1e-4)
+    assert np.all(np.abs(data.likelihood(rest, ALL)(moved) - data.likelihood(rest, ALL)(states)) > 1e-6)
 
 
 def test_the_nearest_part_is_that_of_the_nearest_cone():
@@ -172,6 +189,37 @@ def test_occupancy_and_scouts_tell_a_limb_that_is_there_from_one_that_is_not(fil
     assert np.median([one.spread_deg for one in found]) < settings.found_spread_deg
     lost = [scout(np.random.default_rng(seed), table, missing, state, limb, active, settings) for seed in range(4)]
     assert max(one.occupancy for one in lost) < settings.found_occupancy
+
+
+def test_a_forearm_is_in_doubt_when_its_arm_has_drawn_back_into_the_trunk(filters):
+    settings, table = filters["default"].preset.limbs, filters["default"].table
+    active = np.ones(len(LIMBS), bool)
+    hanging, inside, kneeling = standing(), standing(), standing(0.6)
+    inside[dof_index("l_shoulder_x", "l_elbow_z")] -= np.radians([30.0, 20.0])
+    kneeling[dof_index("r_knee_y", "l_knee_y")] = np.radians(140.0)
+    in_trunk = landmarks(table.body, inside)[LANDMARKS.index("l_elbow")] - landmarks(table.body, inside)[LANDMARKS.index("neck")]
+    assert np.linalg.norm(in_trunk[:2]) < 0.12
+
+    def doubted(state):
+        maps = score_maps(hull_of(state), None)
+        return {name for k, name in enumerate(LIMBS) if in_doubt(table, maps, state, k, active, settings)}
+
+    assert doubted(hanging) == set()
+    assert doubted(kneeling) == set()
+    assert doubted(inside) == {"l_forearm"}
+
+
+def test_scouts_find_a_shank_although_its_thigh_has_gone_astray(filters):
+    filt = filters["default"]
+    state = standing()
+    state[dof_index("r_knee_y", "r_hip_y")] = np.radians([60.0, -30.0])
+    maps, limb = score_maps(hull_of(state), None), LIMBS.index("r_shank")
+    astray = state.copy()
+    astray[dof_index("r_hip_y")] += np.radians(50.0)
+    active = filt.preset.limbs.tree.possible(np.arange(len(LIMBS)) != limb)
+    found = [scout(np.random.default_rng(seed), filt.table, maps, astray, limb, active, filt.preset.limbs) for seed in range(5)]
+    away = [np.linalg.norm(landmarks(filt.body, one.state) - landmarks(filt.body, state), axis=1).max() for one in found]
+    assert np.median(away) < 0.12
 
 
 def test_a_hidden_shank_is_dropped_and_taken_back_and_the_rest_stays(filters):

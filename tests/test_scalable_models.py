@@ -35,6 +35,8 @@ def test_an_angle_or_part_that_breaks_inclusion_is_named():
         Inclusive("mine", (small, Model("large", ("root_tx", "root_rz", "neck_x"), ("torso", "head"))))
     with pytest.raises(InputError, match=r"'large' lacks the part 'head' of 'small'"):
         Inclusive("mine", (small, Model("large", ("root_tx", "root_ty", "neck_x"), ("torso",))))
+    with pytest.raises(InputError, match="`thinning` must be a whole number of at least 1"):
+        Inclusive("mine", (small,), thinning=0)
     with pytest.raises(InputError, match="adds no angle"):
         Inclusive("mine", (small, replace(small, name="same")))
 
@@ -89,7 +91,7 @@ def text_of(models, kind, extra=""):
 
 def test_models_come_back_from_a_file(tmp_path):
     path = tmp_path / "mine.toml"
-    path.write_text(text_of([("model", one) for one in MODEL_2.models], "inclusive", 'name = "2"'))
+    path.write_text(text_of([("model", one) for one in MODEL_2.models], "inclusive", 'name = "2"\nthinning = 2'))
     assert read_hierarchy(path) == MODEL_2
     path.write_text(
         text_of([("leaf", leaf) for leaf in UNITIVE.leaves], "unitive", f'name = "figure 7.11"\nneeds = {[list(n) for n in UNITIVE.needs]}')

@@ -1,7 +1,7 @@
 """Figure 7.15: DDM-APF against APF behind furniture: hidden limbs are dropped and taken back, the rest is kept.
 
-Source: Canton (2009), section 7.5.2, which shows pictures. Here it is measured: a limb is hidden where less than 30 % of its true flesh is
-in the tolerant hull, of what is free of other parts, and shown where more than 60 % is; between the two, either is right.
+Source: Canton (2009), section 7.5.2, which shows pictures. Here it is measured, limb by limb (`hmc.experiments.hiding`). The thresholds of
+DDM-APF were found on `counter`; `workbench` has another room, table, person and motion, and nothing was fitted to it.
 """
 
 from __future__ import annotations
@@ -14,154 +14,144 @@ import numpy as np
 
 from hmc.experiments import scalable_runs as runs
 from hmc.experiments.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
-from hmc.experiments.filter_runs import HEIGHT_M
+from hmc.experiments.hiding import ENDS, hidden_and_shown, limb_views, rest_of, waits
 from hmc.experiments.inputs import Inputs, rendered
-from hmc.experiments.markerless_runs import FRONTEND, MASKS_KEY, tracked
-from hmc.experiments.pose_runs import VOXEL_M, estimates, first_truth, standing_state
-from hmc.frontend import stream_hulls
+from hmc.experiments.markerless_runs import tracked
+from hmc.experiments.pose_runs import estimates, first_truth
 from hmc.landmarks import landmark_index
-from hmc.mask_store import kept_masks
 from hmc.metrics.landmarks import landmark_errors
-from hmc.pose.annealed.apf import make_filter, score_maps
 from hmc.pose.annealed.presets import pose_preset
-from hmc.pose.body.inverse import fit_landmarks
-from hmc.pose.body.proportions import default_body
-from hmc.pose.scalable.limbs import LimbSettings
 from hmc.pose.scalable.methods import method_preset
-from hmc.pose.scalable.models import UNITIVE_PIECES
-from hmc.pose.scalable.restrict import part_mask
-from hmc.pose.scalable.scouts import limb_occupancy
-from hmc.pose.sequence import targets_of
-from hmc.recording import Recording
-from hmc.results import PoseTable, TrackTable
-from hmc.tracking.resumable import person_grid
 
-__all__ = ["EXPERIMENT", "hidden_and_shown", "waits"]
+__all__ = ["EXPERIMENT"]
 
-METHODS = (runs.APF, "DDM-APF", "SHBM-DDM-APF")
-#: Recordings of people behind furniture.
-RECORDINGS = {False: ("counter", "pick_up", "sit"), True: ("counter",)}
-HIDDEN, SHOWN = 0.3, 0.6
-#: Limbs that may be missing, and the landmark that tells whether one is.
-ENDS = {"r_upper_arm": "r_elbow", "r_forearm": "r_wrist", "l_upper_arm": "l_elbow", "l_forearm": "l_wrist",
-        "r_thigh": "r_knee", "r_shank": "r_ankle", "l_thigh": "l_knee", "l_shank": "l_ankle"}  # fmt: skip
-#: Frames within which a hidden limb must be dropped, and one that is shown again taken back.
-DROP_FRAMES, BACK_FRAMES = 10, 15
+#: Methods and recordings of people behind furniture, by `plan.quick`.
+METHODS = {False: (runs.APF, "DDM-APF", "SHBM-DDM-APF"), True: (runs.APF, "DDM-APF")}
+RECORDINGS = {False: ("counter", "workbench", "pick_up", "sit"), True: ("counter", "workbench")}
+#: Frames within which a hidden limb must be dropped, and one that is shown again taken back; error of the rest; share of the frames in
+#: which a shown limb may be missing, percent.
+DROP_FRAMES, BACK_FRAMES, REST_MM, WRONG_PERCENT = 10, 15, 60.0, 5.0
+_ENDS = [landmark_index(name) for name in ENDS.values()]
 
 
 def grid(plan: Plan) -> list[dict]:
     """Every method on every recording."""
     sources = plan.recordings or tuple(rendered(name) for name in RECORDINGS[plan.quick])
-    return [{"recording": source.label, "method": method} for source in sources for method in METHODS]
+    return [{"recording": source.label, "method": method} for source in sources for method in METHODS[plan.quick]]
 
 
 def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Results:
-    """Poses from videos alone by the preset `default`, and how much of every true limb the hull has."""
-    recording, tracks, masks = tracked(inputs, parameters["recording"], 0)
-    truth = first_truth(recording)
+    """Poses from videos alone by the preset `default`, and how much of every true limb the recording shows."""
+    label = parameters["recording"]
+    recording, tracks, masks = tracked(inputs, label, 0)
     name, models = runs.METHODS[parameters["method"]]
     preset = method_preset(pose_preset("default"), name, models)
-    results = runs.chain(recording, tracks, masks, truth, preset, int(rng.integers(2**31)))
-    return results | {"occupancy": _occupancy(recording, tracks, masks, truth)}
+    results = runs.chain(recording, tracks, masks, first_truth(recording), preset, int(rng.integers(2**31)))
+    views = limb_views(inputs, label)
+    return results | {"occupancy": views.occupancy, "cameras": views.cameras}
 
 
-def _occupancy(recording: Recording, tracks: TrackTable, masks, truth: PoseTable) -> np.ndarray:
-    """Of every limb in every true frame, shape (n, n_limbs); NaN where it cannot be told."""
-    grid = person_grid(recording, VOXEL_M)
-    preset = method_preset(pose_preset("default"), "ddm-apf")
-    body = default_body(float(recording.subject_height_m[0]) if recording.subject_height_m else HEIGHT_M)
-    table = make_filter(body, preset, recording.fps, VOXEL_M, recording.room).table
-    limbs = LimbSettings(tree=UNITIVE_PIECES).tree.limbs
-    whole = part_mask(UNITIVE_PIECES.unions[-1].model.parts)
-    out = np.full((len(truth.frames), len(limbs)), np.nan)
-    first, last = int(truth.frames[0]), int(truth.frames[-1]) + 1
-    state = standing_state(body, truth.positions[0])
-    where = TrackTable(truth.frames, np.zeros(len(truth.frames), int), truth.positions.mean(axis=1))
-    kept = kept_masks(masks, MASKS_KEY, first, last)
-    for hull in stream_hulls(recording, grid, FRONTEND, first=first, last=last, masks=kept, on_problem=lambda line: None):
-        row = np.flatnonzero(truth.frames == hull.index)
-        target = targets_of(recording, grid, where, hull).get(0)
-        if not len(row) or target is None or table is None:
+def _limb_rows(one: Cell) -> list[dict[str, Any]]:
+    """Of a cell, a row a limb that is hidden or left out at some time."""
+    estimate, truth = estimates(one)
+    errors = 1000 * np.linalg.norm(estimate - truth, axis=-1)
+    hidden, shown = hidden_and_shown(one.results["occupancy"])
+    missing = np.isnan(estimate[:, _ENDS, 0])
+    cameras = np.asarray(one.results["cameras"], float)
+    rows = []
+    for k, (limb, end) in enumerate(zip(ENDS, _ENDS, strict=True)):
+        if not (hidden[:, k].any() or missing[:, k].any()):
             continue
-        state, _ = fit_landmarks(body, truth.positions[row[0]], state)
-        maps = score_maps(target, recording.room)
-        # What hangs on a limb goes with it, so that a bent knee does not cover the thigh.
-        out[row[0]] = [limb_occupancy(table, state, maps, limb.parts, whole) for limb in limbs]
-    return out
+        there = hidden[:, k] & ~missing[:, k]
+        rows.append(
+            {
+                "recording": one.parameters["recording"].rpartition("@")[0],
+                "method": one.parameters["method"],
+                "limb": limb,
+                "hidden_frames": int(hidden[:, k].sum()),
+                "cameras_that_see_it_then": float(np.nanmean(cameras[hidden[:, k], k])) if hidden[:, k].any() else None,
+                "of_these_dropped_percent": 100 * float(missing[hidden[:, k], k].mean()) if hidden[:, k].any() else None,
+                "frames_to_drop": max(waits(hidden[:, k], missing[:, k]), default=None),
+                "shown_frames": int(shown[:, k].sum()),
+                "of_these_dropped_wrongly": int((missing & shown)[:, k].sum()),
+                "frames_to_take_back": max(waits(shown[:, k], ~missing[:, k]), default=None),
+                "invented_mm": float(errors[there, end].mean()) if there.any() else None,
+            }
+        )
+    return rows
 
 
-def hidden_and_shown(occupancy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Which limbs are hidden in which frames, and which are shown; neither where it is in between or unknown."""
-    occupancy = np.asarray(occupancy, float)
-    return occupancy < HIDDEN, occupancy > SHOWN
+def _row(one: Cell) -> dict[str, Any]:
+    """Of a cell, errors of the rest and of all that is estimated, and what is dropped, of all limbs together."""
+    estimate, truth = estimates(one)
+    errors = 1000 * landmark_errors(estimate, truth)
+    hidden, shown = hidden_and_shown(one.results["occupancy"])
+    missing, rest = np.isnan(estimate[:, _ENDS, 0]), rest_of(hidden)
+    drops = [wait for k in range(len(ENDS)) for wait in waits(hidden[:, k], missing[:, k])]
+    backs = [wait for k in range(len(ENDS)) for wait in waits(shown[:, k], ~missing[:, k])]
+    return {
+        "recording": one.parameters["recording"].rpartition("@")[0],
+        "method": one.parameters["method"],
+        "mean_mm": float(errors[np.isfinite(errors)].mean()),
+        "rest_mm": float(errors[rest & np.isfinite(errors)].mean()),
+        "rest_MMTA_percent": 100 * float(np.mean(errors[rest] < 100)),
+        "rest_MMTA_50_percent": 100 * float(np.mean(errors[rest] < 50)),
+        "hidden_limb_frames": int(hidden.sum()),
+        "of_these_dropped_percent": 100 * float(missing[hidden].mean()) if hidden.any() else None,
+        "shown_limb_frames": int(shown.sum()),
+        "of_these_dropped_wrongly_percent": 100 * float(missing[shown].mean()) if shown.any() else None,
+        "frames_to_drop": max(drops, default=0),
+        "frames_to_take_back": max(backs, default=0),
+    }
 
 
-def waits(since: np.ndarray, reached: np.ndarray) -> list[int]:
-    """For every stretch of frames in which something holds, after how many of them something else was reached: all where it was not.
-
-    Parameters
-    ----------
-    since, reached : ndarray of bool, shape (n,)
-    """
-    edges = np.flatnonzero(np.diff(np.r_[False, since, False].astype(int)))
-    return [int(np.argmax(np.r_[reached[start:stop], True])) for start, stop in edges.reshape(-1, 2)]
+def _claim(row: dict[str, Any], apf: dict[str, Any]) -> Claim:
+    wrong = row["of_these_dropped_wrongly_percent"] or 0.0
+    return Claim(
+        f"{row['recording']}: {row['method']} drops hidden limbs within {DROP_FRAMES} frames and no others, takes them back within "
+        f"{BACK_FRAMES}, and keeps the rest within {REST_MM:.0f} mm",
+        row["frames_to_drop"] <= DROP_FRAMES
+        and row["frames_to_take_back"] <= BACK_FRAMES
+        and row["rest_mm"] <= REST_MM
+        and wrong <= WRONG_PERCENT,
+        f"{row['frames_to_drop']} and {row['frames_to_take_back']} frames, {wrong:.1f} % of shown limbs' frames dropped wrongly, "
+        f"{row['rest_mm']:.1f} mm; APF {apf['rest_mm']:.1f} mm",
+    )
 
 
 def report(cells: Sequence[Cell], plan: Plan) -> Report:
-    """Error of what is estimated, limbs dropped and taken back, and a picture of both over time."""
-    rows: list[dict[str, Any]] = []
+    """What is dropped and taken back limb by limb, errors of the rest, and a picture of both over time."""
     labels = list(dict.fromkeys(one.parameters["recording"] for one in cells))
     figure, panels = plt.subplots(2, len(labels), figsize=(5.2 * len(labels), 5), sharex="col", squeeze=False)
-    ends = [landmark_index(name) for name in ENDS.values()]
+    rows, limbs, claims = [], [], []
     for column, label in zip(panels.T, labels, strict=True):
-        for one in (one for one in cells if one.parameters["recording"] == label):
+        chosen = [one for one in cells if one.parameters["recording"] == label]
+        hidden, _ = hidden_and_shown(chosen[0].results["occupancy"])
+        for one in chosen:
             estimate, truth = estimates(one)
-            errors = 1000 * landmark_errors(estimate, truth)
-            errors[np.isinf(errors)] = np.nan  # no estimate
-            missing = np.isnan(estimate[:, ends, 0])
-            hidden, shown = hidden_and_shown(one.results["occupancy"])
-            drops = [wait for k in range(len(ENDS)) for wait in waits(hidden[:, k], missing[:, k])]
-            backs = [wait for k in range(len(ENDS)) for wait in waits(shown[:, k], ~missing[:, k])]
-            rows.append(
-                {
-                    "recording": label.rpartition("@")[0],
-                    "method": one.parameters["method"],
-                    "mean_mm": float(np.nanmean(errors)),
-                    "MMTA_percent": 100 * float(np.mean(errors < 100)),
-                    "MMTA_50_percent": 100 * float(np.mean(errors < 50)),
-                    "hidden_limb_frames": int(hidden.sum()),
-                    "of_these_dropped_percent": 100 * float(missing[hidden].mean()) if hidden.any() else None,
-                    "shown_limb_frames": int(shown.sum()),
-                    "of_these_dropped_wrongly_percent": 100 * float(missing[shown].mean()) if shown.any() else None,
-                    "frames_to_drop": max(drops, default=0),
-                    "frames_to_take_back": max(backs, default=0),
-                }
-            )
-            column[0].plot(one.results["frames"], np.nanmean(errors, axis=1), label=one.parameters["method"])
-            column[1].plot(one.results["frames"], missing.sum(axis=1), label=one.parameters["method"])
-        column[1].plot(one.results["frames"], hidden.sum(axis=1), "k:", label="hidden in truth")
-        column[0].set(title=label.rpartition("@")[0], ylabel="mean of what is estimated (mm)")
+            errors = np.where(rest_of(hidden), 1000 * np.linalg.norm(estimate - truth, axis=-1), np.nan)
+            seen = np.isfinite(errors).any(axis=1)
+            frames = np.asarray(one.results["frames"])
+            column[0].plot(frames[seen], np.nanmean(errors[seen], axis=1), label=one.parameters["method"])
+            column[1].plot(frames, np.isnan(estimate[:, _ENDS, 0]).sum(axis=1), label=one.parameters["method"])
+            limbs += _limb_rows(one)
+        column[1].plot(frames, hidden.sum(axis=1), "k:", label="hidden in truth")
+        column[0].set(title=label.rpartition("@")[0], ylabel="mean error of the rest (mm)")
         column[1].set(xlabel="frame", ylabel="limbs left out")
+        own = [_row(one) for one in chosen]
+        rows += own
+        claims += [_claim(row, own[0]) for row in own[1:]]
     panels[0, 0].legend(fontsize=7)
     panels[1, 0].legend(fontsize=7)
-    claims = []
-    for label in dict.fromkeys(row["recording"] for row in rows):
-        apf, *others = [row for row in rows if row["recording"] == label]
-        for row in others:
-            claims.append(
-                Claim(
-                    f"{label}: {row['method']} drops hidden limbs within {DROP_FRAMES} frames, takes them back within {BACK_FRAMES}, "
-                    "and keeps the rest within 60 mm",
-                    row["frames_to_drop"] <= DROP_FRAMES and row["frames_to_take_back"] <= BACK_FRAMES and row["mean_mm"] <= 60,
-                    f"{row['frames_to_drop']} and {row['frames_to_take_back']} frames, {row['mean_mm']:.1f} mm; "
-                    f"APF {apf['mean_mm']:.1f} mm",
-                )
-            )
     caption = (
-        "Limbs that furniture hides: error of what is estimated, hidden limbs that are left out, shown limbs that are left out "
-        "wrongly, and the longest wait until a hidden limb is dropped and a shown one taken back, frames."
+        "Limbs that furniture hides: errors of all that is estimated and of the landmarks of no hidden limb, hidden limbs that are left "
+        "out, shown limbs that are left out wrongly, and the longest waits, frames."
     )
-    return Report((Table("fig-7.15", caption, rows),), {"fig-7.15": figure}, tuple(claims))
+    by_limb = (
+        "Limb by limb: in how many frames it is hidden, how many cameras see half of it then, the longest wait until it is dropped "
+        "and until it is taken back, frames, and the error of its end where it is estimated though hidden."
+    )
+    return Report((Table("fig-7.15", caption, rows), Table("fig-7.15-limbs", by_limb, limbs)), {"fig-7.15": figure}, tuple(claims))
 
 
-EXPERIMENT = Experiment("fig-7.15", "limbs hidden by furniture", "Canton, Figure 7.15", grid, cell, report)
+EXPERIMENT = Experiment("fig-7.15", "limbs hidden by furniture", "Canton, Figure 7.15", grid, cell, report, version=2)

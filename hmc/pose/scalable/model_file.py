@@ -14,7 +14,7 @@ from hmc.pose.scalable.models import Inclusive, Model, Union, Unitive
 
 __all__ = ["read_hierarchy"]
 
-_KEYS = {"inclusive": ("kind", "name", "held", "model"), "unitive": ("kind", "name", "leaf", "union", "needs")}
+_KEYS = {"inclusive": ("kind", "name", "held", "thinning", "model"), "unitive": ("kind", "name", "leaf", "union", "needs")}
 _MODEL_KEYS = ("name", "angles", "parts")
 _UNION_KEYS = (*_MODEL_KEYS, "of")
 
@@ -49,7 +49,7 @@ def read_hierarchy(path: str | Path) -> Inclusive | Unitive:
     try:
         if kind == "inclusive":
             models = tuple(_model(item, f"[[model]] {k + 1}") for k, item in enumerate(_tables(content, "model")))
-            return Inclusive(name, models, content.get("held", "last"))
+            return Inclusive(name, models, content.get("held", "last"), content.get("thinning", 1))
         leaves = [_model(item, f"[[leaf]] {k + 1}") for k, item in enumerate(_tables(content, "leaf"))]
         known, unions = {leaf.name: leaf for leaf in leaves}, []
         for k, item in enumerate(_tables(content, "union")):

@@ -73,6 +73,8 @@ class Inclusive:
     held : {"last", "rest"}
         Where the angles are that a part needs and its model does not have: where the most detailed model last saw them, or at rest
         (a straight limb).
+    thinning : int
+        All models but the last are compared with the data at every so many-th point of their flesh.
 
     Raises
     ------
@@ -83,12 +85,15 @@ class Inclusive:
     name: str
     models: tuple[Model, ...]
     held: Literal["last", "rest"] = "last"
+    thinning: int = 1
 
     def __post_init__(self) -> None:
         if not self.models:
             raise InputError(f"hierarchy '{self.name}': has no models")
         if self.held not in ("last", "rest"):
             raise InputError(f"hierarchy '{self.name}': `held` must be 'last' or 'rest'; got {self.held!r}")
+        if isinstance(self.thinning, bool) or not isinstance(self.thinning, int) or self.thinning < 1:
+            raise InputError(f"hierarchy '{self.name}': `thinning` must be a whole number of at least 1; got {self.thinning!r}")
         for lower, upper in zip(self.models[:-1], self.models[1:], strict=True):
             for what, inner, outer in (("angle", lower.angles, upper.angles), ("part", lower.parts, upper.parts)):
                 lost = [name for name in inner if name not in outer]
@@ -254,7 +259,7 @@ def _shbm(name: str, first_parts: tuple[str, ...]) -> Inclusive:
     """Figure 7.7 with the dimensions of Eq. 7.18, the last one the whole body: 6, 16 and 27.
 
     The trunk carries along the limbs that the next model moves, as they were last seen: alone it slides about in the hull (measured:
-    docs/scalable.md).
+    docs/scalable.md). Half of the flesh is enough to find the trunk and the limbs' directions.
     """
     return Inclusive(
         name,
@@ -263,6 +268,7 @@ def _shbm(name: str, first_parts: tuple[str, ...]) -> Inclusive:
             Model("limbs", (*_ROOT, *_SECOND), first_parts),
             Model("body", (*_ROOT, *_SECOND, *_THIRD, *_TRUNK), PARTS),
         ),
+        thinning=2,
     )
 
 

@@ -10,15 +10,26 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from hmc.montecarlo.filters import LogLikelihood
 from hmc.pose.annealed.apf import PoseFilter
 from hmc.pose.annealed.hull_target import HullTarget
 from hmc.pose.annealed.scores import ScoreMaps, ScoreTable, ScoreVariances, log_likelihood_factorised, log_likelihood_global, scores
-from hmc.pose.annealed.symmetric import BodyPoints, body_distance, symmetric_cost
+from hmc.pose.annealed.symmetric import BodyPoints, body_distance, symmetric_cost, thinned
 from hmc.pose.body.flesh import SurfaceSamples
 from hmc.pose.body.joints import SEGMENTS
 from hmc.pose.body.model import PARTS, BodyModel, Cones
 
-__all__ = ["ScoreData", "SymmetricData", "nearest_part", "part_body", "part_mask", "restrict_filter", "restrict_table", "restrict_target"]
+__all__ = [
+    "ScoreData",
+    "SymmetricData",
+    "coarser_table",
+    "nearest_part",
+    "part_body",
+    "part_mask",
+    "restrict_filter",
+    "restrict_table",
+    "restrict_target",
+]
 
 
 def part_mask(parts: Collection[str]) -> np.ndarray:
@@ -68,11 +79,34 @@ def restrict_table(table: ScoreTable, keep: np.ndarray) -> ScoreTable:
     table : ScoreTable
     keep : ndarray of bool, shape (n_parts,)
     """
+    if keep.all():
+        return table
     overlap = table.overlap
     there = keep[overlap.pieces.part]
     joined = there[overlap.joints.hanging] & there[overlap.joints.holding]
     overlap = replace(overlap, pairs=overlap.pairs[there[overlap.pairs].all(axis=1)], joint_shares=overlap.joint_shares * joined)
     return replace(table, blocks=tuple(block for block in table.blocks if keep[block[0]]), overlap=overlap)
+
+
+def coarser_table(table: ScoreTable, every: int) -> ScoreTable:
+    """Every so many-th point of each run of the flesh; what is estimated of overlaps stays.
+
+    Parameters
+    ----------
+    table : ScoreTable
+    every : int
+        1 or more.
+    """
+    if every == 1:
+        return table
+    blocks, rows, counts, n = [], [np.zeros(0, int)], np.zeros_like(table.counts), 0
+    for part, segment, is_surface, start, stop in table.blocks:
+        rows.append(np.arange(start, stop, every))
+        blocks.append((part, segment, is_surface, n, n + len(rows[-1])))
+        counts[part, : 4 if is_surface else 3] += len(rows[-1])
+        n += len(rows[-1])
+    # Parts without flesh have scores that nobody reads.
+    return replace(table, points=table.points[np.concatenate(rows)], blocks=tuple(blocks), counts=np.maximum(counts, 1))
 
 
 def nearest_part(body: BodyModel, state: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -122,12 +156,13 @@ class SymmetricData:
     points: np.ndarray
     part: np.ndarray
 
-    def log_likelihood(self, filt: PoseFilter, states: np.ndarray, keep: np.ndarray) -> np.ndarray:
-        """Of the kept parts of states (n, 27), shape (n,); `filt` is the whole body's."""
-        one, target = restrict_filter(filt, keep), restrict_target(self.target, keep)
+    def likelihood(self, filt: PoseFilter, keep: np.ndarray, every: int = 1) -> LogLikelihood:
+        """Of the kept parts, at every so many-th point of the body's surface; `filt` is the whole body's."""
+        one, target, settings = restrict_filter(filt, keep), restrict_target(self.target, keep), filt.preset.symmetric
+        samples = one.samples if every == 1 else thinned(one.samples, max(1, len(one.samples.surface.points) // every))
         points = self.points[keep[self.part]]
         points = points if len(points) else self.points[:1]
-        return -symmetric_cost(one.body, one.samples, states, target, points, filt.preset.symmetric)
+        return lambda states: -symmetric_cost(one.body, samples, states, target, points, settings)
 
 
 @dataclass(frozen=True)
@@ -136,12 +171,12 @@ class ScoreData:
 
     maps: ScoreMaps
 
-    def log_likelihood(self, filt: PoseFilter, states: np.ndarray, keep: np.ndarray) -> np.ndarray:
-        """Of the kept parts of states (n, 27), shape (n,); `filt` is the whole body's, with a table of its flesh."""
+    def likelihood(self, filt: PoseFilter, keep: np.ndarray, every: int = 1) -> LogLikelihood:
+        """Of the kept parts, at every so many-th point of the flesh; `filt` is the whole body's, with a table of its flesh."""
         if filt.table is None:
             raise ValueError("`filt` has no table of its flesh")
-        values = scores(restrict_table(filt.table, keep), states, self.maps)[:, keep]
-        variances = ScoreVariances()
+        table = coarser_table(restrict_table(filt.table, keep), every)
+        variances, counts = ScoreVariances(), table.counts[keep]
         if filt.preset.likelihood == "global":
-            return log_likelihood_global(values, filt.table.counts[keep], variances.whole_body())
-        return log_likelihood_factorised(values, variances.by_part()[keep])
+            return lambda states: log_likelihood_global(scores(table, states, self.maps)[:, keep], counts, variances.whole_body())
+        return lambda states: log_likelihood_factorised(scores(table, states, self.maps)[:, keep], variances.by_part()[keep])

@@ -1,7 +1,7 @@
 """Scouts: annealed filters that look for a missing limb where it may be (Canton 2009, section 7.4.1).
 
 A scout moves the missing limb widely, and with it the limb on which it hangs (elbow and shoulder say together where a forearm is), and
-leaves the rest of the body where the tracked limbs' filter has put it. It never changes that estimate.
+leaves the rest of the body where the tracked limbs' filter has put it. Only a limb that is found changes that estimate.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ TWISTS = dof_index("r_shoulder_y", "l_shoulder_y", "r_hip_z", "l_hip_z")
 #: How far the limb on which a missing one hangs is moved, against the missing one.
 SEEN_SHARE = 0.2
 
-__all__ = ["ScoutReport", "limb_dofs", "limb_occupancy", "scout"]
+__all__ = ["ScoutReport", "in_doubt", "limb_dofs", "limb_occupancy", "scout"]
 
 
 @dataclass(frozen=True)
@@ -97,6 +97,33 @@ def limb_occupancy(table: ScoreTable, state: np.ndarray, maps: ScoreMaps, parts:
     return float(maps.occupancy[tuple(index[inside].T)].sum() / len(index))
 
 
+def in_doubt(table: ScoreTable, maps: ScoreMaps, state: np.ndarray, limb: int, active: np.ndarray, settings: LimbSettings) -> bool:
+    """Whether a tracked limb is not shown: its free flesh is in the void, or it has drawn back into the trunk, or what it hangs on has.
+
+    A limb that furniture hides often ends up there: it is the only place of the hull that is left for it.
+
+    Parameters
+    ----------
+    table, maps
+        As for `limb_occupancy`.
+    state : ndarray, shape (27,)
+    limb : int
+        Place in the tree's `limbs`.
+    active : ndarray of bool, shape (n_limbs,)
+    settings : LimbSettings
+    """
+    tree = settings.tree
+    own, there = tree.limbs[limb].parts, part_mask(tree.model(active).parts)
+    if limb_occupancy(table, state, maps, own, there) < settings.lost_occupancy:
+        return True
+    if tree.parent[limb] < 0:
+        return False
+    # A shank against the thigh of who kneels, or a forearm against the upper arm, says nothing.
+    holding = tree.limbs[tree.parent[limb]].parts
+    others = there & ~part_mask([*own, *holding])
+    return any(np.isnan(limb_occupancy(table, state, maps, one, others)) for one in (own, holding))
+
+
 def scout(
     rng: np.random.Generator,
     table: ScoreTable,
@@ -143,6 +170,8 @@ def scout(
         ]
     )
     starts[:, broad] = drawn[:, broad]
+    # With its lower part hidden the upper one may have gone astray into what is now shown again: every other scout draws that too.
+    starts[::2] = drawn[::2]
     third = max(1, settings.scouts // 3)
     annealed = AnnealedSettings(
         settings.scout_layers, (settings.scouts, *[third] * (settings.scout_layers - 1)), settings.scout_survival, spread=0.5

@@ -30,7 +30,7 @@ from hmc.pose.body.model import PARTS
 from hmc.pose.scalable.limbs import LimbMemory, LimbSettings, limb_spread_deg, look_again
 from hmc.pose.scalable.models import Inclusive
 from hmc.pose.scalable.restrict import ScoreData, SymmetricData, nearest_part, part_mask, restrict_filter, restrict_target
-from hmc.pose.scalable.scouts import limb_occupancy, scout
+from hmc.pose.scalable.scouts import in_doubt, limb_dofs, scout
 from hmc.pose.scalable.structure import structural_step
 
 __all__ = ["PoseStep", "scalable_step", "step_of", "suited"]
@@ -108,9 +108,9 @@ def scalable_step(rng: np.random.Generator, filt: PoseFilter, state: PoseState, 
     kept = {} if preset.refine is not None else _kept(found.lower)
     particles = found.particles
     if limbs is not None and memory is not None and filt.table is not None and maps is not None:
-        memory, estimate, looked = _look(rng, filt.table, maps, estimate, particles, memory, limbs)
-        returned = _there(limbs, memory).dofs & ~there.dofs
-        particles = replace(particles, particles=np.where(returned, estimate, particles.particles))
+        tracked = estimate
+        memory, estimate, looked = _look(rng, filt.table, maps, tracked, particles, memory, limbs)
+        particles = replace(particles, particles=np.where(estimate != tracked, estimate, particles.particles))
         there, more = _there(limbs, memory), more + looked
         kept |= memory.kept()
     pose = PoseState(estimate, np.where(there.dofs, estimate - state.state, 0.0), particles, kept)
@@ -153,7 +153,7 @@ def _annealed(rng, filt, state, data, there) -> _Found:
     particles, info = annealed_step(
         rng,
         starts,
-        lambda states: data.log_likelihood(filt, states, there.parts),
+        data.likelihood(filt, there.parts),
         np.where(there.dofs, filt.drift, 0.0),
         low,
         high,
@@ -196,14 +196,11 @@ def suited(hierarchies: Sequence[Inclusive], state: np.ndarray, there: np.ndarra
 
 def _likelihood(filt, data, hierarchy, level, there):
     keep = part_mask(hierarchy.models[level].parts) & there.parts
+    log_likelihood = data.likelihood(filt, keep, 1 if level == len(hierarchy.models) - 1 else hierarchy.thinning)
+    if hierarchy.held == "last":
+        return log_likelihood
     lacking = hierarchy.group > level
-
-    def log_likelihood(states: np.ndarray) -> np.ndarray:
-        if hierarchy.held == "rest":
-            states = np.where(lacking, POSTURE[0], states)
-        return data.log_likelihood(filt, states, keep)
-
-    return log_likelihood
+    return lambda states: log_likelihood(np.where(lacking, POSTURE[0], states))
 
 
 def _kept(threads) -> dict[str, np.ndarray]:
@@ -235,7 +232,6 @@ def _look(
 ) -> tuple[LimbMemory, np.ndarray, int]:
     """Are the tracked limbs still shown, and the missing ones again? Memory, estimate with the limbs that were found, evaluations."""
     tree = limbs.tree
-    there = part_mask(tree.model(memory.active).parts)
     weights = normalise(particles.log_weights)
     evidence = np.zeros(len(tree.limbs), bool)
     found, evaluations = {}, 0
@@ -244,7 +240,7 @@ def _look(
             evaluations += 1
             spread = limb_spread_deg(particles.particles[:, limb.dofs], weights).min()
             if spread > limbs.lost_spread_deg:
-                evidence[k] = limb_occupancy(table, estimate, maps, limb.parts, there) < limbs.lost_occupancy
+                evidence[k] = in_doubt(table, maps, estimate, k, memory.active, limbs)
         elif tree.parent[k] < 0 or memory.active[tree.parent[k]]:
             report = scout(rng, table, maps, estimate, k, memory.active, limbs)
             evaluations += report.evaluations
@@ -252,5 +248,5 @@ def _look(
             evidence[k] = report.spread_deg < limbs.found_spread_deg and report.occupancy > limbs.found_occupancy
     after = look_again(memory, evidence, limbs)
     for k in np.flatnonzero(after.active & ~memory.active).tolist():
-        estimate = np.where(np.isin(np.arange(N_DOF), tree.limbs[k].dofs), found[k], estimate)
+        estimate = np.where(np.isin(np.arange(N_DOF), limb_dofs(limbs, k)), found[k], estimate)
     return after, estimate, evaluations
