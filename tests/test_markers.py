@@ -1,5 +1,7 @@
 """Poses from markers: lookups against brute force, geometry against OpenCV, detectors against what they are told, known poses."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -15,9 +17,13 @@ from hmc.pose.body.joints import dof_index
 from hmc.pose.body.kinematics import landmarks
 from hmc.pose.body.model import neutral_state
 from hmc.pose.body.proportions import default_body
+from hmc.pose.initialisation import swapped_pose
+from hmc.pose.legs import LegChoice
+from hmc.pose.markers import sequence
 from hmc.pose.markers.body import fit_tips, place_tips, with_skin_markers
 from hmc.pose.markers.colour import ColourSettings, detect_markers, learn_marker_colour
 from hmc.pose.markers.detections import DetectionTable, read_detections, write_detections
+from hmc.pose.markers.explain import explain_all, refine_to_points
 from hmc.pose.markers.filter import MarkerPreset, make_marker_filter, marker_preset, marker_step
 from hmc.pose.markers.likelihood import MarkerLikelihood, marker_cost, marker_views, observe_markers, project_markers
 from hmc.pose.markers.nearest import nearest_detections
@@ -290,6 +296,51 @@ def test_a_step_finds_the_pose_and_repeats_itself():
     np.testing.assert_array_equal(state.state, again.state)
     assert info.status == "fitted" and np.isfinite(info.cost)
     assert np.linalg.norm(landmarks(BODY, state.state) - landmarks(BODY, truth), axis=1).mean() < 0.02
+
+
+def test_exchanged_legs_are_put_right_and_a_limb_gone_astray_is_found():
+    """Each from a pose that has taken other markers' detections, or false ones, for its own."""
+    true = standing()
+    seen = observe_markers(VIEWS, detections(landmarks(BODY, true), false=8, noise=1.0), GATE)
+    astray = true.copy()
+    astray[dof_index("r_shoulder_y", "r_elbow_z")] += -1.2, 0.8
+    for wrong in (swapped_pose(BODY, true, "legs"), astray):
+        state, points = refine_to_points(BODY, seen, wrong, GATE)
+        assert np.linalg.norm(landmarks(BODY, state) - landmarks(BODY, true), axis=1).max() > 0.15
+        better, points, choice = explain_all(np.random.default_rng(0), BODY, seen, state, points, GATE)
+        assert np.linalg.norm(landmarks(BODY, better) - landmarks(BODY, true), axis=1).max() < 0.05
+        assert np.nanmax(np.linalg.norm(points - landmarks(BODY, true), axis=1)) < 0.05
+        np.testing.assert_array_equal(choice.states[0], better)
+        assert choice.costs[0] < choice.costs[1]
+
+
+def test_legs_are_told_apart_over_the_whole_motion(monkeypatch):
+    """A filter that now and then ends with exchanged legs; the motion before and after says which they are."""
+    frames = list(range(16))
+    states = np.repeat(standing()[None], len(frames), axis=0)
+    states[:, 0] += 0.03 * np.array(frames)
+    states[:, dof_index("l_hip_y", "r_hip_y")] += 0.4 * np.sin(np.arange(16) / 3)[:, None] * [1, -1]
+    points = landmarks(BODY, states)
+    rows = [
+        (frame, name, uv)
+        for frame in frames
+        for name, seen in zip(RIG.names, detections(points[frame], false=2, seed=frame), strict=True)
+        for uv in seen
+    ]
+    table = DetectionTable(*(np.array(column) for column in zip(*rows, strict=True)))
+    real = sequence.marker_step
+
+    def confused(rng, filt, pose, seen):
+        pose, info = real(rng, filt, pose, seen)
+        if int(rng.integers(3)) or info.choice is None:
+            return pose, info
+        other = LegChoice(info.choice.states[::-1], info.choice.costs[::-1])
+        return replace(pose, state=other.states[0]), replace(info, choice=other)
+
+    monkeypatch.setattr(sequence, "marker_step", confused)
+    found = pose_from_markers(RIG, table, frames, 30.0, marker_preset("default"), height_m=1.75, skin=False)
+    off = np.linalg.norm(found.poses.positions - points, axis=2)
+    assert off.mean() < 0.03 and off.max() < 0.15
 
 
 def test_without_markers_the_pose_stays():

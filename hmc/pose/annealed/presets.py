@@ -131,7 +131,7 @@ PRESETS: dict[str, PosePreset] = {
     "default": PosePreset(
         name="default",
         source="found on rendered recordings (docs/accuracy.md): symmetric cost, strong selection, refinement, limb search, fitted body",
-        annealed=AnnealedSettings(layers=4, particles=150, survival_rate=0.04, spread=0.6),
+        annealed=AnnealedSettings(layers=4, particles=120, survival_rate=0.04, spread=0.6),
         drift_scale=0.7,
         motion="both",
         refine=RefineSettings(),

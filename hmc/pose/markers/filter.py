@@ -8,32 +8,19 @@ from typing import Literal
 import numpy as np
 
 from hmc.errors import InputError
-from hmc.landmarks import landmark_index
 from hmc.montecarlo.filters import AnnealedInfo, AnnealedSettings, annealed_step, particle_init
 from hmc.pose.annealed.apf import PoseState
 from hmc.pose.annealed.presets import drift
-from hmc.pose.body.inverse import fit_landmarks
-from hmc.pose.body.kinematics import landmarks
 from hmc.pose.body.model import BodyModel
+from hmc.pose.legs import LegChoice
 from hmc.pose.markers.body import place_tips
+from hmc.pose.markers.explain import explain_all, refine_to_points
 from hmc.pose.markers.likelihood import MarkerLikelihood, SeenMarkers, marker_cost
-from hmc.pose.markers.points import find_points, matched_points
-from hmc.pose.markers.start import lay_body, search_near
 
 __all__ = ["MARKER_PRESETS", "MarkerFilter", "MarkerInfo", "MarkerPreset", "make_marker_filter", "marker_preset", "marker_step"]
 
 #: With fewer markers than this seen from two sides a frame has no pose.
 LEAST_MARKERS = 5
-#: A marker that lies farther than this from where the refined body has it is not refined to, metres.
-FARTHEST_M = 0.08
-#: Two markers nearer to each other than this are one, metres.
-SAME_M = 0.03
-#: Middle and end of every limb, by their places among the landmarks.
-LIMBS = np.array([landmark_index(f"{side}_{name}") for side in "lr" for name in ("elbow", "wrist", "knee", "ankle")])
-#: How far a marker may be from where it is found again, round by round, metres.
-SEARCH_GATES_M = (0.6, 0.4, 0.2)
-#: Steps of inverse kinematics in the refinement.
-REFINE_STEPS = 12
 
 
 @dataclass(frozen=True)
@@ -54,7 +41,7 @@ class MarkerPreset:
     refine : bool
         Move the estimate to where the detections say that its markers are, and begin the next frame there.
     search : bool
-        Look for a limb of which a marker was not found among all points that the detections make; needs `refine`.
+        Look for limbs among all points that the detections make, and tell the legs apart (`hmc.pose.markers.explain`); needs `refine`.
     """
 
     name: str
@@ -132,6 +119,8 @@ class MarkerInfo:
     annealed : AnnealedInfo or None
     status : str
         ``"fitted"``, or why not.
+    choice : LegChoice or None
+        The pose and the one with exchanged legs; None where no limbs are looked for.
     """
 
     cost: float
@@ -139,6 +128,7 @@ class MarkerInfo:
     points: np.ndarray
     annealed: AnnealedInfo | None
     status: str
+    choice: LegChoice | None = None
 
 
 def make_marker_filter(body: BodyModel, preset: MarkerPreset, fps: float) -> MarkerFilter:
@@ -186,47 +176,18 @@ def marker_step(rng: np.random.Generator, filt: MarkerFilter, state: PoseState, 
     if preset.refine:
         starts = particle_init(np.stack([state.state, np.clip(state.state + state.velocity, low, high)]))
     particles, annealed = annealed_step(rng, starts, log_likelihood, filt.drift, low, high, preset.annealed)
-    estimate, points = annealed.estimate, missing
+    estimate, points, choice = annealed.estimate, missing, None
     if preset.refine:
-        estimate, points = _refine(body, seen, annealed.best, preset.likelihood.gate_px)
+        estimate, points = refine_to_points(body, seen, annealed.best, preset.likelihood.gate_px)
+    if preset.search:
+        estimate, points, choice = explain_all(rng, body, seen, estimate, points, preset.likelihood.gate_px)
     cost, matched = _cost(body, seen, estimate, preset.likelihood)
-    if preset.search and np.isnan(points[LIMBS]).any():
-        found, views = find_points(seen)
-        near, better = search_near(rng, body, found, views, estimate)
-        for other in [lay_body(body, found, estimate, SEARCH_GATES_M, views)[0], *([near] if better else [])]:
-            other, other_points = _refine(body, seen, other, preset.likelihood.gate_px)
-            other_cost, other_matched = _cost(body, seen, other, preset.likelihood)
-            if other_cost < cost:
-                estimate, points, cost, matched = other, other_points, other_cost, other_matched
     status = "fitted" if (matched >= 2).sum() >= LEAST_MARKERS else "too few markers where the body should have them"
-    info = MarkerInfo(cost, matched, points, annealed, status)
+    info = MarkerInfo(cost, matched, points, annealed, status, choice)
     return PoseState(estimate, estimate - state.state, particles), info
-
-
-def _taken(points: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Markers that were found where another one was that is nearer to it, (15,): one marker cannot be two."""
-    apart = np.linalg.norm(points[:, None] - points, axis=-1)
-    off = np.linalg.norm(points - places, axis=1)
-    return ((apart < SAME_M) & (off[:, None] > off)).any(axis=1)
 
 
 def _cost(body: BodyModel, seen: SeenMarkers, state: np.ndarray, settings: MarkerLikelihood) -> tuple[float, np.ndarray]:
     """The cost of one state, and in how many views its markers have detections, (15,)."""
     cost, matched = marker_cost(seen, place_tips(body, state[None]), settings)
     return float(cost[0]), matched[:, 0]
-
-
-def _refine(body: BodyModel, seen: SeenMarkers, state: np.ndarray, gate_px: float) -> tuple[np.ndarray, np.ndarray]:
-    """Inverse kinematics on the markers that two views or more agree on, twice, as a better pose finds more of them."""
-    points = np.full((len(body.tips), 3), np.nan)
-    for gate in (gate_px, gate_px / 2):
-        places = landmarks(body, state)
-        points = matched_points(seen, places, gate)
-        points[_taken(points, places)] = np.nan
-        if np.isfinite(points).all(axis=1).sum() < LEAST_MARKERS:
-            break
-        fitted, _ = fit_landmarks(body, points, state, iterations=REFINE_STEPS)
-        # What still lies far off is another marker or a false one.
-        points[np.linalg.norm(landmarks(body, fitted) - points, axis=1) > FARTHEST_M] = np.nan
-        state, _ = fit_landmarks(body, points, state, iterations=REFINE_STEPS)
-    return state, points

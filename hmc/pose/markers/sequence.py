@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from hmc.pose.body.joints import DOF_NAMES
 from hmc.pose.body.kinematics import landmarks
 from hmc.pose.body.model import BodyModel
 from hmc.pose.body.proportions import canton_body, default_body
+from hmc.pose.legs import LegChoice, LegSettings, choose_legs, leg_points
 from hmc.pose.markers.body import fit_tips, with_skin_markers
 from hmc.pose.markers.detections import DetectionTable
 from hmc.pose.markers.filter import MarkerFilter, MarkerInfo, MarkerPreset, make_marker_filter, marker_step
@@ -41,6 +43,8 @@ LOST_FRAMES = 10
 SOMEBODY_ELSE = 8
 #: Where markers are worn is learnt from at most this many frames.
 LEARN_FRAMES = 60
+#: Either choice of legs counts as what it costs: which one a frame's filter ended with says nothing.
+LEGS = LegSettings(doubt=0.0)
 
 
 def seen_in_frame(rig: Rig, views, detections: Sequence[np.ndarray], gate_px: float) -> SeenMarkers:
@@ -131,7 +135,7 @@ def pose_from_markers(
         pose, info = marker_step(_rng(seed, frames[k], 1), filt, pose, one)
         lost = 0 if info.status == "fitted" else lost + 1
         found[k] = pose, info
-    return _people(frames, body, found)
+    return _people(frames, body, _legs_told_apart(frames, fps, markers, found))
 
 
 def _rng(seed: int, frame: int, stage: int) -> np.random.Generator:
@@ -196,6 +200,19 @@ def _begun_anew(rng, filt: MarkerFilter, pose: PoseState, lost: int, seen: SeenM
         return pose, lost
     starts = start_poses(rng, filt.body, *find_points(seen, room))
     return (pose_init(starts[0][0]), 0) if starts else (pose, lost)
+
+
+def _legs_told_apart(
+    frames: Sequence[int], fps: float, body: BodyModel, found: dict[int, tuple[PoseState, MarkerInfo]]
+) -> dict[int, tuple[PoseState, MarkerInfo]]:
+    """The same poses with left and right leg as the whole motion has them, where every frame offers both."""
+    choices = [found[k][1].choice for k in range(len(frames))]
+    known = [LegChoice(np.stack([found[k][0].state] * 2), np.zeros(2)) if one is None else one for k, one in enumerate(choices)]
+    if all(one is None for one in choices):
+        return found
+    legs = np.array([leg_points(body, one.states) for one in known])
+    picks = choose_legs(np.array(frames), np.array([one.costs for one in known]), legs, fps, LEGS)
+    return {k: (replace(found[k][0], state=known[k].states[pick]), found[k][1]) for k, pick in enumerate(picks)}
 
 
 def _people(frames: Sequence[int], body: BodyModel, found: dict[int, tuple[PoseState, MarkerInfo]]) -> PosedPeople:

@@ -19,7 +19,7 @@ from hmc.pose.body.kinematics import landmarks
 from hmc.pose.body.model import BodyModel, neutral_state
 from hmc.pose.markers.body import place_tips
 
-__all__ = ["LEAST_POINTS", "lay_body", "left_over", "search_near", "start_poses"]
+__all__ = ["LEAST_POINTS", "lay_body", "left_over", "point_cost", "search_near", "start_poses"]
 
 #: From fewer points than this no pose is begun.
 LEAST_POINTS = 6
@@ -66,7 +66,7 @@ def start_poses(rng: np.random.Generator, body: BodyModel, points: np.ndarray, v
         return []
     trust = _trust(views)
     middle = np.average(points, axis=0, weights=trust + 0.01)
-    cost = _point_cost(body, points, trust)
+    cost = point_cost(body, points, views)
     finds = []
     for heading in np.arange(HEADINGS) * 2 * np.pi / HEADINGS:
         state = neutral_state("down", body.limits)
@@ -104,7 +104,7 @@ def search_near(
     """
     if len(points) < LEAST_POINTS:
         return state, False
-    cost = _point_cost(body, points, _trust(views))
+    cost = point_cost(body, points, views)
     found, _ = _search(rng, body, cost, state, NEAR_SEARCH, NEAR_SHARE)
     found, _ = lay_body(body, points, found, GATES_M, views)
     before, after = cost(np.stack([state, found]))
@@ -121,7 +121,7 @@ def _search(
     return info.best, -info.best_log_likelihood
 
 
-def left_over(body: BodyModel, state: np.ndarray, points: np.ndarray, views: np.ndarray) -> int:
+def left_over(body: BodyModel, state: np.ndarray, points: np.ndarray, views: np.ndarray, gate_m: float = SEARCH_GATE_M) -> int:
     """How many trusted points are nowhere near a body's markers: those of another person, where they are many.
 
     Parameters
@@ -131,9 +131,11 @@ def left_over(body: BodyModel, state: np.ndarray, points: np.ndarray, views: np.
     state : ndarray, shape (27,)
     points : ndarray, shape (n, 3)
     views : ndarray of int, shape (n,)
+    gate_m : float
+        What is farther than this from all markers is nowhere near, metres.
     """
     away = np.linalg.norm(points[:, None] - landmarks(body, state), axis=-1).min(axis=1)
-    return int(((away > SEARCH_GATE_M) & (_trust(views) >= 0.5)).sum())
+    return int(((away > gate_m) & (_trust(views) >= 0.5)).sum())
 
 
 def _trust(views: np.ndarray) -> np.ndarray:
@@ -142,8 +144,17 @@ def _trust(views: np.ndarray) -> np.ndarray:
     return np.ones(len(views)) if few == many else (views - few) / (many - few)
 
 
-def _point_cost(body: BodyModel, points: np.ndarray, trust: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
-    """Costs (n,) of states (n, 27) in `start_poses`."""
+def point_cost(body: BodyModel, points: np.ndarray, views: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+    """How badly states, shape (n, 27), explain points: the cost of `start_poses`, shape (n,), square metres.
+
+    Parameters
+    ----------
+    body : BodyModel
+        With its markers as tips.
+    points : ndarray, shape (m, 3)
+    views : ndarray of int, shape (m,)
+    """
+    trust = _trust(views)
     gate = np.float32(SEARCH_GATE_M**2)
     places = points.astype(np.float32)
     doubt, needed = ((DOUBT_M * (1 - trust)) ** 2).astype(np.float32), (trust**2).astype(np.float32)

@@ -1,0 +1,138 @@
+"""A pose against all points that the detections make: its own markers first, then limbs that went astray and legs that were exchanged.
+
+A marker that lost its detections takes others nearby, among which there are often enough false ones or another marker's, and looks
+found. What gives it away is the point left over where it should be, if many views agree on that one. Exchanged legs leave no
+point over, as points have no names; but they have to cross, and reach their points less well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from hmc.landmarks import landmark_index
+from hmc.pose.annealed.symmetric import POSTURE, posture_spread
+from hmc.pose.body.inverse import fit_landmarks
+from hmc.pose.body.kinematics import landmarks
+from hmc.pose.body.model import BodyModel
+from hmc.pose.initialisation import swapped_pose
+from hmc.pose.legs import LegChoice
+from hmc.pose.markers.likelihood import SeenMarkers
+from hmc.pose.markers.points import find_points, matched_points
+from hmc.pose.markers.start import LEAST_POINTS, lay_body, left_over, point_cost, search_near
+
+__all__ = ["explain_all", "refine_to_points", "strain"]
+
+#: From fewer markers than this no pose is refined.
+LEAST_REFINED = 5
+#: A marker that lies farther than this from where the refined body has it is not refined to, metres.
+FARTHEST_M = 0.08
+#: Two markers nearer to each other than this are one, metres.
+SAME_M = 0.03
+#: Middle and end of every limb, by their places among the landmarks.
+LIMBS = np.array([landmark_index(f"{side}_{name}") for side in "lr" for name in ("elbow", "wrist", "knee", "ankle")])
+#: How far a marker may be from where it is found again, round by round, metres.
+SEARCH_GATES_M = (0.6, 0.4, 0.2)
+#: A trusted point farther than this from all markers is left over, metres.
+LEFT_OVER_M = 0.12
+#: Steps of inverse kinematics in the refinement.
+REFINE_STEPS = 12
+#: What an angle one spread (`hmc.pose.annealed.symmetric.posture_spread`) away from rest costs, square metres.
+POSTURE_WEIGHT = 1e-5
+
+
+def explain_all(
+    rng: np.random.Generator, body: BodyModel, seen: SeenMarkers, state: np.ndarray, points: np.ndarray, gate_px: float
+) -> tuple[np.ndarray, np.ndarray, LegChoice]:
+    """The pose that explains all points best, of one and what is found near it.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    body : BodyModel
+        With its markers as tips.
+    seen : SeenMarkers
+    state : ndarray, shape (27,)
+        As refined.
+    points : ndarray, shape (15, 3)
+        What its markers were refined to, world, metres; NaN where nothing was found.
+    gate_px : float
+
+    Returns
+    -------
+    state : ndarray, shape (27,)
+    points : ndarray, shape (15, 3)
+        As from `refine_to_points`.
+    choice : LegChoice
+        That pose and the same with exchanged legs, and how badly they explain the points, square metres.
+    """
+    found, views = find_points(seen)
+    if len(found) < LEAST_POINTS:
+        return state, points, LegChoice(np.stack([state, state]), np.zeros(2))
+    cost = strain(body, found, views)
+    if np.isnan(points[LIMBS]).any() or left_over(body, state, found, views, LEFT_OVER_M):
+        near, better = search_near(rng, body, found, views, state)
+        others = [lay_body(body, found, state, SEARCH_GATES_M, views)[0], *([near] if better else [])]
+        trials = [(state, points), *(refine_to_points(body, seen, other, gate_px) for other in others)]
+        state, points = trials[int(cost(np.array([one for one, _ in trials])).argmin())]
+    exchanged, exchanged_points = refine_to_points(body, seen, swapped_pose(body, state, "legs"), gate_px)
+    states = np.stack([state, exchanged])
+    costs = cost(states)
+    if costs[1] < costs[0]:
+        return exchanged, exchanged_points, LegChoice(states[::-1], costs[::-1])
+    return state, points, LegChoice(states, costs)
+
+
+def strain(body: BodyModel, points: np.ndarray, views: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+    """How badly states, shape (n, 27), explain points, shape (n,), square metres: `point_cost`, and how far they are from rest.
+
+    Parameters
+    ----------
+    body : BodyModel
+    points : ndarray, shape (m, 3)
+    views : ndarray of int, shape (m,)
+        Both as from `hmc.pose.markers.points.find_points`.
+    """
+    cost = point_cost(body, points, views)
+    return lambda states: cost(states) + POSTURE_WEIGHT * (((states - POSTURE[0]) / posture_spread(states)) ** 2).sum(axis=1)
+
+
+def refine_to_points(body: BodyModel, seen: SeenMarkers, state: np.ndarray, gate_px: float) -> tuple[np.ndarray, np.ndarray]:
+    """Inverse kinematics on the markers that enough views agree on, twice, as a better pose finds more of them.
+
+    Parameters
+    ----------
+    body : BodyModel
+        With its markers as tips.
+    seen : SeenMarkers
+    state : ndarray, shape (27,)
+        Start.
+    gate_px : float
+        Farther than this from where it should be a detection is not a marker's; half of it the second time.
+
+    Returns
+    -------
+    state : ndarray, shape (27,)
+    points : ndarray, shape (15, 3)
+        Where the markers were seen, world, metres; NaN where not.
+    """
+    points = np.full((len(body.tips), 3), np.nan)
+    for gate in (gate_px, gate_px / 2):
+        places = landmarks(body, state)
+        points = matched_points(seen, places, gate)
+        points[_taken(points, places)] = np.nan
+        if np.isfinite(points).all(axis=1).sum() < LEAST_REFINED:
+            break
+        fitted, _ = fit_landmarks(body, points, state, iterations=REFINE_STEPS)
+        # What still lies far off is another marker or a false one.
+        points[np.linalg.norm(landmarks(body, fitted) - points, axis=1) > FARTHEST_M] = np.nan
+        state, _ = fit_landmarks(body, points, state, iterations=REFINE_STEPS)
+    return state, points
+
+
+def _taken(points: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Markers that were found where another one was that is nearer to it, (15,): one marker cannot be two."""
+    apart = np.linalg.norm(points[:, None] - points, axis=-1)
+    off = np.linalg.norm(points - places, axis=1)
+    return ((apart < SAME_M) & (off[:, None] > off)).any(axis=1)
