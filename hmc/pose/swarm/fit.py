@@ -15,17 +15,9 @@ from hmc.pose.swarm.pso import PsoSettings, pso_run
 from hmc.pose.swarm.volume import volume_error
 
 __all__ = [
-    "FitSettings",
-    "Fitted",
-    "Prior",
-    "bounds_around",
-    "fine_tune",
-    "fit_around",
-    "fit_cost",
-    "fit_flat",
-    "fit_hierarchical",
-    "rest_state",
-]
+    "PARTS", "FitSettings", "Fitted", "Prior", "bounds_around", "fine_tune", "fit_around", "fit_cost", "fit_flat", "fit_hierarchical",
+    "rest_state", "torso_moves",
+]  # fmt: skip
 
 _TORSO = tuple(range(7))
 
@@ -48,11 +40,9 @@ PARTS: tuple[tuple[int, ...], ...] = (
     _TORSO, _of("neck"), _of("l_shoulder", "l_elbow"), _of("r_shoulder", "r_elbow"), _of("l_hip", "l_knee"), _of("r_hip", "r_knee"),
 )  # fmt: skip
 #: Beside voxels, no curve's error counts as more than this, metres; and how much the voxels' counts.
-BOUND_M, VOLUME_WEIGHT = 0.1, 1.0
+BOUND_M, VOLUME_WEIGHT = 0.08, 1.5
 #: Of the inverse kinematics below, metres a radian.
 LIMB_DAMPING_M = 0.05
-#: Places of each limb, anywhere within its limits, that are tried in every frame.
-LIMB_TRIALS = 40
 
 
 @dataclass(frozen=True)
@@ -264,42 +254,6 @@ def _one_part_moved(rng: np.random.Generator, state: np.ndarray, low: np.ndarray
         rows = np.arange(k, len(states), len(PARTS))[:, None]
         states[rows, free] += far[rows[:, 0]] * (moved[rows, free] - states[rows, free])
     return states
-
-
-def free_limbs(
-    rng: np.random.Generator, model: SkeletonModel, observed: Observed, state: np.ndarray, prior: Prior | None = None
-) -> tuple[np.ndarray, int]:
-    """Try every limb anywhere within its limits, whatever it did before, and the legs exchanged: what is lost is not found nearby.
-
-    Parameters
-    ----------
-    rng, model, observed, state, prior
-        As for `fine_tune`.
-
-    Returns
-    -------
-    state : ndarray, shape (23,)
-        The given one or a better one.
-    evaluations : int
-    """
-    limbs = PARTS[2:]
-    states = np.repeat(state[None], 1 + LIMB_TRIALS * len(limbs), axis=0)
-    for k, free in enumerate(limbs):
-        rows = np.arange(1 + k * LIMB_TRIALS, 1 + (k + 1) * LIMB_TRIALS)[:, None]
-        angles = np.array(free) - 7
-        states[rows, free] = rng.uniform(model.low[angles], model.high[angles], (LIMB_TRIALS, len(free)))
-    exchanged = state.copy()
-    left, right = [list(free) for free in PARTS[-2:]]
-    exchanged[left], exchanged[right] = state[right], state[left]
-    costs = fit_cost(model, np.concatenate([states, exchanged[None]]), observed, prior)
-    if costs[-1] < costs[:-1].min():
-        return exchanged, len(costs)
-    best = state.copy()
-    for k, free in enumerate(limbs):
-        one = 1 + k * LIMB_TRIALS + int(costs[1 + k * LIMB_TRIALS : 1 + (k + 1) * LIMB_TRIALS].argmin())
-        if costs[one] < costs[0]:
-            best[list(free)] = states[one, list(free)]
-    return best, len(costs)
 
 
 def fit_flat(

@@ -40,6 +40,8 @@ __all__ = ["FitRow", "SwarmPreset", "SwarmTask", "pose_by_swarm", "swarm_preset"
 
 logger = logging.getLogger("hmc")
 
+#: Frames of the first window in which a start is tried.
+ANCHORS = 3
 NO_VOXELS = "no fit: no voxels of this person in this frame"
 
 
@@ -245,14 +247,17 @@ def _start(task: SwarmTask, person: _Person, grid) -> list[FitRow]:
     frames = [one[0] for one in person.watched]
     person.watched = []
     scores = [2 * r.segmentation.whole + 0.2 * len(r.curves) if r is not None and r.status == "read" else -1.0 for r in readings]
-    anchor = int(np.argmax(scores))
     feet = np.concatenate([np.zeros((0, 3)), *(r.feet for r in readings if r is not None)])
-    found: dict[int, tuple[SwarmState | None, SwarmInfo]] = {}
-    # At the start, the feet of the whole window say which way the person faces.
-    opening = readings[anchor]
-    if opening is not None and scores[anchor] > 0:
-        opening = replace(opening, feet=feet)
-    found[anchor] = _step(task, person, frames[anchor], opening, None)
+    # A frame can be misread and look whole: of those that show most, the one whose pose costs least.
+    trials: dict[int, tuple[SwarmState | None, SwarmInfo]] = {}
+    for k in np.argsort(-np.array(scores), kind="stable")[:ANCHORS].tolist():
+        opening = readings[k]
+        if opening is not None and scores[k] > 0:
+            # At the start, the feet of the whole window say which way the person faces.
+            opening = replace(opening, feet=feet)
+        trials[k] = _step(task, person, frames[k], opening, None)
+    anchor = min(trials, key=lambda k: trials[k][1].cost_m if trials[k][0] is not None else np.inf)
+    found = {anchor: trials[anchor]}
     for order in (range(anchor + 1, len(frames)), range(anchor - 1, -1, -1)):
         state = found[anchor][0]
         for k in order:

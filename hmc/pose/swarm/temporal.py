@@ -11,19 +11,9 @@ import numpy as np
 
 from hmc.pose.spectral.reading import BodyReading
 from hmc.pose.swarm.error import curves_near, curves_of, observe_curves
-from hmc.pose.swarm.fit import (
-    FitSettings,
-    Fitted,
-    Prior,
-    bounds_around,
-    fine_tune,
-    fit_around,
-    fit_cost,
-    fit_hierarchical,
-    free_limbs,
-    rest_state,
-)
+from hmc.pose.swarm.fit import FitSettings, Fitted, Prior, bounds_around, fine_tune, fit_around, fit_cost, fit_hierarchical, rest_state
 from hmc.pose.swarm.heading import facing_evidence, heading_of, spin_towards
+from hmc.pose.swarm.lost_limbs import free_limbs
 from hmc.pose.swarm.model import SkeletonModel
 
 __all__ = ["SwarmInfo", "SwarmSettings", "SwarmState", "missed", "start_fits", "swarm_step"]
@@ -76,13 +66,13 @@ class SwarmSettings:
     least_reach_rad: float = 0.35
     particles: int = 36
     iterations: int = 15
-    doubt_m: float = 0.045
+    doubt_m: float = 0.055
     doubt_ratio: float = 1.4
     margin_m: float = 0.012
     facing_m: float = 0.02
     backwards: float = -2.5
     farthest_m: float = 0.25
-    lost_m: float = 0.12
+    lost_m: float = 0.15
     last_weight: float = 0.02
     spin_weight: float = 0.01
     always_check: bool = False
