@@ -20,7 +20,7 @@ from hmc.pose.body.model import neutral_state
 from hmc.pose.body.proportions import default_body
 from hmc.pose.smd.body import CHAINS, FREE
 from hmc.pose.smd.color_cue import ColorSettings, color_fits, learn_colors, update_colors
-from hmc.pose.smd.cues import CueSettings, Observed
+from hmc.pose.smd.cues import CueSettings, Observed, draw_of_groups
 from hmc.pose.smd.descent import Evaluation, SmdSettings, converged, smd_init, smd_run, smd_step
 from hmc.pose.smd.edge_cue import Crop, edge_maps, match_edges, shown_contours
 from hmc.pose.smd.levenberg import robust_residuals
@@ -29,7 +29,7 @@ from hmc.pose.smd.presets import smd_preset
 from hmc.pose.smd.rows import evaluate, gauss_newton_product, jacobian, leclerc, pose_body
 from hmc.pose.smd.start import find_da_vinci
 from hmc.pose.smd.surface_cue import match_surface, match_voxels, nearest_voxels, place, voxel_cloud
-from hmc.pose.smd.tracker import make_tracker, track_init, track_step
+from hmc.pose.smd.tracker import evaluation, make_scene, make_tracker, track_init, track_step
 from hmc.pose.smd.views import project_in, stack_views
 
 PLACES = [(3.0, 0.2, 1.6), (-0.4, 3.0, 1.5), (-2.8, -1.0, 1.4), (0.4, -2.9, 1.7)]
@@ -257,20 +257,37 @@ def test_descent_finds_the_minimum_of_a_quadratic(seed):
 
 
 def test_step_sizes_grow_where_gradients_agree_and_halve_at_most():
-    state = smd_init(np.zeros(2), np.full(2, 0.1))
-    wide, chosen = np.full(2, np.inf), SmdSettings(meta_step=1.0, memory=0.3)
+    state = smd_init(np.zeros(2), np.full(2, 0.1), np.array([1.0, 1.0]))
+    wide, chosen = np.full(2, np.inf), SmdSettings(memory=0.3)
     first = Evaluation(0.0, np.array([1.0, 1.0]), lambda v: 0 * v, np.ones(2))
     state = smd_step(state, first, -wide, wide, chosen)
     np.testing.assert_allclose(state.trace, 0.1)  # v = a g
     again = Evaluation(0.0, np.array([1.0, -100.0]), lambda v: 0 * v, np.ones(2))
     after = smd_step(state, again, -wide, wide, chosen)
     np.testing.assert_allclose(after.steps, [0.1 * (1 + 0.1), 0.05])
+    sure = smd_step(replace(state, meta=np.full(2, 1000.0)), again, -wide, wide, chosen)
+    np.testing.assert_allclose(sure.steps, [0.2, 0.05])  # and double at most
+
+
+def test_the_descent_does_not_depend_on_the_units():
+    """Degrees for radians, with step sizes learnt in degrees either way: the same path."""
+    matrix, goal, wide = np.diag([1.0, 4.0]), np.array([0.3, -0.2]), np.full(2, np.inf)
+    factor, chosen = np.degrees(1.0), SmdSettings(iterations=12, first_step=0.05, meta_step=0.1)
+    tight = np.full(2, 1e-9)
+    _, radians = smd_run(quadratic(matrix, goal), np.zeros(2), -wide, wide, tight, replace(chosen, reach=1e9), None, 1 / factor)
+    scaled = quadratic(matrix / factor**2, goal * factor)
+    _, degrees = smd_run(scaled, np.zeros(2), -wide, wide, factor * tight, replace(chosen, reach=1e9), None, 1.0)
+    np.testing.assert_allclose(degrees.path, factor * radians.path, rtol=1e-6, atol=1e-9)
+    _, fixed = smd_run(
+        quadratic(matrix, goal), np.zeros(2), -wide, wide, tight, replace(chosen, reach=1e9, meta_step=0.0), None, 1 / factor
+    )
+    assert np.linalg.norm(radians.path[-1] - goal) < 0.9 * np.linalg.norm(fixed.path[-1] - goal)
 
 
 def test_limits_hold_and_the_constrained_gradient_leads_to_them():
     low, high = np.array([-1.0, -1.0]), np.array([0.05, 1.0])
     found = Evaluation(0.0, np.array([-1.0, -1.0]), lambda v: 0 * v, np.ones(2))
-    state = smd_step(smd_init(np.zeros(2), np.full(2, 0.1)), found, low, high, SmdSettings())
+    state = smd_step(smd_init(np.zeros(2), np.full(2, 0.1), np.zeros(2)), found, low, high, SmdSettings())
     np.testing.assert_allclose(state.parameters, [0.05, 0.1])
     # Eq. 23: the trace is the change that was made, with its sign.
     np.testing.assert_allclose(state.trace, [-0.05, -0.1])
@@ -280,7 +297,7 @@ def test_limits_hold_and_the_constrained_gradient_leads_to_them():
 
 
 def test_moving_average_decides():
-    state = replace(smd_init(np.zeros(1), np.ones(1)), history=tuple(np.array([x]) for x in (0.0, 5.0, -5.0, 2.9)))
+    state = replace(smd_init(np.zeros(1), np.ones(1), np.zeros(1)), history=tuple(np.array([x]) for x in (0.0, 5.0, -5.0, 2.9)))
     assert converged(state, np.ones(1), SmdSettings(average=3))  # |2.9 - 0| / 3 below 1
     assert not converged(replace(state, history=state.history[:3]), np.ones(1), SmdSettings(average=3))
     late = replace(state, history=(*state.history[:3], np.array([3.1])))
@@ -317,6 +334,22 @@ def test_colours_are_learnt_and_confine(tracker):
     known = np.isfinite(model.mean[:, 0])
     np.testing.assert_allclose(darker.mean[known, 0], model.mean[known, 0] - 3.0)
     assert color_fits(model, np.full((1, 3), np.nan), ColorSettings()).all()
+
+
+def test_samples_of_some_groups_pull_as_they_do_among_all(tracker):
+    """Without what stays, the gradient on the chains that still move is the same."""
+    rng = np.random.default_rng(6)
+    state, seen = state_of(rng, 0.2), seen_of(tracker, state_of(rng, 0.2))
+    scene = make_scene(tracker, seen, state[FREE])
+    drawn = scene.draw(rng, trunk=False)
+    wanted = np.array([False, False, True, False, False, True])
+    fewer = draw_of_groups(drawn, tracker.grid, tracker.strips, wanted)
+    assert len(fewer.surface) == 40
+    assert len(fewer.strips) == len(drawn.strips) // 2
+    gradients = [evaluation(*scene.match(state[FREE], one), 1.0).gradient for one in (drawn, fewer)]
+    moving = np.concatenate([CHAINS[1], CHAINS[4]])
+    np.testing.assert_allclose(gradients[1][moving], gradients[0][moving], rtol=1e-6, atol=1e-12)
+    assert np.abs(gradients[0][CHAINS[2]] - gradients[1][CHAINS[2]]).max() > 1e-4
 
 
 def seen_of(tracker, state):

@@ -45,7 +45,7 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
             above.plot(one.results["frames"], true, color=COLOURS["paper"], linewidth=1, label="true")
             above.plot(one.results["frames"], found, color=COLOURS["sparse"], label="estimated")
         below.plot(one.results["frames"], errors, color=COLOURS["sparse"], alpha=0.6)
-    above.set(ylabel="right upper arm above the level, degrees")
+    above.set(ylabel="right upper arm\nabove the level, degrees")
     above.legend()
     below.set(ylabel="mean joint error, mm", xlabel="frame")
     detail = ", ".join(f"{row['last_tenth_mm']:.0f} mm in the last tenth" for row in rows)

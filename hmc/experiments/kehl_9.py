@@ -39,10 +39,8 @@ METHODS = {"SMD": "stochastic", "deterministic": "deterministic"}
 
 def grid(plan: Plan) -> list[dict]:
     """One cell a recording."""
-    name = kehl_runs.QUICK_RECORDING if plan.quick else "pedal_arms"
-    sources = plan.recordings or (rendered(name),)
-    count, second = (10, 0.4) if plan.quick else (DISPLACEMENTS, SECOND)
-    return [{"recording": source.label, "displacements": count, "second": second} for source in sources]
+    sources = plan.recordings or (rendered("pedal_arms"),)
+    return [{"recording": source.label, "displacements": DISPLACEMENTS, "second": SECOND} for source in sources]
 
 
 def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Results:

@@ -39,7 +39,6 @@ __all__ = ["FAMILY", "VARIANTS", "cell", "cell_grid", "errors_mm", "observations
 
 FAMILY = "kehl"
 VOXEL_M = 0.03
-QUICK_RECORDING, QUICK_FRAMES = "kick_quick", 10
 _SURFACE = {"edge_weight": 0.0, "colors": None}
 #: Variants by name: what differs from the default preset, in the cues and elsewhere.
 VARIANTS: dict[str, tuple[dict, dict]] = {
@@ -68,17 +67,13 @@ def preset_of(variant: str) -> SmdPreset:
     return replace(preset, cues=replace(preset.cues, **cues), **more)
 
 
-def cell_grid(quick: bool, recordings: Sequence[Source], name: str, variants: Sequence[str], repeats: int, shown_s: Sequence[float] = ()):
-    """Every variant, several times, on the user's recordings or on a rendered one; in the quick mode once and on few frames."""
-    sources = tuple(recordings) or (rendered(QUICK_RECORDING if quick else name),)
+def cell_grid(
+    quick: bool, recordings: Sequence[Source], name: str, variants: Sequence[str], repeats: int, shown_s: Sequence[float] = ()
+) -> list[dict]:
+    """Every variant, several times, on the user's recordings or on a rendered one; in the quick mode once."""
+    sources = tuple(recordings) or (rendered(name),)
     return [
-        {
-            "recording": source.label,
-            "variant": variant,
-            "repeat": k,
-            "frames": QUICK_FRAMES if quick else 0,
-            "shown_s": [0.4] if quick else list(shown_s),
-        }
+        {"recording": source.label, "variant": variant, "repeat": k, "shown_s": list(shown_s)}
         for source in sources
         for k in range(1 if quick else repeats)
         for variant in variants
@@ -120,7 +115,7 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
     preset = preset_of(parameters["variant"])
     wanted = {round(second * recording.fps) for second in parameters["shown_s"]} if parameters["repeat"] == 0 else set()
     window = max(3, round(WINDOW_S * recording.fps))
-    waiting, stream = [], observations(recording, parameters["frames"])
+    waiting, stream = [], observations(recording)
     for index, seen, target in stream:
         waiting.append((index, seen, target))
         if len(waiting) == window:

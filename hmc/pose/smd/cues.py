@@ -16,7 +16,7 @@ from hmc.pose.smd.samples import SurfaceGrid, draw_samples
 from hmc.pose.smd.surface_cue import VoxelCloud, match_surface, match_voxels
 from hmc.pose.smd.views import Views
 
-__all__ = ["CueSettings", "Draw", "Observed", "draw_cues", "match_cues"]
+__all__ = ["CueSettings", "Draw", "Observed", "draw_cues", "draw_of_groups", "match_cues"]
 
 
 @dataclass(frozen=True)
@@ -99,12 +99,16 @@ class Draw:
         Of the cloud.
     strips, view : ndarray of int
         Strips, and in which of the used views.
+    surface_share, edge_share : float
+        Of the surface samples and strips that were drawn so many are among these.
     """
 
     surface: np.ndarray
     voxels: np.ndarray
     strips: np.ndarray
     view: np.ndarray
+    surface_share: float = 1.0
+    edge_share: float = 1.0
 
 
 def draw_cues(
@@ -145,6 +149,24 @@ def draw_cues(
     return Draw(surface, voxels, lines.ravel(), np.repeat(np.arange(n_views), lines.shape[1]))
 
 
+def draw_of_groups(draw: Draw, grid: SurfaceGrid, strips: Strips, wanted: np.ndarray) -> Draw:
+    """Without the samples of groups that stay where they are; the others count as much as before.
+
+    Parameters
+    ----------
+    draw : Draw
+    grid : SurfaceGrid
+    strips : Strips
+    wanted : ndarray of bool, shape (6,)
+        Of `hmc.pose.smd.body.GROUPS`.
+    """
+    surface, lines = wanted[grid.group[draw.surface]], wanted[strips.group[draw.strips]]
+    return Draw(
+        draw.surface[surface], draw.voxels, draw.strips[lines], draw.view[lines],
+        draw.surface_share * surface.mean() if len(surface) else 1.0, draw.edge_share * lines.mean() if len(lines) else 1.0,
+    )  # fmt: skip
+
+
 def match_cues(
     body: SolidBody,
     grid: SurfaceGrid,
@@ -169,11 +191,12 @@ def match_cues(
     draw : Draw
     settings : CueSettings
     """
-    found = [match_surface(body, grid, draw.surface, posed, cloud, settings.surface_weight)]
+    found = [match_surface(body, grid, draw.surface, posed, cloud, draw.surface_share * settings.surface_weight)]
     if len(draw.voxels):
         # A third of the grid is dense enough to say which part is nearest.
         candidates = np.arange(0, len(grid.points), 3)
         found.append(match_voxels(body, grid, candidates, posed, cloud, draw.voxels, settings.voxel_weight))
     if maps is not None and len(draw.strips):
-        found.append(match_edges(body, strips, posed, maps, draw.strips, draw.view, settings.reach_m, settings.edge_weight))
+        weight = draw.edge_share * settings.edge_weight
+        found.append(match_edges(body, strips, posed, maps, draw.strips, draw.view, settings.reach_m, weight))
     return joined(found)

@@ -45,7 +45,8 @@ class SmdSettings:
     first_step : float
         First step sizes, in shares of the inverse curvature ("observe the value of the gradient in the first few iterations").
     meta_step : float
-        mu of Eq. 18.
+        mu of Eq. 18, in shares of the first step sizes, for parameters in degrees and centimetres. "Values of one-tenth of the initial
+        step sizes" worked best in the paper (section 7), a third of that here.
     memory : float
         lambda of Eq. 19.
     average : int
@@ -57,10 +58,10 @@ class SmdSettings:
     """
 
     first_step: float = 0.5
-    meta_step: float = 1.0
+    meta_step: float = 0.03
     memory: float = 0.3
     average: int = 3
-    iterations: int = 25
+    iterations: int = 18
     reach: float = 20.0
 
 
@@ -72,6 +73,8 @@ class SmdState:
     ----------
     parameters, steps, trace : ndarray, shape (n,)
         p, a and v of Eq. 17 to 19.
+    meta : ndarray, shape (n,)
+        mu of Eq. 18.
     history : tuple of ndarray
         The last parameters, `SmdSettings.average` of them at most, the newest last.
     """
@@ -79,6 +82,7 @@ class SmdState:
     parameters: np.ndarray
     steps: np.ndarray
     trace: np.ndarray
+    meta: np.ndarray
     history: tuple[np.ndarray, ...]
 
 
@@ -100,15 +104,15 @@ class SmdInfo:
     path: np.ndarray
 
 
-def smd_init(parameters: np.ndarray, steps: np.ndarray) -> SmdState:
+def smd_init(parameters: np.ndarray, steps: np.ndarray, meta: np.ndarray) -> SmdState:
     """A state that has not moved.
 
     Parameters
     ----------
-    parameters, steps : ndarray, shape (n,)
+    parameters, steps, meta : ndarray, shape (n,)
     """
     parameters = np.asarray(parameters, float)
-    return SmdState(parameters, np.asarray(steps, float), np.zeros_like(parameters), (parameters,))
+    return SmdState(parameters, np.asarray(steps, float), np.zeros_like(parameters), np.asarray(meta, float), (parameters,))
 
 
 def smd_step(state: SmdState, found: Evaluation, low: np.ndarray, high: np.ndarray, settings: SmdSettings) -> SmdState:
@@ -123,12 +127,12 @@ def smd_step(state: SmdState, found: Evaluation, low: np.ndarray, high: np.ndarr
         Limits into which parameters are put back.
     settings : SmdSettings
     """
-    steps = state.steps * np.maximum(0.5, 1 + settings.meta_step * state.trace * found.gradient)
+    steps = state.steps * np.clip(1 + state.meta * state.trace * found.gradient, 0.5, 2.0)
     parameters = np.clip(state.parameters - steps * found.gradient, low, high)
     # The gradient that would have led there without limits.
     constrained = (state.parameters - parameters) / steps
     trace = settings.memory * state.trace + steps * (constrained - settings.memory * found.product(state.trace))
-    return SmdState(parameters, steps, trace, (*state.history, parameters)[-settings.average - 1 :])
+    return SmdState(parameters, steps, trace, state.meta, (*state.history, parameters)[-settings.average - 1 :])
 
 
 def converged(state: SmdState, tolerance: np.ndarray, settings: SmdSettings, group: np.ndarray | slice = slice(None)) -> bool:
@@ -157,7 +161,7 @@ def smd_run(
     tolerance: np.ndarray,
     settings: SmdSettings,
     groups: Sequence[np.ndarray] | None = None,
-    gains: np.ndarray | float = 1.0,
+    units: np.ndarray | float = 1.0,
 ) -> tuple[np.ndarray, SmdInfo]:
     """Descend until every group of parameters has come to rest.
 
@@ -171,8 +175,8 @@ def smd_run(
     settings : SmdSettings
     groups : sequence of ndarray of int, optional
         One group of all parameters by default. What is in no group stays.
-    gains : ndarray, shape (n,), optional
-        Factors on the first step sizes.
+    units : ndarray, shape (n,), optional
+        Of the parameters: what counts as a change of one in Eq. 18.
 
     Returns
     -------
@@ -189,7 +193,8 @@ def smd_run(
         at = path[-1]
         found = objective(at, going)
         if state is None:
-            state = smd_init(at, gains * settings.first_step / np.maximum(found.curvature, 1e-9))
+            steps = settings.first_step / np.maximum(found.curvature, 1e-9)
+            state = smd_init(at, steps, settings.meta_step * steps / np.square(units))
         free = np.zeros(len(at), bool)
         free[np.concatenate([group for group, moving in zip(groups, going, strict=True) if moving])] = True
         found = replace(found, gradient=np.where(free, found.gradient, 0.0))

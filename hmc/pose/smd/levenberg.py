@@ -56,7 +56,7 @@ def robust_residuals(matches: Matches, rows: np.ndarray, width: float) -> tuple[
 
 
 def lm_run(
-    matched: Callable[[np.ndarray], tuple[Matches, np.ndarray]],
+    matched: Sequence[Callable[[np.ndarray], tuple[Matches, np.ndarray]]],
     parameters: np.ndarray,
     low: np.ndarray,
     high: np.ndarray,
@@ -71,7 +71,7 @@ def lm_run(
 
     Parameters
     ----------
-    matched : callable
+    matched : sequence of callable, one a group
         Parameters (24,) to matches and their Jacobian.
     parameters, low, high : ndarray, shape (24,)
     groups : sequence of ndarray of int
@@ -87,8 +87,8 @@ def lm_run(
     """
     parameters = np.array(parameters, float)
     counts, cost = [], np.nan
-    for group in groups:
-        parameters[group], evaluations, cost = _minimise(matched, parameters, low, high, group, width, settings)
+    for find, group in zip(matched, groups, strict=True):
+        parameters[group], evaluations, cost = _minimise(find, parameters, low, high, group, width, settings)
         counts.append(evaluations)
     return parameters, np.array(counts), cost
 

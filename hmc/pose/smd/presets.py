@@ -15,7 +15,7 @@ SMD_PRESETS: dict[str, SmdPreset] = {
     "default": SmdPreset(),
     "kehl2006": SmdPreset(
         cues=CueSettings(voxel_points=0, full_edges=True, width=0.5),
-        descent=SmdSettings(iterations=40),
+        descent=SmdSettings(meta_step=0.1, iterations=40),
         tolerance_m=0.02,
         tolerance_deg=2.0,
         predict=0.0,

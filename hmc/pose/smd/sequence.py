@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -53,7 +54,7 @@ class SmdTask:
     height_m : float or None
         None: estimated for each person.
     any_start : callable, optional
-        Start from a pose that is not da Vinci's; by default that of the annealed filter (`hmc.pose.start`).
+        Start from a pose that is not da Vinci's; by default by the spectral route (`hmc.pose.spectral_start`).
     """
 
     recording: Recording
@@ -148,7 +149,7 @@ def _try_start(task: SmdTask, person: _Person, grid: VoxelGrid) -> list:
             break
     if first is None:
         speed = person.velocities[np.searchsorted(person.frames, frames)]
-        start = task.any_start or (lambda rng, targets, speed: _annealed_start(task, rng, targets, speed))
+        start = task.any_start or partial(_spectral_start, task)
         first = start(lambda k: task.rng(person.number, frames[k]), targets, speed)
     person.watched, watched = [], person.watched
     if first is None:
@@ -162,10 +163,11 @@ def _try_start(task: SmdTask, person: _Person, grid: VoxelGrid) -> list:
     return rows
 
 
-def _annealed_start(task: SmdTask, rng, targets, speed) -> FirstPose | None:
-    """By the annealed filter's start, the waist taken into the trunk."""
+def _spectral_start(task: SmdTask, rng, targets, speed) -> FirstPose | None:
+    """By the start of the annealed filters with candidates from the spectral skeleton, the waist taken into the trunk."""
     recording = task.recording
-    started = start_person(rng, pose_preset("default"), recording.fps, targets, task.height_m, speed, recording.room)
+    preset = replace(pose_preset("default"), start="spectral")
+    started = start_person(rng, preset, recording.fps, targets, task.height_m, speed, recording.room)
     if started is None:
         return None
     place = int(np.nanargmin([info.cost for info in started.infos]))

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
 from hmc.pose.body.joints import N_DOF
 from hmc.pose.body.model import BodyModel
-from hmc.pose.smd.body import CHAINS, FREE, SolidBody, solid_body
+from hmc.pose.smd.body import CHAINS, FREE, GROUPS, SolidBody, solid_body
 from hmc.pose.smd.color_cue import ColorModel, color_fits, learn_colors, update_colors
 from hmc.pose.smd.contours import Strips, make_strips
-from hmc.pose.smd.cues import CueSettings, Draw, Observed, draw_cues, match_cues
+from hmc.pose.smd.cues import CueSettings, Draw, Observed, draw_cues, draw_of_groups, match_cues
 from hmc.pose.smd.descent import Evaluation, SmdSettings, smd_run
 from hmc.pose.smd.edge_cue import EdgeMaps, best_views, edge_maps, shown_contours
 from hmc.pose.smd.levenberg import LmSettings, lm_run
@@ -29,6 +30,8 @@ __all__ = [
 OPTIMISERS = ("smd", "deterministic", "lm")
 #: Fewer surface voxels than these say nothing of a pose.
 LEAST_VOXELS = 60
+#: In which step sizes are learnt: a centimetre, and a degree.
+_UNITS = np.where(FREE < 3, 0.01, np.radians(1.0))
 
 
 @dataclass(frozen=True)
@@ -264,17 +267,32 @@ def optimise(
     preset, limits = scene.tracker.preset, scene.tracker.body.skeleton.limits
     low, high = limits.low[FREE], limits.high[FREE]
     trunk = any((group < 6).any() for group in groups)  # the chains leave it where it is
+    moved = np.array([_moved_groups(group) for group in groups])
     first = scene.draw(rng, trunk)
+
+    def matched(at: np.ndarray, going: np.ndarray, drawn: Draw) -> tuple[Matches, np.ndarray]:
+        """What has come to rest needs no samples."""
+        still = moved[going].any(axis=0)
+        return scene.match(at, drawn if still.all() else draw_of_groups(drawn, scene.tracker.grid, scene.tracker.strips, still))
+
     if preset.optimiser == "lm":
-        return lm_run(lambda at: scene.match(at, first), parameters, low, high, groups, preset.cues.width, preset.levenberg)
+        alone = np.eye(len(groups), dtype=bool)
+        by_group = [partial(matched, going=row, drawn=first) for row in alone]
+        return lm_run(by_group, parameters, low, high, groups, preset.cues.width, preset.levenberg)
 
     def objective(at: np.ndarray, going: np.ndarray) -> Evaluation:
-        drawn = scene.draw(rng, trunk) if preset.optimiser == "smd" else first
-        return evaluation(*scene.match(at, drawn), preset.cues.width)
+        return evaluation(*matched(at, going, scene.draw(rng, trunk) if preset.optimiser == "smd" else first), preset.cues.width)
 
     tolerance = tolerance_share * np.where(FREE < 3, preset.tolerance_m, np.radians(preset.tolerance_deg))
-    found, info = smd_run(objective, parameters, low, high, tolerance, preset.descent, groups)
+    found, info = smd_run(objective, parameters, low, high, tolerance, preset.descent, groups, _UNITS)
     return found, info.iterations, float(info.values[-1])
+
+
+def _moved_groups(dofs: np.ndarray) -> np.ndarray:
+    """Which of `GROUPS` some of the 24 degrees of freedom move, shape (6,)."""
+    if (dofs < 6).any():
+        return np.ones(len(GROUPS), bool)
+    return np.array([False, *(np.isin(chain, dofs).any() for chain in CHAINS)])
 
 
 def evaluation(matches: Matches, rows: np.ndarray, width: float) -> Evaluation:
