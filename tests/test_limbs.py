@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from posed import body_of
+from scipy.ndimage import binary_dilation, binary_fill_holes
 
 from hmc.errors import InputError
-from hmc.landmarks import LANDMARKS
 from hmc.pose.annealed.apf import make_filter, pose_init, score_maps
 from hmc.pose.annealed.hull_target import make_target
 from hmc.pose.annealed.presets import PRESETS
@@ -191,22 +191,27 @@ def test_occupancy_and_scouts_tell_a_limb_that_is_there_from_one_that_is_not(fil
     assert max(one.occupancy for one in lost) < settings.found_occupancy
 
 
-def test_a_forearm_is_in_doubt_when_its_arm_has_drawn_back_into_the_trunk(filters):
-    settings, table = filters["default"].preset.limbs, filters["default"].table
-    active = np.ones(len(LIMBS), bool)
-    hanging, inside, kneeling = standing(), standing(), standing(0.6)
-    inside[dof_index("l_shoulder_x", "l_elbow_z")] -= np.radians([30.0, 20.0])
+def test_a_folded_forearm_is_in_doubt_in_a_fat_hull_that_has_none_and_not_in_its_own(filters):
+    filt = filters["default"]
+    settings, table, active = filt.preset.limbs, filt.table, np.ones(len(LIMBS), bool)
+    folded, kneeling = standing(), standing(0.6)
+    folded[dof_index("l_shoulder_x", "l_elbow_z")] -= np.radians([25.0, 60.0])
     kneeling[dof_index("r_knee_y", "l_knee_y")] = np.radians(140.0)
-    in_trunk = landmarks(table.body, inside)[LANDMARKS.index("l_elbow")] - landmarks(table.body, inside)[LANDMARKS.index("neck")]
-    assert np.linalg.norm(in_trunk[:2]) < 0.12
 
-    def doubted(state):
-        maps = score_maps(hull_of(state), None)
+    def doubted(state, target):
+        maps = score_maps(target, None)
         return {name for k, name in enumerate(LIMBS) if in_doubt(table, maps, state, k, active, settings)}
 
-    assert doubted(hanging) == set()
-    assert doubted(kneeling) == set()
-    assert doubted(inside) == {"l_forearm"}
+    for state in (standing(), folded, kneeling):
+        assert doubted(state, hull_of(state)) == set()
+    occupied = np.zeros(GRID.shape, bool)
+    armless = hull_of(folded, without("l_upper_arm", "l_forearm"))
+    occupied[tuple(GRID.index_of(armless.surface).T)] = True
+    fat = np.argwhere(binary_dilation(binary_fill_holes(occupied), iterations=5))
+    target = make_target(GRID, fat, fat)
+    others = part_mask(settings.tree.model(active).parts)
+    assert limb_occupancy(table, folded, score_maps(target, None), ("l_forearm",), others) > settings.lost_occupancy
+    assert doubted(folded, target) == {"l_forearm"}
 
 
 def test_scouts_find_a_shank_although_its_thigh_has_gone_astray(filters):

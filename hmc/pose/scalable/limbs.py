@@ -26,6 +26,9 @@ class LimbSettings:
         annealed so strongly that they say nothing of it.
     lost_occupancy : float
         ... and when less than this share of its flesh is in occupied voxels that no other part fills.
+    lost_closeness : float
+        ... or, where it lies folded against what it hangs on, when its skin is less close than this to the hull's surface
+        (`hmc.pose.scalable.scouts.limb_closeness`); 0: it does not matter.
     found_spread_deg : float
         A missing limb is shown when its angles vary by less than this (in the median) among its scouts, degrees.
     found_occupancy : float
@@ -44,6 +47,7 @@ class LimbSettings:
     tree: Unitive = field(default_factory=lambda: UNITIVE)
     lost_spread_deg: float = 15.0
     lost_occupancy: float = 0.05
+    lost_closeness: float = 0.0
     found_spread_deg: float = 5.0
     found_occupancy: float = 0.7
     lost_frames: int = 3

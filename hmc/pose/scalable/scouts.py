@@ -31,7 +31,7 @@ TWISTS = dof_index("r_shoulder_y", "l_shoulder_y", "r_hip_z", "l_hip_z")
 #: How far the limb on which a missing one hangs is moved, against the missing one.
 SEEN_SHARE = 0.2
 
-__all__ = ["ScoutReport", "in_doubt", "limb_dofs", "limb_occupancy", "scout"]
+__all__ = ["ScoutReport", "in_doubt", "limb_closeness", "limb_dofs", "limb_occupancy", "scout"]
 
 
 @dataclass(frozen=True)
@@ -85,22 +85,36 @@ def limb_occupancy(table: ScoreTable, state: np.ndarray, maps: ScoreMaps, parts:
     float
         0 to 1; NaN where hardly any of the limb is free, and nothing can be said.
     """
-    own = part_mask(parts)
-    rows = own[table.flesh.part]
+    free = _free_voxels(table, state, maps, parts, others, part_mask(parts)[table.flesh.part])
+    return np.nan if free is None else float(maps.occupancy[tuple(free[0].T)].sum() / free[1])
+
+
+def limb_closeness(table: ScoreTable, state: np.ndarray, maps: ScoreMaps, parts: tuple[str, ...], others: np.ndarray) -> float:
+    """How near the skin of a limb is to the hull's surface (1 - Eq. 6.16), of what is free of other parts; as `limb_occupancy`.
+
+    A limb that is seen has its skin where the hull ends. One that is hidden and has found room inside of a fat hull has not.
+    """
+    skin = part_mask(parts)[table.flesh.part] & table.flesh.is_surface
+    free = _free_voxels(table, state, maps, parts, others, skin)
+    return np.nan if free is None else float(maps.surface[tuple(free[0].T)].sum(dtype=float) / 255 / free[1])
+
+
+def _free_voxels(table, state, maps, parts, others, rows) -> tuple[np.ndarray, int] | None:
+    """Voxels of those of a limb's points that are free of other parts, and how many points these are; None where too few are."""
     rotations, positions = segment_transforms(table.body, state)
     points = place_points(rotations, positions, table.flesh.points[rows], table.flesh.segment[rows])
-    free = body_distance(part_body(table.body, others & ~own), state[None], points)[0] > FREE_M
+    free = body_distance(part_body(table.body, others & ~part_mask(parts)), state[None], points)[0] > FREE_M
     if free.mean() < LEAST_FREE:
-        return np.nan
+        return None
     index = np.floor((points[free] - maps.origin) / maps.voxel_size_m).astype(int)
-    inside = np.all((index >= 0) & (index < maps.occupancy.shape), axis=1)
-    return float(maps.occupancy[tuple(index[inside].T)].sum() / len(index))
+    return index[np.all((index >= 0) & (index < maps.occupancy.shape), axis=1)], len(index)
 
 
 def in_doubt(table: ScoreTable, maps: ScoreMaps, state: np.ndarray, limb: int, active: np.ndarray, settings: LimbSettings) -> bool:
-    """Whether a tracked limb is not shown: its free flesh is in the void, or it has drawn back into the trunk, or what it hangs on has.
+    """Whether a tracked limb is not shown: its free flesh is in the void, or it lies folded inside of the hull.
 
-    A limb that furniture hides often ends up there: it is the only place of the hull that is left for it.
+    A limb that furniture hides often ends up there: it is the only place of the hull that is left for it. What it hangs on is then
+    covered by it and the trunk, and its skin is not where the hull ends.
 
     Parameters
     ----------
@@ -116,12 +130,9 @@ def in_doubt(table: ScoreTable, maps: ScoreMaps, state: np.ndarray, limb: int, a
     own, there = tree.limbs[limb].parts, part_mask(tree.model(active).parts)
     if limb_occupancy(table, state, maps, own, there) < settings.lost_occupancy:
         return True
-    if tree.parent[limb] < 0:
+    if tree.parent[limb] < 0 or not np.isnan(limb_occupancy(table, state, maps, tree.limbs[tree.parent[limb]].parts, there)):
         return False
-    # A shank against the thigh of who kneels, or a forearm against the upper arm, says nothing.
-    holding = tree.limbs[tree.parent[limb]].parts
-    others = there & ~part_mask([*own, *holding])
-    return any(np.isnan(limb_occupancy(table, state, maps, one, others)) for one in (own, holding))
+    return limb_closeness(table, state, maps, own, there) < settings.lost_closeness
 
 
 def scout(
