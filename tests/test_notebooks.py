@@ -17,7 +17,7 @@ def read(path):
 
 
 def test_there_are_notebooks():
-    assert [path.stem for path in NOTEBOOKS][:1] == ["01_first_recording"] and len(NOTEBOOKS) >= 6
+    assert [path.stem for path in NOTEBOOKS][:1] == ["01_first_recording"] and len(NOTEBOOKS) >= 9
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
