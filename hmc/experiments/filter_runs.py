@@ -8,7 +8,7 @@ layers.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from time import thread_time
 
@@ -16,10 +16,10 @@ import numpy as np
 
 from hmc.camera.model import Rig
 from hmc.experiments.experiment import Parameters, Results
-from hmc.experiments.inputs import Inputs
+from hmc.experiments.inputs import Inputs, once, read_hulls, write_hulls
 from hmc.experiments.markerless_runs import FRONTEND, MASKS_KEY, tracked
 from hmc.experiments.pose_runs import first_truth, standing_state
-from hmc.frontend import MaskStep, stream_hulls, stream_masks
+from hmc.frontend import HullStep, MaskStep, stream_hulls, stream_masks
 from hmc.mask_store import kept_masks
 from hmc.pose.annealed.apf import make_filter, pose_init
 from hmc.pose.annealed.presets import PosePreset, pose_preset
@@ -103,13 +103,20 @@ def follow_from_truth(
     where = TrackTable(truth.frames, np.zeros(len(truth.frames), int), truth.positions.mean(axis=1))
     first, last = int(truth.frames[0]), int(truth.frames[-1]) + 1
     kept = kept_masks(masks, MASKS_KEY, first, last)
-    if change is not None:
+
+    def hulls(silhouettes: Iterable[MaskStep] | None) -> Iterator[HullStep]:
+        return stream_hulls(recording, grid, FRONTEND, first=first, last=last, masks=silhouettes, on_problem=lambda line: None)
+
+    if change is None:  # the same for every cell, and dearer than the filter
+        name = f"hulls-{len(recording.rig)}-cameras-{parameters['voxel_mm']:g}mm-{first}-{last}"
+        seen = read_hulls(once(masks.with_name(name), lambda part: write_hulls(part, hulls(kept))), grid, recording)
+    else:
         steps = stream_masks(recording, FRONTEND, first=first, last=last, on_problem=lambda line: None) if kept is None else kept
         joints = dict(zip(truth.frames.tolist(), truth.positions, strict=True))
-        kept = (change(one, recording.rig, joints[one.index]) for one in steps if one.index in joints)
+        seen = hulls(change(one, recording.rig, joints[one.index]) for one in steps if one.index in joints)
     step, movers = step_of(preset), landmark_masks(body)
     estimates, seconds = {}, 0.0
-    for hull in stream_hulls(recording, grid, FRONTEND, first=first, last=last, masks=kept, on_problem=lambda line: None):
+    for hull in seen:
         target = targets_of(recording, grid, where, hull).get(0)
         before = thread_time()
         if hull.index > first:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import os
 import shutil
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass
 from pathlib import Path
 
@@ -32,7 +32,7 @@ try:
 except ImportError:  # no such locks on Windows: two workers may then make the same thing, and the first to finish keeps it
     fcntl = None  # type: ignore[assignment]
 
-__all__ = ["Inputs", "once", "rendered", "source_of"]
+__all__ = ["Inputs", "once", "read_hulls", "rendered", "source_of", "write_hulls"]
 
 #: Files of a recording on which a cell's result depends.
 _CONTENT = ("calibration*", "recording.toml", "videos/*", "images/*/*", "silhouettes/*/*", "background/*", "background/*/*", "truth/*.csv")
@@ -183,15 +183,30 @@ class Inputs:
         """
         recording = self.recording(label)
         grid = VoxelGrid.from_room(recording.room, voxel_size_m, len(recording.rig))
-        folder = once(self.folder / label / f"hulls-{1000 * voxel_size_m:g}mm", lambda part: _write_hulls(part, recording, grid))
-        sizes = [camera.size for camera in recording.rig]
-        for path in sorted(folder.glob("*.npz")):
-            with np.load(path, allow_pickle=False) as data:
-                levels = np.zeros(grid.shape, np.uint8)
-                levels.ravel()[data["voxels"]] = data["levels"]
-                masks = tuple(_unpack(data[f"mask_{c}"], size) if f"mask_{c}" in data else None for c, size in enumerate(sizes))
-            nothing = (None,) * len(sizes)
-            yield HullStep(int(path.stem), nothing, masks, nothing, levels == 3, levels >= 2, levels >= 1)
+        folder = once(self.folder / label / f"hulls-{1000 * voxel_size_m:g}mm", lambda part: write_hulls(part, _hulls(recording, grid)))
+        yield from read_hulls(folder, grid, recording)
+
+
+def read_hulls(folder: Path, grid: VoxelGrid, recording: Recording) -> Iterator[HullStep]:
+    """Silhouettes and hulls as `write_hulls` kept them, in order, with None for images and doubts."""
+    sizes = [camera.size for camera in recording.rig]
+    for path in sorted(folder.glob("*.npz")):
+        with np.load(path, allow_pickle=False) as data:
+            levels = np.zeros(grid.shape, np.uint8)
+            levels.ravel()[data["voxels"]] = data["levels"]
+            masks = tuple(_unpack(data[f"mask_{c}"], size) if f"mask_{c}" in data else None for c, size in enumerate(sizes))
+        nothing = (None,) * len(sizes)
+        yield HullStep(int(path.stem), nothing, masks, nothing, levels == 3, levels >= 2, levels >= 1)
+
+
+def write_hulls(folder: Path, steps: Iterable[HullStep]) -> None:
+    """Keep silhouettes and hulls, one file a frame, in a new folder."""
+    folder.mkdir()
+    for step in steps:
+        levels = step.strict.astype(np.uint8) + step.tolerant + step.loose
+        voxels = np.flatnonzero(levels).astype(np.int64 if levels.size > np.iinfo(np.int32).max else np.int32)
+        masks = {f"mask_{c}": np.packbits(mask) for c, mask in enumerate(step.masks) if mask is not None}
+        np.savez_compressed(folder / f"{step.index:08d}.npz", voxels=voxels, levels=levels.ravel()[voxels], **masks)  # type: ignore[arg-type]
 
 
 def _recipe_of(name: str) -> tuple[Recipe, bool]:
@@ -202,13 +217,8 @@ def _recipe_of(name: str) -> tuple[Recipe, bool]:
     return load_recipe(name), False
 
 
-def _write_hulls(folder: Path, recording: Recording, grid: VoxelGrid) -> None:
-    folder.mkdir()
-    for step in stream_hulls(recording, grid, _FRONTEND, on_problem=lambda line: None):
-        levels = step.strict.astype(np.uint8) + step.tolerant + step.loose
-        voxels = np.flatnonzero(levels).astype(np.int64 if levels.size > np.iinfo(np.int32).max else np.int32)
-        masks = {f"mask_{c}": np.packbits(mask) for c, mask in enumerate(step.masks) if mask is not None}
-        np.savez_compressed(folder / f"{step.index:08d}.npz", voxels=voxels, levels=levels.ravel()[voxels], **masks)  # type: ignore[arg-type]
+def _hulls(recording: Recording, grid: VoxelGrid) -> Iterator[HullStep]:
+    return stream_hulls(recording, grid, _FRONTEND, on_problem=lambda line: None)
 
 
 def _unpack(bits: np.ndarray, size: tuple[int, int]) -> np.ndarray:

@@ -29,7 +29,7 @@ from hmc.pose.smoothing import smooth_landmarks
 __all__ = ["EXPERIMENT", "hidden", "jitter_mm"]
 
 #: Actions, the cameras of a recording, seeds.
-ACTIONS = {False: ("walk", "jog", "throw_catch", "box"), True: ("jog", "box")}
+ACTIONS = {False: ("walk", "jog", "throw_catch", "box"), True: ("jog",)}
 CAMERAS, SEEDS = 4, 3
 #: Who gets lost, and how many seeds of that.
 LOST_ACTORS = {False: ("man", "woman"), True: ("man",)}
