@@ -177,3 +177,13 @@ def test_presets_know_their_names_and_sources():
         assert preset.refine is not None or (preset.search is None and preset.fit_body is None and preset.start == "neutral")
     with pytest.raises(InputError, match=r"defualt.*canton2009, default"):
         pose_preset("defualt")
+
+
+def test_a_preset_that_cannot_work_is_refused():
+    default = PRESETS["default"]
+    with pytest.raises(InputError, match="need `refine`"):
+        replace(default, refine=None)
+    with pytest.raises(InputError, match="needs the symmetric likelihood"):
+        replace(default, likelihood="global")
+    with pytest.raises(InputError, match="must not exceed `symmetric.cap_m`"):
+        replace(default, symmetric=replace(default.symmetric, cap_m=0.04))

@@ -116,6 +116,8 @@ class PosePreset:
     def __post_init__(self) -> None:
         if self.refine is None and (self.search is not None or self.fit_body is not None or self.start != "neutral"):
             raise InputError(f"preset '{self.name}': search, fit_body and several starts need `refine`")
+        if self.search is not None and self.search.far_m > self.symmetric.cap_m:
+            raise InputError(f"preset '{self.name}': `search.far_m` must not exceed `symmetric.cap_m`, beyond which no distance is known")
         if self.refine is not None and self.likelihood != "symmetric":
             raise InputError(f"preset '{self.name}': `refine` needs the symmetric likelihood")
 
