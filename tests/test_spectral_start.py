@@ -8,6 +8,8 @@ from acted import act
 from posed import COST, body_of, mean_error
 
 from hmc.landmarks import LANDMARKS
+from hmc.pose.annealed.apf import make_filter, pose_init, pose_step
+from hmc.pose.annealed.presets import pose_preset
 from hmc.pose.body.kinematics import landmarks
 from hmc.pose.body.proportions import default_body
 from hmc.pose.spectral.reading import read_body
@@ -40,6 +42,22 @@ def test_one_of_the_first_poses_is_near_the_truth(motion, heading_deg):
     # No two are the same pose.
     apart = [np.linalg.norm(one - other, axis=1).max() for k, one in enumerate(found) for other in found[:k]]
     assert min(apart) > 0.05
+
+
+@pytest.mark.parametrize(("motion", "heading_deg", "backwards"), [("gesture", -130, False), ("box", 120, False), ("walk", 40, True)])
+def test_a_filter_started_in_the_middle_of_an_action_is_at_the_truth_within_ten_frames(motion, heading_deg, backwards):
+    """Standing in one place, or walking backwards: where the person goes does not say which way round they are."""
+    acted = act(motion, frames=13, heading_deg=heading_deg)
+    order = range(12, -1, -1) if backwards else range(13)
+    targets, truth = [acted.targets[k] for k in order], acted.landmarks[list(order)]
+    body, points = body_of(acted.height_m)
+    states, _ = spectral_poses(np.random.default_rng(0), body, points, targets[2], COST)
+    filt = make_filter(body, pose_preset("default"), acted.fps)
+    pose, errors = pose_init(states[0]), []
+    for k in range(3, 13):
+        pose, _ = pose_step(np.random.default_rng(k), filt, pose, targets[k])
+        errors.append(mean_error(landmarks(body, pose.state), truth[k]))
+    assert errors[-1] < 0.06 and np.median(errors) < 0.06, np.round(1000 * np.array(errors))
 
 
 def test_a_head_at_the_limit_is_not_taken_for_an_arm():
