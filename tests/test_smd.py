@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -27,12 +28,17 @@ from hmc.pose.smd.levenberg import robust_residuals
 from hmc.pose.smd.observe import crop_images
 from hmc.pose.smd.presets import smd_preset
 from hmc.pose.smd.rows import evaluate, gauss_newton_product, jacobian, leclerc, pose_body
+from hmc.pose.smd.sequence import SmdTask, pose_by_descent
 from hmc.pose.smd.start import find_da_vinci
 from hmc.pose.smd.surface_cue import match_surface, match_voxels, nearest_voxels, place, voxel_cloud
 from hmc.pose.smd.tracker import evaluation, make_scene, make_tracker, track_init, track_step
 from hmc.pose.smd.views import project_in, stack_views
+from hmc.pose.spectral_start import spectral_poses
+from hmc.recording import open_recording
+from hmc.results import TrackTable, read_joints
 
 PLACES = [(3.0, 0.2, 1.6), (-0.4, 3.0, 1.5), (-2.8, -1.0, 1.4), (0.4, -2.9, 1.7)]
+TINY = Path(__file__).resolve().parents[1] / "data" / "synthetic" / "tiny"
 CAMERAS = [look_at(f"c{k}", (320, 240), at, (0, 0, 1.0), 50, (-0.15, 0.03, 0.001, -0.002)) for k, at in enumerate(PLACES)]
 
 
@@ -446,3 +452,22 @@ def test_unknown_preset():
 
 def test_chains_and_trunk_share_nothing():
     assert all((chain >= 6).all() for chain in CHAINS)
+
+
+def test_who_does_not_stand_like_da_vinci_is_found_by_the_spectral_route(monkeypatch):
+    """The tiny recording begins with arms down: the first pose comes from the voxels' skeleton, and is followed from there."""
+    recording = open_recording(TINY, frames=3)
+    truth = read_joints(TINY / "truth" / "joints.csv").of(0)
+    tracks = TrackTable(truth.frames[:3], np.zeros(3, int), truth.positions[:3, 0])
+    asked = []
+
+    def spy(*args, **kwargs):
+        asked.append(args[3])
+        return spectral_poses(*args, **kwargs)
+
+    monkeypatch.setattr("hmc.pose.start.spectral_poses", spy)
+    found = pose_by_descent(SmdTask(recording, smd_preset("default"), height_m=1.76), tracks, 0.04)
+    assert asked
+    assert found.notes == ()
+    error = np.linalg.norm(found.poses.positions - truth.positions[:3], axis=2)
+    assert error.mean() < 0.08
