@@ -36,7 +36,8 @@ th, td { padding: .28rem .6rem; border-bottom: 1px solid #e3e7ee; text-align: le
 th { border-bottom: 2px solid #b9c2d0; font-weight: 600; }
 td.n, th.n { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
 th.paper, td.paper { background: #f1f4fa; }
-.scroll { overflow-x: auto; } .overview { width: 100%; table-layout: fixed; } .overview p { margin: .15rem 0; } .overview td:first-child { white-space: nowrap; }
+.scroll { overflow-x: auto; } .overview { width: 100%; table-layout: fixed; } .overview p { margin: .15rem 0; }
+.overview td:first-child { white-space: nowrap; }
 .overview th:nth-child(1) { width: 7.5rem; } .overview th:nth-child(2) { width: 18%; } .overview th:nth-child(3) { width: 34%; }
 .verdict { display: inline-block; border-radius: 1rem; padding: .02rem .6rem; font-size: .8rem; white-space: nowrap; }
 .good { background: #d9f0df; color: #14532d; } .bad { background: #fde8cf; color: #7a3c04; } .none { background: #e9ecf1; color: #475063; }
