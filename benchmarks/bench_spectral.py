@@ -27,7 +27,7 @@ from hmc.voxels.components import components
 from hmc.voxels.grid import VoxelGrid
 
 SIZE_M = 0.03
-DIMENSIONS, PARTICLES, ITERATIONS, REPEATS = 23, 40, 150, 9
+DIMENSIONS, PARTICLES, ITERATIONS, REPEATS = 23, 40, 150, 41
 
 
 def person() -> tuple[np.ndarray, np.ndarray]:

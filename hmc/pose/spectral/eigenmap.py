@@ -40,7 +40,7 @@ class Eigenmap:
     labels: np.ndarray
 
 
-def eigenmap(weights: csr_array, dimensions: int = 6) -> Eigenmap:
+def eigenmap(weights: csr_array, dimensions: int = 6, tolerance: float = 1e-7) -> Eigenmap:
     """Embed the nodes of a graph.
 
     Parameters
@@ -49,6 +49,8 @@ def eigenmap(weights: csr_array, dimensions: int = 6) -> Eigenmap:
         Symmetric, not negative, nothing on the diagonal.
     dimensions : int
         Eigenvectors wanted. There are fewer where the graph has fewer nodes than that and its components together.
+    tolerance : float
+        Relative accuracy of the eigenvalues.
 
     Returns
     -------
@@ -63,7 +65,7 @@ def eigenmap(weights: csr_array, dimensions: int = 6) -> Eigenmap:
         if len(nodes) < 2:
             continue
         part = weights if len(nodes) == n else csr_array(weights[nodes][:, nodes])
-        found, columns = _connected(part, min(dimensions, len(nodes) - 1))
+        found, columns = _connected(part, min(dimensions, len(nodes) - 1), tolerance)
         values += found.tolist()
         owners += [nodes] * len(found)
         vectors += list(columns.T)
@@ -75,24 +77,25 @@ def eigenmap(weights: csr_array, dimensions: int = 6) -> Eigenmap:
     return Eigenmap(np.array(values)[order], out, labels)
 
 
-def _connected(weights: csr_array, k: int) -> tuple[np.ndarray, np.ndarray]:
+def _connected(weights: csr_array, k: int, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
     """The k smallest non-zero eigenvalues of a connected graph, and their eigenvectors (n, k)."""
     degree = np.asarray(weights.sum(axis=1)).ravel()
     root = 1 / np.sqrt(degree)
     n = len(degree)
-    # The symmetric form: N = I - D^-1/2 E D^-1/2 has the eigenvectors D^1/2 u.
-    scaled = diags_array(root) @ weights @ diags_array(root)
+    # The symmetric form: N = I - D^-1/2 E D^-1/2 has the eigenvectors D^1/2 u. A symmetric matrix by rows is the same by columns.
+    rows = np.repeat(np.arange(n), np.diff(weights.indptr))
+    scaled = csc_array((weights.data * root[rows] * root[weights.indices], weights.indices, weights.indptr), shape=(n, n))
     if n <= max(DENSE_NODES, 2 * k + 2):
         values, vectors = np.linalg.eigh(np.eye(n) - scaled.toarray())
         return values[1 : k + 1], root[:, None] * vectors[:, 1 : k + 1]
-    shifted = csc_array(diags_array(np.full(n, 1.0 - SHIFT)) - scaled)
+    shifted = csc_array(diags_array(np.full(n, 1.0 - SHIFT), format="csc") - scaled)
     factor = splu(shifted, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
     # The eigenvector of zero is known; with it taken out of the inverse, only those that are wanted are left to find.
     null = np.sqrt(degree / degree.sum())
     inverse = LinearOperator((n, n), matvec=lambda x: (y := factor.solve(np.asarray(x).ravel())) - null * (null @ y), dtype=float)
     start = _start_vector(n)
     start -= null * (null @ start)
-    values, vectors = eigsh(inverse, k=k, which="LM", v0=start, tol=1e-7)
+    values, vectors = eigsh(inverse, k=k, which="LM", v0=start, tol=tolerance, ncv=2 * k + 8)
     order = np.argsort(-values)
     return 1 / values[order] + SHIFT, root[:, None] * vectors[:, order]
 

@@ -98,8 +98,13 @@ def limb_pieces(edges: np.ndarray, far: np.ndarray, nearest: float, settings: Pi
         near = [other for other in neighbours[starts[node] : starts[node + 1]] if seen[other]]
         seen[node] = True
         met = [root(other) for other in near if not trunk[other]]
+        if met and len(met) == len(near) == met.count(met[0]) and met[0] not in ended:
+            # Most nodes lie within one branch.
+            parent[node] = met[0]
+            size[met[0]] += 1
+            continue
         roots = sorted(set(met), key=lambda one: -height[one])
-        if any(trunk[other] for other in near) or any(one in ended for one in roots):
+        if len(met) < len(near) or any(one in ended for one in roots):
             trunk[node] = True
             for one in roots:
                 ended.setdefault(one, level)

@@ -21,6 +21,10 @@ from hmc.pose.spectral.segmentation import Segmentation
 __all__ = ["SkeletonSettings", "baseline_skeletons", "curve_through", "equally_spaced", "extract_skeletons", "site_values"]
 
 
+#: Of the eigenvectors that site values come from: these only say where to draw a smooth curve.
+SITE_TOLERANCE = 1e-4
+
+
 @dataclass(frozen=True)
 class SkeletonSettings:
     """How curves are drawn.
@@ -70,7 +74,7 @@ def site_values(edges: np.ndarray, n: int, along: np.ndarray | None = None) -> n
     sites = np.full(n, np.nan)
     if len(body) < 3:
         return sites
-    waves = eigenmap(csr_array(graph[body][:, body]), 1 if along is None else 3).vectors
+    waves = eigenmap(csr_array(graph[body][:, body]), 1 if along is None else 3, SITE_TOLERANCE).vectors
     wave = waves[:, 0]
     if along is not None:
         rising = (along[body] - along[body].mean()) @ (waves - waves.mean(0)) / np.maximum(waves.std(0), 1e-300)
