@@ -20,7 +20,7 @@ from hmc.experiments.pose_runs import first_truth
 from hmc.experiments.style import COLOURS
 from hmc.pose.spectral.reading import read_body
 from hmc.pose.swarm.error import curves_of, observe_curves, skeleton_error
-from hmc.pose.swarm.fit import FitSettings, Prior, bounds_around, fit_flat, fit_hierarchical, rest_state
+from hmc.pose.swarm.fit import FitSettings, Prior, bounds_around, fit_cost, fit_flat, fit_hierarchical, rest_state
 from hmc.pose.swarm.heading import heading_of, spin_towards
 from hmc.pose.swarm.model import model_of_height, skeleton_landmarks
 from hmc.pose.swarm.pso import PsoSettings
@@ -90,7 +90,7 @@ def _by_scipy(rng, method, model, observed, start, budget) -> tuple[np.ndarray, 
         nonlocal spent
         states = np.atleast_2d(values.T)
         spent += len(states)
-        errors = skeleton_error(model, states, observed)[0] + prior.weight * np.abs(states[:, 7:] - prior.state[7:]).mean(1)
+        errors = fit_cost(model, states, observed, prior)
         return errors if values.ndim > 1 else float(errors[0])
 
     bounds: Any = list(zip(low.tolist(), high.tolist(), strict=True))
