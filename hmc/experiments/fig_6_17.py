@@ -31,10 +31,13 @@ COMPARED: dict[str, Any] = {"annealing": "strong", "layers": 6, "particles": 600
 def grid(plan: Plan) -> list[dict]:
     """Both likelihoods with every number of layers and particles; and in one cell of these with all actions and seeds."""
     every = _settings(LAYERS[plan.quick], PARTICLES[plan.quick])
-    one = _settings((COMPARED["layers"],), (COMPARED["particles"],))
     cells = filter_grid(plan, every, ACTIONS)
-    more = filter_grid(plan, one, dict.fromkeys((False, True), STUDIED[False]), (COMPARED["annealing"],), REPEATS)
-    return cells + [parameters for parameters in more if parameters not in cells]
+    return cells + [parameters for parameters in _compared(plan) if parameters not in cells]
+
+
+def _compared(plan: Plan) -> list[dict]:
+    one = _settings((COMPARED["layers"],), (COMPARED["particles"],))
+    return filter_grid(plan, one, dict.fromkeys((False, True), STUDIED[False]), (COMPARED["annealing"],), REPEATS)
 
 
 def _settings(layers: Sequence[int], particles: Sequence[int]) -> list[dict[str, Any]]:
@@ -44,7 +47,8 @@ def _settings(layers: Sequence[int], particles: Sequence[int]) -> list[dict[str,
 def report(cells: Sequence[Cell], plan: Plan) -> Report:
     """MMTA by layers and particles for both, and by action."""
     layers, particles = LAYERS[plan.quick], PARTICLES[plan.quick]
-    compared = [one for one in cells if all(one.parameters[name] == value for name, value in COMPARED.items())]
+    wanted = _compared(plan)
+    compared = [one for one in cells if one.parameters in wanted]
     cells = cells[: len(filter_grid(plan, _settings(layers, particles), ACTIONS))]
     rows = grouped_rows(cells, ("annealing", "likelihood", "layers", "particles"))
     each = grouped_rows(cells, ("recording", "annealing", "likelihood", "layers", "particles"))
