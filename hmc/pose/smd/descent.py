@@ -46,7 +46,7 @@ class SmdSettings:
         First step sizes, in shares of the inverse curvature ("observe the value of the gradient in the first few iterations").
     meta_step : float
         mu of Eq. 18, in shares of the first step sizes, for parameters in degrees and centimetres. "Values of one-tenth of the initial
-        step sizes" worked best in the paper (section 7), a third of that here.
+        step sizes" worked best in the paper (section 7); first steps that are half the inverse curvature leave little to learn.
     memory : float
         lambda of Eq. 19.
     average : int
@@ -58,10 +58,10 @@ class SmdSettings:
     """
 
     first_step: float = 0.5
-    meta_step: float = 0.03
+    meta_step: float = 0.0003
     memory: float = 0.3
     average: int = 3
-    iterations: int = 18
+    iterations: int = 25
     reach: float = 20.0
 
 
