@@ -127,7 +127,7 @@ CATALOGUE = (
     Entry(
         "fig-6.17", CANTON, "global against factorised likelihood", "factorised better", _HUMANEVA,
         "The trunk has half of the voxels and so half of the global likelihood, and a tenth of the factorised one, where forearms and "
-        "shanks decide: hips fall behind whoever walks, as there is no model of motion. Which is ahead differs by action, actor and frames.",
+        "shanks decide: hips fall behind whoever walks, as there is no model of motion. Which is ahead differs by action and actor.",
     ),
     Entry("fig-6.18", CANTON, "density of the flesh table", "MMTA and frames a second by density", _HUMANEVA,
         why="Frames a second rise as in the thesis. Of one walk and one seed the same cell differs by 5 to 15 points of MMTA from seed "
