@@ -1,7 +1,7 @@
 """Nine actions by the whole method. Hsiao (2008), chapter 4.
 
 The thesis shows pictures of its sequences s1 to s9 and no figures; here mean error, MMTA and the frames that were started anew, on rendered
-actions like them, matched within 100 mm. A frame without a fit counts as wrong in all landmarks. Quick: about ten minutes.
+actions like them, matched within 100 mm. A frame without a fit counts as wrong in all landmarks. Quick: about four minutes of a processor.
 """
 
 from __future__ import annotations
