@@ -49,6 +49,7 @@ EXPERIMENTS = {
     "what-each-adds": "what_each_adds",
     "lost-arm": "lost_arm",
     "over-time": "over_time",
+    "all-methods": "all_methods",
     "fig-B.1": "fig_b_1",
     "hsiao-3.8": "hsiao_3_8",
     "hsiao-3.15": "hsiao_3_15",

@@ -55,7 +55,7 @@ def _preset(**changes) -> Callable[[PosePreset], tuple[PosePreset, FollowSetting
 WAYS: dict[str, Callable[[PosePreset], tuple[PosePreset, FollowSettings]]] = {
     DEFAULT: _preset(),
     "motion: smooth": _preset(motion="smooth"),
-    "motion: both": _preset(motion="both"),
+    "motion: none": _preset(motion="none"),
     "start: spectral": _preset(start="spectral"),
     NO_RECOVERY: lambda preset: (preset, FollowSettings(loss=None)),
 }

@@ -63,9 +63,9 @@ class LegChoice:
 
     Parameters
     ----------
-    states : ndarray, shape (2, 27)
-        As followed, and with exchanged legs.
-    costs : ndarray, shape (2,)
+    states : ndarray, shape (m, 27)
+        As followed, and with exchanged legs; of markers, other exchanges too.
+    costs : ndarray, shape (m,)
         Square metres, from the same points; zero in a frame that tells nothing.
     """
 
@@ -112,8 +112,8 @@ def choose_legs(frames: np.ndarray, costs: np.ndarray, legs: np.ndarray, fps: fl
         Rising; frames may be missing.
     costs : ndarray, shape (n, m)
         Of the m poses a frame, that of the filter first; square metres.
-    legs : ndarray, shape (n, m, 4, 3)
-        Their knees and ankles, metres.
+    legs : ndarray, shape (n, m, k, 3)
+        Their knees and ankles, metres; or the k points of whatever limbs are told apart.
     fps : float
     settings : LegSettings
 

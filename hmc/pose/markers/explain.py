@@ -1,13 +1,15 @@
-"""A pose against all points that the detections make: its own markers first, then limbs that went astray and legs that were exchanged.
+"""A pose against all points that the detections make: its own markers first, then limbs that went astray or were exchanged.
 
 A marker that lost its detections takes others nearby, among which there are often enough false ones or another marker's, and looks
 found. What gives it away is the point left over where it should be, if many views agree on that one. Exchanged legs leave no
-point over, as points have no names; but they have to cross, and reach their points less well.
+point over, as points have no names, nor do exchanged arms; but they have to cross, and reach their points less well: hardly so in one
+frame, plainly in a second (`hmc.pose.markers.sequence`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Literal
 
 import numpy as np
 
@@ -38,6 +40,10 @@ SEARCH_GATES_M = (0.6, 0.4, 0.2)
 LEFT_OVER_M = 0.12
 #: Steps of inverse kinematics in the refinement.
 REFINE_STEPS = 12
+#: What of left and right may be exchanged (`hmc.pose.initialisation.swapped_pose`).
+_EXCHANGES: tuple[Literal["legs", "arms"], ...] = ("legs", "arms")
+#: A pose with exchanged legs or arms that strains more than the present one times this is not refined.
+PROMISE = 1.3
 #: What an angle one spread (`hmc.pose.annealed.symmetric.posture_spread`) away from rest costs, square metres.
 POSTURE_WEIGHT = 1e-5
 
@@ -45,7 +51,7 @@ POSTURE_WEIGHT = 1e-5
 def explain_all(
     rng: np.random.Generator, body: BodyModel, seen: SeenMarkers, state: np.ndarray, points: np.ndarray, gate_px: float
 ) -> tuple[np.ndarray, np.ndarray, LegChoice]:
-    """The pose that explains all points best, of one and what is found near it.
+    """The pose that explains all points best, of one, what is found near it, and that with legs or arms exchanged.
 
     Parameters
     ----------
@@ -65,7 +71,7 @@ def explain_all(
     points : ndarray, shape (15, 3)
         As from `refine_to_points`.
     choice : LegChoice
-        That pose and the same with exchanged legs, and how badly they explain the points, square metres.
+        The pose before such exchanges and after each of them, and how badly they explain the points, square metres.
     """
     found, views = find_points(seen)
     if len(found) < LEAST_POINTS:
@@ -76,12 +82,14 @@ def explain_all(
         others = [lay_body(body, found, state, SEARCH_GATES_M, views)[0], *([near] if better else [])]
         trials = [(state, points), *(refine_to_points(body, seen, other, gate_px) for other in others)]
         state, points = trials[int(cost(np.array([one for one, _ in trials])).argmin())]
-    exchanged, exchanged_points = refine_to_points(body, seen, swapped_pose(body, state, "legs"), gate_px)
-    states = np.stack([state, exchanged])
-    costs = cost(states)
-    if costs[1] < costs[0]:
-        return exchanged, exchanged_points, LegChoice(states[::-1], costs[::-1])
-    return state, points, LegChoice(states, costs)
+    # The last is the same pose, to be refined once more: around a better pose other points are nearest.
+    states = np.array([state, *(swapped_pose(body, state, what) for what in _EXCHANGES), state])
+    costs, all_points = cost(states), [points] + [np.full_like(points, np.nan)] * (len(states) - 1)
+    for k in np.flatnonzero(costs[1:] < PROMISE * costs[0]) + 1:
+        states[k], all_points[k] = refine_to_points(body, seen, states[k], gate_px)
+        costs[k] = cost(states[k][None])[0]
+    best = int(costs.argmin())
+    return states[best], all_points[best], LegChoice(states, costs)
 
 
 def strain(body: BodyModel, points: np.ndarray, views: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:

@@ -120,7 +120,7 @@ class MarkerInfo:
     status : str
         ``"fitted"``, or why not.
     choice : LegChoice or None
-        The pose and the one with exchanged legs; None where no limbs are looked for.
+        The pose and others with exchanged limbs; None where none are looked for.
     """
 
     cost: float

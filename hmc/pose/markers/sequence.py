@@ -17,9 +17,10 @@ from hmc.pose.body.joints import DOF_NAMES
 from hmc.pose.body.kinematics import landmarks
 from hmc.pose.body.model import BodyModel
 from hmc.pose.body.proportions import canton_body, default_body
-from hmc.pose.legs import LegChoice, LegSettings, choose_legs, leg_points
+from hmc.pose.legs import LegChoice, LegSettings, choose_legs
 from hmc.pose.markers.body import fit_tips, with_skin_markers
 from hmc.pose.markers.detections import DetectionTable
+from hmc.pose.markers.explain import LIMBS
 from hmc.pose.markers.filter import MarkerFilter, MarkerInfo, MarkerPreset, make_marker_filter, marker_step
 from hmc.pose.markers.likelihood import SeenMarkers, marker_views, observe_markers
 from hmc.pose.markers.points import find_points
@@ -43,8 +44,8 @@ LOST_FRAMES = 10
 SOMEBODY_ELSE = 8
 #: Where markers are worn is learnt from at most this many frames.
 LEARN_FRAMES = 60
-#: Either choice of legs counts as what it costs: which one a frame's filter ended with says nothing.
-LEGS = LegSettings(doubt=0.0)
+#: Every way counts as what it costs: in which one a frame's filter ended says nothing.
+TELLING_APART = LegSettings(doubt=0.0, jump_weight=5e-5)
 
 
 def seen_in_frame(rig: Rig, views, detections: Sequence[np.ndarray], gate_px: float) -> SeenMarkers:
@@ -135,7 +136,7 @@ def pose_from_markers(
         pose, info = marker_step(_rng(seed, frames[k], 1), filt, pose, one)
         lost = 0 if info.status == "fitted" else lost + 1
         found[k] = pose, info
-    return _people(frames, body, _legs_told_apart(frames, fps, markers, found))
+    return _people(frames, body, _limbs_told_apart(frames, fps, markers, found))
 
 
 def _rng(seed: int, frame: int, stage: int) -> np.random.Generator:
@@ -202,16 +203,17 @@ def _begun_anew(rng, filt: MarkerFilter, pose: PoseState, lost: int, seen: SeenM
     return (pose_init(starts[0][0]), 0) if starts else (pose, lost)
 
 
-def _legs_told_apart(
+def _limbs_told_apart(
     frames: Sequence[int], fps: float, body: BodyModel, found: dict[int, tuple[PoseState, MarkerInfo]]
 ) -> dict[int, tuple[PoseState, MarkerInfo]]:
-    """The same poses with left and right leg as the whole motion has them, where every frame offers both."""
+    """The same poses with limbs as the whole motion has them, where every frame offers several ways."""
     choices = [found[k][1].choice for k in range(len(frames))]
-    known = [LegChoice(np.stack([found[k][0].state] * 2), np.zeros(2)) if one is None else one for k, one in enumerate(choices)]
-    if all(one is None for one in choices):
-        return found
-    legs = np.array([leg_points(body, one.states) for one in known])
-    picks = choose_legs(np.array(frames), np.array([one.costs for one in known]), legs, fps, LEGS)
+    ways = max((len(one.costs) for one in choices if one is not None), default=1)
+    # A frame that tells nothing has the same pose in all ways.
+    same = [LegChoice(np.repeat(found[k][0].state[None], ways, axis=0), np.zeros(ways)) for k in range(len(frames))]
+    known = [other if one is None or len(one.costs) < ways else one for one, other in zip(choices, same, strict=True)]
+    points = np.array([landmarks(body, one.states)[:, LIMBS] for one in known])
+    picks = choose_legs(np.array(frames), np.array([one.costs for one in known]), points, fps, TELLING_APART)
     return {k: (replace(found[k][0], state=known[k].states[pick]), found[k][1]) for k, pick in enumerate(picks)}
 
 
