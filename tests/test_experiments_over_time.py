@@ -61,7 +61,7 @@ def test_figures_of_the_tables():
     costs = {row["way"]: row["costs_mm"] for row in ways.rows if row["action"] == "all"}
     assert costs.pop(DEFAULT) == 0 and set(costs) == set(WAYS) - {DEFAULT, NO_RECOVERY}
     assert all(cost == pytest.approx(9.5, abs=0.5) for cost in costs.values())
-    assert [row["jitter_mm"] for row in smoothing.rows if row["window_s"] == 0] == pytest.approx([20.0] * 3)
+    assert [row["jitter_mm"] for row in smoothing.rows if row["window_s"] == 0] == pytest.approx([20.0] * 2)
     assert all(row["jitter_mm"] < 10 for row in smoothing.rows if row["window_s"] >= 0.3)
     assert {row["way"]: row["back_after_s"] for row in found.rows} == {DEFAULT: pytest.approx(0.25), NO_RECOVERY: None}
 
