@@ -15,6 +15,7 @@ from hmc.experiments.pose_runs import estimate_of, first_truth, standing_state
 from hmc.experiments.style import house_style
 from hmc.pose.annealed.presets import pose_preset
 from hmc.pose.body.inverse import fit_landmarks
+from hmc.pose.body.joints import dof_index
 from hmc.pose.body.kinematics import landmarks
 from hmc.pose.body.model import neutral_state
 from hmc.pose.body.proportions import canton_body, default_body
@@ -200,6 +201,21 @@ def test_a_filter_cell_starts_from_the_truth(small, monkeypatch):
     first = first_truth(inputs.recording(source.label)).positions[0]
     assert np.linalg.norm(one["estimate_m"][0] - first, axis=1).mean() < 0.08  # the thesis's body has other lengths
     assert np.array_equal(one["estimate_m"], filter_runs.cell(few, inputs, np.random.default_rng(0))["estimate_m"])
+
+
+def test_what_an_action_varies_by_is_told_by_its_poses():
+    """Half of what each variable changes by in a frame; at least half of 2 cm and 2 degrees; and no jump where a heading passes 180."""
+    body = canton_body(1.8)
+    states = np.repeat(neutral_state("down", body.limits)[None], 12, axis=0)
+    states[:, 0] = 0.1 * np.arange(12)
+    states[:, dof_index("root_rz")] = np.pi - 0.3 + 0.06 * np.arange(12)[:, None]
+    states[:, dof_index("r_elbow_z")] = 0.4 + 0.1 * np.arange(12)[:, None]
+    drift = filter_runs.action_drift(body, landmarks(body, states))
+    assert drift[0] == pytest.approx(0.05, abs=2e-3) and drift[3] == pytest.approx(0.03, abs=0.01)
+    assert drift[dof_index("r_elbow_z")[0]] == pytest.approx(0.05, abs=0.01)
+    still = [k for k in range(27) if k not in (0, 3, 6, 7, 8, *dof_index("r_elbow_z", "r_shoulder_y"))]
+    np.testing.assert_allclose(drift[still], 0.5 * filter_runs.LEAST_VARIATION[still], atol=0.02)
+    np.testing.assert_allclose(filter_runs.action_drift(body, landmarks(body, states[:1])), 0.5 * filter_runs.LEAST_VARIATION)
 
 
 def test_the_likelihood_map_is_best_near_the_truth_with_all_scores(small, monkeypatch):

@@ -59,4 +59,4 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     return Report((Table("fig-6.16", caption, rows),), {"fig-6.16": figure}, tuple(claims))
 
 
-EXPERIMENT = Experiment("fig-6.16", "cameras and voxel size", "Canton, Figure 6.16", grid, runs.cell, report, runs.FAMILY)
+EXPERIMENT = Experiment("fig-6.16", "cameras and voxel size", "Canton, Figure 6.16", grid, runs.cell, report, runs.FAMILY, runs.VERSION)

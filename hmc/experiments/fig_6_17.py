@@ -123,4 +123,6 @@ def _by_action(cells: Sequence[Cell], annealing: str) -> dict[str, dict[str, flo
     }
 
 
-EXPERIMENT = Experiment("fig-6.17", "global against factorised likelihood", "Canton, Figure 6.17", grid, runs.cell, report, runs.FAMILY)
+EXPERIMENT = Experiment(
+    "fig-6.17", "global against factorised likelihood", "Canton, Figure 6.17", grid, runs.cell, report, runs.FAMILY, runs.VERSION
+)

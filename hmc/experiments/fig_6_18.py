@@ -61,4 +61,4 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     return Report((Table("fig-6.18", caption, rows),), {"fig-6.18": figure}, tuple(claims))
 
 
-EXPERIMENT = Experiment("fig-6.18", "density of the flesh table", "Canton, Figure 6.18", grid, runs.cell, report, runs.FAMILY)
+EXPERIMENT = Experiment("fig-6.18", "density of the flesh table", "Canton, Figure 6.18", grid, runs.cell, report, runs.FAMILY, runs.VERSION)

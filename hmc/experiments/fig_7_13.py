@@ -62,4 +62,6 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     return Report((Table("fig-7.13", caption, rows),), {"fig-7.13": figure}, tuple(claims))
 
 
-EXPERIMENT = Experiment("fig-7.13", "SHBM-APF by particles a variable", "Canton, Figure 7.13", grid, runs.cell, report, runs.FAMILY)
+EXPERIMENT = Experiment(
+    "fig-7.13", "SHBM-APF by particles a variable", "Canton, Figure 7.13", grid, runs.cell, report, runs.FAMILY, runs.VERSION
+)

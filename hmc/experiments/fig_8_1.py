@@ -67,4 +67,6 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     return Report((Table("fig-8.1", caption, rows),), {"fig-8.1": figure}, tuple(claims))
 
 
-EXPERIMENT = Experiment("fig-8.1", "APF and SHBM-APF by evaluations", "Canton, Figure 8.1", grid, runs.cell, report, runs.FAMILY)
+EXPERIMENT = Experiment(
+    "fig-8.1", "APF and SHBM-APF by evaluations", "Canton, Figure 8.1", grid, runs.cell, report, runs.FAMILY, runs.VERSION
+)

@@ -24,20 +24,28 @@ from hmc.mask_store import kept_masks
 from hmc.pose.annealed.apf import make_filter, pose_init
 from hmc.pose.annealed.presets import PosePreset, pose_preset
 from hmc.pose.body.inverse import fit_landmarks
+from hmc.pose.body.joints import N_DOF
 from hmc.pose.body.kinematics import landmark_masks, landmarks
+from hmc.pose.body.model import BodyModel
 from hmc.pose.body.proportions import canton_body
 from hmc.pose.scalable.step import step_of
 from hmc.pose.sequence import targets_of
 from hmc.results import TrackTable
 from hmc.tracking.resumable import person_grid
 
-__all__ = ["ANNEALING", "FAMILY", "cell", "filter_preset", "follow_from_truth"]
+__all__ = ["ANNEALING", "FAMILY", "VERSION", "action_drift", "cell", "filter_preset", "follow_from_truth"]
 
 FAMILY = "markerless-filter"
 #: Ways of annealing, and the presets that they are taken from.
 ANNEALING = {"printed": "canton2009", "strong": "default"}
 #: Stature where a recording does not say it, metres.
 HEIGHT_M = 1.75
+#: Of the cells that follow from the true first pose.
+VERSION = 2
+#: The largest variation is that which so many frames do not exceed: inverse kinematics now and then jumps.
+USUAL_SHARE = 0.95
+#: Of what hardly moves, so much is expected nevertheless, metres and radians.
+LEAST_VARIATION = np.r_[np.full(3, 0.02), np.full(N_DOF - 3, np.radians(2))]
 
 
 def filter_preset(parameters: Parameters) -> PosePreset:
@@ -47,7 +55,6 @@ def filter_preset(parameters: Parameters) -> PosePreset:
         base,
         likelihood=parameters["likelihood"],
         density=parameters["density"],
-        drift_scale=annealing.drift_scale,
         annealed=replace(annealing.annealed, layers=parameters["layers"], particles=parameters["particles"]),
     )
 
@@ -64,6 +71,31 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
     rng : numpy.random.Generator
     """
     return follow_from_truth(filter_preset(parameters), parameters, inputs, rng)
+
+
+def action_drift(body: BodyModel, positions: np.ndarray) -> np.ndarray:
+    """P0 of an action: half of the largest variation of each variable in one frame (Canton 2009, section 3.2.2).
+
+    Parameters
+    ----------
+    body : BodyModel
+    positions : ndarray, shape (n, 15, 3)
+        True landmarks in frames that follow one another, metres.
+
+    Returns
+    -------
+    ndarray, shape (27,)
+        Metres and radians.
+    """
+    state, states = standing_state(body, positions[0]), []
+    for one in positions:
+        state, _ = fit_landmarks(body, one, state)
+        states.append(state)
+    if len(states) < 2:
+        return 0.5 * LEAST_VARIATION
+    change = np.diff(states, axis=0)
+    change[:, 3:] = (change[:, 3:] + np.pi) % (2 * np.pi) - np.pi
+    return 0.5 * np.maximum(np.quantile(np.abs(change), USUAL_SHARE, axis=0), LEAST_VARIATION)
 
 
 def follow_from_truth(
@@ -91,13 +123,14 @@ def follow_from_truth(
         As of `cell`; an estimate is NaN where its limb is missing.
     """
     recording, _, masks = tracked(inputs, parameters["recording"], parameters["cameras"])
-    truth = first_truth(recording)
+    truth = every_frame = first_truth(recording)
     if parameters["frames"]:
         truth = truth.where(truth.frames < truth.frames[0] + parameters["frames"])
     voxel_m = parameters["voxel_mm"] / 1000
     grid = person_grid(recording, voxel_m)
     body = canton_body(float(recording.subject_height_m[0]) if recording.subject_height_m else HEIGHT_M)
     filt = make_filter(body, preset, recording.fps, voxel_m, recording.room)
+    filt = replace(filt, drift=preset.drift_scale * action_drift(filt.body, every_frame.positions))
     state, _ = fit_landmarks(body, truth.positions[0], standing_state(body, truth.positions[0]))
     pose = pose_init(state)
     where = TrackTable(truth.frames, np.zeros(len(truth.frames), int), truth.positions.mean(axis=1))

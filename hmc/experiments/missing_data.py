@@ -70,4 +70,4 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     return Report((Table("missing-data", "Errors by share of silhouette pixels removed.", rows),), {"missing-data": figure}, (claim,))
 
 
-EXPERIMENT = Experiment("missing-data", "accuracy against silhouettes removed", "ours", grid, runs.cell, report, runs.FAMILY)
+EXPERIMENT = Experiment("missing-data", "accuracy against silhouettes removed", "ours", grid, runs.cell, report, runs.FAMILY, runs.VERSION)

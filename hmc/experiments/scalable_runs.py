@@ -18,7 +18,7 @@ import numpy as np
 from hmc.experiments import marker_runs
 from hmc.experiments.experiment import Cell, Parameters, Plan, Results
 from hmc.experiments.filter_grids import QUICK_FRAMES
-from hmc.experiments.filter_runs import ANNEALING, filter_preset, follow_from_truth
+from hmc.experiments.filter_runs import ANNEALING, VERSION, filter_preset, follow_from_truth
 from hmc.experiments.inputs import Inputs
 from hmc.experiments.markerless_runs import FRONTEND, MASKS_KEY, action_sources, tracked
 from hmc.experiments.pose_runs import VOXEL_M, estimate_of, first_truth
@@ -39,6 +39,7 @@ __all__ = [
     "MARKERS",
     "METHODS",
     "SHBM",
+    "VERSION",
     "by_method",
     "cell",
     "chain",

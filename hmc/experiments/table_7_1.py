@@ -61,4 +61,6 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     return Report((Table("table-7.1", caption, rows),), {"table-7.1": bars(rows, runs.SHBM, PAPER["SHBM-APF, model 2"])}, (claim,))
 
 
-EXPERIMENT = Experiment("table-7.1", "SHBM-APF by action and model", "Canton, Table 7.1", grid, runs.cell, report, runs.FAMILY)
+EXPERIMENT = Experiment(
+    "table-7.1", "SHBM-APF by action and model", "Canton, Table 7.1", grid, runs.cell, report, runs.FAMILY, runs.VERSION
+)

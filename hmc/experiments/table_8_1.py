@@ -61,4 +61,4 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     return Report((Table("table-8.1", caption, rows),), {"table-8.1": figure}, tuple(claims))
 
 
-EXPERIMENT = Experiment("table-8.1", "all methods by action", "Canton, Table 8.1", grid, runs.cell, report, runs.FAMILY)
+EXPERIMENT = Experiment("table-8.1", "all methods by action", "Canton, Table 8.1", grid, runs.cell, report, runs.FAMILY, runs.VERSION)
