@@ -185,5 +185,5 @@ def test_a_preset_that_cannot_work_is_refused():
         replace(default, refine=None)
     with pytest.raises(InputError, match="needs the symmetric likelihood"):
         replace(default, likelihood="global")
-    with pytest.raises(InputError, match="must not exceed `symmetric.cap_m`"):
+    with pytest.raises(InputError, match=r"must not exceed `symmetric\.cap_m`"):
         replace(default, symmetric=replace(default.symmetric, cap_m=0.04))
