@@ -113,7 +113,9 @@ def chain(recording: Recording, tracks: TrackTable, masks: Path, truth: PoseTabl
     return {"frames": truth.frames, "fps": recording.fps, "estimate_m": estimate_of(truth, poses), "truth_m": truth.positions}
 
 
-def method_grid(plan: Plan, actions: Sequence[str], settings: Sequence[dict[str, Any]], repeats: int = 3) -> list[dict[str, Any]]:
+def method_grid(
+    plan: Plan, actions: Sequence[str], settings: Sequence[dict[str, Any]], repeats: int = 3, quick_repeats: int = 1
+) -> list[dict[str, Any]]:
     """Every setting on every action, by the actors in turn.
 
     Parameters
@@ -122,8 +124,8 @@ def method_grid(plan: Plan, actions: Sequence[str], settings: Sequence[dict[str,
     actions : sequence of str
     settings : sequence of mapping
         ``method`` and what else differs from 7 cameras, 20 mm (quick: 30 mm), strong annealing, whole silhouettes.
-    repeats : int
-        Of every setting; quick: 1.
+    repeats, quick_repeats : int
+        Of every setting, in full and quick.
     """
     sources = action_sources(plan, actions)
     if not plan.recordings:
@@ -134,7 +136,7 @@ def method_grid(plan: Plan, actions: Sequence[str], settings: Sequence[dict[str,
         {"recording": source.label} | base | setting | {"repeat": repeat}
         for source in sources
         for setting in settings
-        for repeat in range(1 if plan.quick else repeats)
+        for repeat in range(quick_repeats if plan.quick else repeats)
     ]
 
 
