@@ -1,6 +1,7 @@
 """Fixtures that several test files share."""
 
 import os
+import sys
 from pathlib import Path
 
 import cv2
@@ -67,3 +68,11 @@ def recording_folder(tmp_path, ring) -> Path:
         write_video(folder / "videos" / f"{camera.name}.avi", 12, camera.size)
         write_video(folder / "background" / f"{camera.name}.avi", 4, camera.size, lambda index: 20)
     return folder
+
+
+@pytest.fixture(autouse=True)
+def _no_figure_is_left():
+    """What a test drew is closed after it: matplotlib warns of many, and the next test would be blamed."""
+    yield
+    if "matplotlib.pyplot" in sys.modules:
+        sys.modules["matplotlib.pyplot"].close("all")
