@@ -30,7 +30,7 @@ from hmc.pose.swarm.sequence import SwarmTask, pose_by_swarm, swarm_preset
 from hmc.recording import Recording
 from hmc.results import TrackTable
 
-__all__ = ["EXPERIMENT", "METHODS"]
+__all__ = ["EXPERIMENT", "METHODS", "effort"]
 
 #: Names, the command line's method and preset.
 METHODS = {

@@ -52,7 +52,7 @@ _FEW_FRAMES = (
 )
 _MARKER_SCORE = (
     "The printed likelihood asks only whether the detections nearest to a landmark agree with one another, not where the landmark lies in "
-    "its gate; and first poses are off in some recordings."
+    "its gate. The preset `default` asks that too, and loses single limbs for some frames."
 )
 _OWN_FUNCTION = "The thesis does not state its function, so it is one of our own."
 _TOUCHING = "What touches over more than a narrow place, as arms at the body do, has no branch of its own."
@@ -103,7 +103,7 @@ CATALOGUE = (
     ),
     Entry(
         "fig-5.4", CANTON, "error histograms and quantile plots", "marker-based errors the most Gaussian", _HUMANEVA,
-        "The marker-based filter loses legs among 20 false detections a view.",
+        "The marker-based filter loses single limbs for some frames among 20 false detections a view: few errors, and large ones.",
     ),
     Entry("fig-5.6", CANTON, "the threshold by both tests", "they agree", _HUMANEVA),
     Entry("fig-5.7", CANTON, "elbow and knee on one reference body", "angles comparable between bodies", _HUMANEVA),

@@ -159,14 +159,14 @@ def search_limbs(
         dofs = LIMBS[limb]
         trials = np.repeat(state[None], settings.draws + 1, axis=0)
         trials[1:, dofs] = _draw(rng, settings, body, state, limb, hull_points)
-        own, *costs = symmetric_cost(body, samples, trials, target, coarse, cost_settings)
+        costs = symmetric_cost(body, samples, trials, target, coarse, cost_settings)  # the first is the present pose
         evaluations += len(trials)
-        if min(costs) > settings.promise * own:
+        if costs[1:].min() > settings.promise * costs[0]:
             continue
         trial, info = refine_best(
             body,
             samples,
-            [trials[1 + pick] for pick in np.argsort(costs)[:2]],
+            [trials[1 + pick] for pick in np.argsort(costs[1:])[:2]],
             target,
             hull_points,
             cost_settings,

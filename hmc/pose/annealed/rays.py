@@ -148,7 +148,7 @@ def slide_to_axis(local: np.ndarray, directions: np.ndarray, lengths: np.ndarray
     u, v, w = directions
     towards = x * u
     towards += y * v
-    across = np.multiply(w, w, dtype=w.dtype)
+    across = w * w
     np.subtract(1, across, out=across)  # directions are unit vectors; where they are zero, so is what is divided
     # A ray along the axis passes it everywhere: any point will do.
     np.maximum(across, 1e-6, out=across)

@@ -127,9 +127,7 @@ def refine(
         Within the body's joint limits.
     info : RefineInfo
     """
-    problem = _Problem(
-        body, samples, target, hull_points, cost_settings, settings, _free(free), settings.stay_weight / _deviation(deviation) ** 2
-    )
+    problem = _problem(body, samples, target, hull_points, cost_settings, settings, free, deviation)
     return _outcome(_descend(problem, _begin(problem, state, anchor), settings.iterations))
 
 
@@ -165,9 +163,7 @@ def refine_best(
     info : RefineInfo
         Of the best, with the evaluations of all.
     """
-    problem = _Problem(
-        body, samples, target, hull_points, cost_settings, settings, _free(None), settings.stay_weight / _deviation(None) ** 2
-    )
+    problem = _problem(body, samples, target, hull_points, cost_settings, settings)
     trials: list[_Descent] = []
     for start in starts:
         begun = _begin(problem, start, anchor, trials[-1].found.pairs if trials else None)
@@ -209,9 +205,7 @@ def refine_all(
     list of tuple
         As from `refine`, start by start.
     """
-    problem = _Problem(
-        body, samples, target, hull_points, cost_settings, settings, _free(None), settings.stay_weight / _deviation(None) ** 2
-    )
+    problem = _problem(body, samples, target, hull_points, cost_settings, settings)
     ended: list[_Descent] = []
     places: list[np.ndarray] = []
     for start in starts:
@@ -225,12 +219,11 @@ def refine_all(
     return [_outcome(trial) for trial in ended]
 
 
-def _free(free: np.ndarray | None) -> np.ndarray:
-    return np.ones(N_DOF, bool) if free is None else free
-
-
-def _deviation(deviation: np.ndarray | None) -> np.ndarray:
-    return np.r_[np.full(3, 0.1), np.full(N_DOF - 3, 0.5)] if deviation is None else deviation
+def _problem(body, samples, target, hull_points, cost_settings, settings, free=None, deviation=None) -> _Problem:
+    """All angles free, and held by .1 m and .5 rad, where nothing else is said."""
+    free = np.ones(N_DOF, bool) if free is None else free
+    deviation = np.r_[np.full(3, 0.1), np.full(N_DOF - 3, 0.5)] if deviation is None else deviation
+    return _Problem(body, samples, target, hull_points, cost_settings, settings, free, settings.stay_weight / deviation**2)
 
 
 def _outcome(descent: _Descent) -> tuple[np.ndarray, RefineInfo]:
