@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from drawn import draw_recording, walk
 from numpy.testing import assert_array_equal
+from stopped import Stopped, noting, stopping
 
 from hmc.errors import InputError
 from hmc.landmarks import landmark_index
@@ -70,18 +71,6 @@ def equal(one, other) -> None:
     assert one.states.bodies == other.states.bodies and one.notes == other.notes
 
 
-def die_after(k: int):
-    """A progress that raises once k frames have been passed on."""
-
-    def progress(steps, total):
-        for n, step in enumerate(steps):
-            if n == k:
-                raise KeyboardInterrupt
-            yield step
-
-    return progress
-
-
 def test_every_frame_of_a_track_has_a_pose(whole, recording):
     name, people = whole
     assert people.poses.frames.tolist() == list(range(FRAMES)) and set(people.poses.persons) == {0}
@@ -111,31 +100,25 @@ def test_a_stopped_run_goes_on_and_ends_as_if_it_had_not_been(whole, recording, 
     name, people = whole
     journal = tmp_path / "journal"
     options = {"seed": 3, "journal": journal, "key": "run"}
-    with pytest.raises(KeyboardInterrupt):
-        pose_recording(recording, tracks, VOXEL_M, PRESET[name], progress=die_after(stop), **options)
+    with pytest.raises(Stopped):
+        pose_recording(recording, tracks, VOXEL_M, PRESET[name], progress=stopping(stop), **options)
     with open(journal, "a") as file:
         file.write('{"person":0,"frames":[2],"sta')  # the power went while a line was written
-    seen = []
-
-    def count(steps, total):
-        for step in steps:
-            seen.append(step.index)
-            yield step
-
-    equal(pose_recording(recording, tracks, VOXEL_M, PRESET[name], progress=count, **options), people)
+    seen: list[int] = []
+    equal(pose_recording(recording, tracks, VOXEL_M, PRESET[name], progress=noting(seen), **options), people)
     # What was decided is not computed again; legs are decided two frames later.
     assert seen[0] == (0 if stop < 3 else stop if name == "canton2009" else 3)
     # A finished run is read back without a frame being touched.
     seen.clear()
-    equal(pose_recording(recording, tracks, VOXEL_M, PRESET[name], progress=count, **options), people)
+    equal(pose_recording(recording, tracks, VOXEL_M, PRESET[name], progress=noting(seen), **options), people)
     assert seen == []
 
 
 def test_a_journal_of_another_run_is_begun_anew(recording, tracks, tmp_path):
     journal = tmp_path / "journal"
     preset = PRESET["canton2009"]
-    with pytest.raises(KeyboardInterrupt):
-        pose_recording(recording, tracks, VOXEL_M, preset, seed=1, journal=journal, key="one", progress=die_after(5))
+    with pytest.raises(Stopped):
+        pose_recording(recording, tracks, VOXEL_M, preset, seed=1, journal=journal, key="one", progress=stopping(5))
     anew = pose_recording(recording, tracks, VOXEL_M, preset, seed=2, journal=journal, key="other")
     equal(anew, pose_recording(recording, tracks, VOXEL_M, preset, seed=2))
 
@@ -186,8 +169,8 @@ def test_a_track_with_a_gap(recording, tracks, tmp_path):
     options = {"seed": 3, "journal": tmp_path / "journal", "key": "gap"}
     whole = pose_recording(recording, kept, VOXEL_M, PRESET["canton2009"], seed=3)
     assert whole.poses.frames.tolist() == [0, 1, 2, 3, 5, 6]
-    with pytest.raises(KeyboardInterrupt):
-        pose_recording(recording, kept, VOXEL_M, PRESET["canton2009"], progress=die_after(5), **options)
+    with pytest.raises(Stopped):
+        pose_recording(recording, kept, VOXEL_M, PRESET["canton2009"], progress=stopping(5), **options)
     equal(pose_recording(recording, kept, VOXEL_M, PRESET["canton2009"], **options), whole)
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
+from stopped import Stopped, noting, stopping
 
 from hmc.cli import main
 from hmc.pose.swarm import sequence
@@ -21,10 +22,6 @@ TINY = Path(__file__).resolve().parents[1] / "data" / "synthetic" / "tiny"
 VOXEL_M = 0.04
 
 
-class Stopped(Exception):
-    """Somebody pressed the keys that stop a program."""
-
-
 @pytest.fixture(scope="module")
 def task():
     fit = FitSettings(stages=((6, 3),) * 5, tune_particles=6, tune_iterations=2)
@@ -36,16 +33,6 @@ def task():
 @pytest.fixture(scope="module")
 def tracks(task):
     return track_recording(task.recording, 0.05)
-
-
-def stopping(after):
-    def progress(steps, total):
-        for k, step in enumerate(steps):
-            if k == after:
-                raise Stopped
-            yield step
-
-    return progress
 
 
 def watched(patch):
@@ -76,7 +63,7 @@ def test_a_stopped_run_goes_on_and_comes_to_the_same(task, tracks, whole, tmp_pa
     with pytest.raises(Stopped):
         pose_by_swarm(task, tracks, VOXEL_M, **kept, progress=stopping(after))
     seen, resumed = [], watched(monkeypatch)
-    again, lines = pose_by_swarm(task, tracks, VOXEL_M, **kept, progress=lambda steps, total: (seen.append(s.index) or s for s in steps))
+    again, lines = pose_by_swarm(task, tracks, VOXEL_M, **kept, progress=noting(seen))
     assert seen == list(range(0 if after < task.window else after, 6))
     assert_array_equal(again.poses.positions, people.poses.positions)
     for line, row in zip(lines, rows, strict=True):

@@ -168,6 +168,7 @@ def run(args: argparse.Namespace) -> int:
     )
     passed: dict[str, Any] = {
         "frontend": frontend,
+        "journal": pose_journal,
         "masks": masks,
         "key": key,
         "on_problem": problems.append,
@@ -175,7 +176,7 @@ def run(args: argparse.Namespace) -> int:
     }
     if pso:
         swarm = SwarmTask(recording, preset, args.seed, height)
-        people, fits = pose_by_swarm(swarm, tracks, args.voxel, journal=pose_journal, **passed)
+        people, fits = pose_by_swarm(swarm, tracks, args.voxel, **passed)
         write_fits(args.out / "fits.csv", fits)
     elif smd:
         people = pose_by_descent(SmdTask(recording, preset, args.seed, height), tracks, args.voxel, **passed)
@@ -188,7 +189,6 @@ def run(args: argparse.Namespace) -> int:
             args.seed,
             height_m=height,
             settings=following,
-            journal=pose_journal,
             **passed,
         )
     if args.smooth:

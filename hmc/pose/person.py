@@ -7,6 +7,7 @@ and the frame alone, so a run can go on from the rows that it left (`taken_up`).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -111,6 +112,10 @@ class PersonTask:
     frames: np.ndarray
     velocities: np.ndarray
 
+    def velocity(self, frames: int | Sequence[int]) -> np.ndarray:
+        """Velocity in some of the person's frames, shape (..., 3), metres a second."""
+        return self.velocities[np.searchsorted(self.frames, frames)]
+
 
 @dataclass(frozen=True)
 class Followed:
@@ -170,8 +175,8 @@ class PersonState:
         Frames that are not decided.
     context : tuple of (int, ndarray of shape (27,))
         The last decided frames, with their poses.
-    done_to : int or None
-        The last decided frame.
+    done_to : int
+        The last decided frame; -1: none is.
     """
 
     filter: PoseFilter | None = None
@@ -179,7 +184,7 @@ class PersonState:
     watched: tuple[tuple[int, HullTarget | None], ...] = ()
     followed: tuple[Followed, ...] = ()
     context: tuple[tuple[int, np.ndarray], ...] = ()
-    done_to: int | None = None
+    done_to: int = -1
 
 
 def person_step(
@@ -233,7 +238,7 @@ def _start(task: PoseTask, person: PersonTask, state: PersonState) -> PersonStat
         task.fps,
         targets,
         task.height_m,
-        person.velocities[np.searchsorted(person.frames, frames)],
+        person.velocity(frames),
         task.room,
         task.settings.start,
     )
@@ -263,7 +268,7 @@ def _found_again(
     """The pose and its account, replaced where the pose was lost; what is known of that goes on in its memory."""
     if task.loss is None:
         return pose, info
-    rng, velocity = task.rng(person.number, frame, 1), person.velocities[np.searchsorted(person.frames, frame)]
+    rng, velocity = task.rng(person.number, frame, 1), person.velocity(frame)
     known = recalled(before.memory)
     pose, info, known = loss_step(rng, filt, task.fps, pose, info, target, velocity, known, task.loss, task.settings.start)
     return replace(pose, memory={**pose.memory, **remembered(known)}), info

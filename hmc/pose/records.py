@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from hmc.files import atomic_write
+from hmc.journal import append_journal, open_journal
 from hmc.montecarlo.filters import ParticleState
 from hmc.pose.annealed.apf import PoseState, pose_init
 from hmc.pose.annealed.presets import PosePreset
@@ -16,7 +18,7 @@ from hmc.pose.body.model import BodyModel
 from hmc.pose.body.proportions import make_body
 from hmc.pose.person import Decided
 
-__all__ = ["body_of", "from_record", "keep_particles", "kept_particles", "to_record"]
+__all__ = ["body_of", "from_record", "keep_decided", "keep_particles", "kept_decided", "kept_particles", "to_record"]
 
 #: Before the names of the memory's arrays in a file of particles.
 _MEMORY = "memory_"
@@ -25,6 +27,45 @@ _MEMORY = "memory_"
 def body_of(dimensions: dict[str, float], preset: PosePreset) -> BodyModel:
     """The body of these dimensions with the preset's joint limits."""
     return make_body(dimensions, canton_limits() if preset.body == "canton" else default_limits())
+
+
+def keep_decided(journal: str | Path | None, preset: PosePreset, decided: Decided, before: int) -> None:
+    """Add rows to a run's journal, with what the filter goes on from beside it.
+
+    Parameters
+    ----------
+    journal : path or None
+        None: nothing is kept.
+    preset : PosePreset
+        Particles are kept where it goes on from them.
+    decided : Decided
+    before : int
+        The last frame of the person that was decided before these rows; -1: there was none.
+    """
+    if journal is None:
+        return
+    if decided.pose is not None and (preset.refine is None or decided.pose.memory):
+        keep_particles(journal, decided.person, decided.frames[-1], before, decided.pose)
+    append_journal(journal, to_record(decided))
+
+
+def kept_decided(journal: str | Path | None, key: str, preset: PosePreset) -> Iterator[Decided]:
+    """The rows that a stopped run left, in order; the last ones of each person with what the filter goes on from.
+
+    Parameters
+    ----------
+    journal, key
+        As for `hmc.journal.open_journal`.
+    preset : PosePreset
+        As they were kept with.
+    """
+    records = open_journal(journal, key)
+    last = {record["person"]: k for k, record in enumerate(records)}
+    for k, record in enumerate(records):
+        kept = None
+        if journal is not None and last[record["person"]] == k:
+            kept = kept_particles(journal, record["person"], record["frames"][-1])
+        yield from_record(record, preset, *(kept or ()))
 
 
 def to_record(decided: Decided) -> dict[str, Any]:

@@ -8,16 +8,14 @@ from __future__ import annotations
 
 import logging
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from hmc.frontend import FrontendSettings, HullStep, stream_hulls
-from hmc.journal import append_journal, open_journal
+from hmc.frontend import FrontendSettings, HullStep, MaskStep, stream_hulls
 from hmc.landmarks import LANDMARKS
 from hmc.mask_store import kept_masks
 from hmc.pose.annealed.hull_target import HullTarget, make_target
@@ -27,14 +25,14 @@ from hmc.pose.annealed.unexplained import explaining
 from hmc.pose.body.joints import DOF_NAMES
 from hmc.pose.body.kinematics import landmark_masks, landmarks
 from hmc.pose.person import Decided, FollowSettings, PersonState, PersonTask, PoseTask, person_step, taken_up
-from hmc.pose.records import from_record, keep_particles, kept_particles, to_record
-from hmc.recording import Recording
+from hmc.pose.records import keep_decided, kept_decided
+from hmc.recording import Recording, iterate_frames
 from hmc.results import PoseStates, PoseTable, TrackTable
 from hmc.tracking.resumable import WARM_UP_FRAMES, observe_step, person_grid
 from hmc.tracking.tracks import person_voxels, velocities
 from hmc.voxels.grid import VoxelGrid
 
-__all__ = ["PosedPeople", "frames_of_persons", "pose_recording", "targets_of", "unfitted_notes"]
+__all__ = ["PosedPeople", "frames_left", "persons_of", "pose_recording", "posed_people", "targets_of", "unfitted_notes"]
 
 logger = logging.getLogger("hmc")
 
@@ -117,38 +115,69 @@ def pose_recording(
         When the voxels are too many for the memory.
     """
     grid = person_grid(recording, voxel_size_m)
-    end = recording.start + recording.n_frames
     task = PoseTask(preset, settings or FollowSettings(), recording.fps, recording.room, voxel_size_m, seed, height_m)
-    persons = {number: PersonTask(number, *rows) for number, rows in frames_of_persons(recording, tracks).items()}
+    persons = persons_of(recording, tracks)
     states = dict.fromkeys(persons, PersonState())
     done: list[Decided] = []
-    for decided in _decided(open_journal(journal, key), preset, journal):
+    for decided in kept_decided(journal, key, preset):
         done.append(replace(decided, pose=None))
         states[decided.person] = taken_up(task, states[decided.person], decided)
-    first = _next_frame(persons, states)
-    if first is None:
-        return _assemble(done)
-    report = on_problem or logger.warning
-    kept = None if masks is None else kept_masks(masks, key, first, end)
-    stream = stream_hulls(recording, grid, frontend, first=first, warm_up=WARM_UP_FRAMES, masks=kept, on_problem=report)
-    for hull in progress(stream, end - first) if progress else stream:
+    done_to = {number: state.done_to for number, state in states.items()}
+    for hull in frames_left(
+        recording, grid, persons, done_to, frontend=frontend, masks=masks, key=key, on_problem=on_problem, progress=progress
+    ):
         for number, target in targets_of(recording, grid, tracks, hull).items():
-            done_to = states[number].done_to
-            if done_to is not None and hull.index <= done_to:
+            before = states[number].done_to
+            if hull.index <= before:
                 continue
             states[number], new = person_step(task, persons[number], states[number], hull.index, target)
             for decided in new:
-                _keep(journal, preset, decided, done_to)
+                keep_decided(journal, preset, decided, before)
                 done.append(replace(decided, pose=None))  # particles are not kept for long
-    return _assemble(done)
+    return posed_people(done)
 
 
-def _keep(journal: str | Path | None, preset: PosePreset, decided: Decided, before: int | None) -> None:
-    if journal is None:
+def frames_left(
+    recording: Recording,
+    grid: VoxelGrid,
+    persons: Mapping[int, PersonTask],
+    done_to: Mapping[int, int],
+    *,
+    frontend: FrontendSettings | None = None,
+    masks: str | Path | None = None,
+    key: str = "",
+    on_problem: Callable[[str], None] | None = None,
+    progress: Callable[[Iterable[HullStep], int], Iterable[HullStep]] | None = None,
+    images: bool = False,
+) -> Iterator[HullStep]:
+    """The frames from the first that somebody still needs to the end of the selection; none where all is done.
+
+    Parameters
+    ----------
+    recording : Recording
+    grid : VoxelGrid
+    persons : mapping of int to PersonTask
+    done_to : mapping of int to int
+        The last frame of each person that is done.
+    frontend, masks, key, on_problem, progress
+        As for `pose_recording`.
+    images : bool
+        Whether images are wanted too where silhouettes were kept.
+
+    Yields
+    ------
+    HullStep
+    """
+    needed = [frame for number, person in persons.items() for frame in person.frames[person.frames > done_to[number]][:1].tolist()]
+    if not needed:
         return
-    if decided.pose is not None and (preset.refine is None or decided.pose.memory):
-        keep_particles(journal, decided.person, decided.frames[-1], before, decided.pose)
-    append_journal(journal, to_record(decided))
+    first, end, report = min(needed), recording.start + recording.n_frames, on_problem or logger.warning
+    kept: Iterable[MaskStep] | None = None if masks is None else kept_masks(masks, key, first, end)
+    if kept is not None and images:
+        frames = iterate_frames(recording, first, end, report)
+        kept = (replace(step, images=frame.images) for step, frame in zip(kept, frames, strict=True))
+    stream = stream_hulls(recording, grid, frontend, first=first, warm_up=WARM_UP_FRAMES, masks=kept, on_problem=report)
+    yield from progress(stream, end - first) if progress else stream
 
 
 def targets_of(recording: Recording, grid: VoxelGrid, tracks: TrackTable, hull: HullStep) -> dict[int, HullTarget | None]:
@@ -187,7 +216,7 @@ def targets_of(recording: Recording, grid: VoxelGrid, tracks: TrackTable, hull: 
     return targets
 
 
-def frames_of_persons(recording: Recording, tracks: TrackTable) -> dict[int, tuple[np.ndarray, np.ndarray]]:
+def persons_of(recording: Recording, tracks: TrackTable) -> dict[int, PersonTask]:
     """Everybody who is tracked in the recording's selection.
 
     Parameters
@@ -195,11 +224,6 @@ def frames_of_persons(recording: Recording, tracks: TrackTable) -> dict[int, tup
     recording : Recording
     tracks : TrackTable
         Rows outside of the selection do not count.
-
-    Returns
-    -------
-    dict of int to (ndarray of int of shape (n,), ndarray of shape (n, 3))
-        The frames of each person's track, rising, and the track's velocity in each, metres a second.
     """
     tracks = tracks.where((tracks.frames >= recording.start) & (tracks.frames < recording.start + recording.n_frames))
     speed = velocities(tracks, recording.fps)
@@ -207,7 +231,7 @@ def frames_of_persons(recording: Recording, tracks: TrackTable) -> dict[int, tup
     for number in np.unique(tracks.persons).tolist():
         rows = np.flatnonzero(tracks.persons == number)
         rows = rows[np.argsort(tracks.frames[rows])]
-        persons[number] = tracks.frames[rows], speed[rows]
+        persons[number] = PersonTask(number, tracks.frames[rows], speed[rows])
     return persons
 
 
@@ -223,27 +247,13 @@ def unfitted_notes(persons: Iterable[int], status: Iterable[str]) -> list[str]:
     return [f"person {who}: {n} frame{'s' if n > 1 else ''} without a pose: {reason}" for (who, reason), n in sorted(why.items())]
 
 
-def _next_frame(persons: Mapping[int, PersonTask], states: Mapping[int, PersonState]) -> int | None:
-    """First frame that anybody still needs; None when all is done."""
-    needed = []
-    for number, person in persons.items():
-        done_to = states[number].done_to
-        needed += person.frames[person.frames > done_to][:1].tolist() if done_to is not None else person.frames[:1].tolist()
-    return min(needed, default=None)
+def posed_people(rows: Sequence[Decided]) -> PosedPeople:
+    """Tables of all rows of a run, in order of frame and person.
 
-
-def _decided(records: list[dict[str, Any]], preset: PosePreset, journal: str | Path | None) -> Iterator[Decided]:
-    """The rows of a journal's records; the last ones of each person with the particles that were kept."""
-    last = {record["person"]: k for k, record in enumerate(records)}
-    for k, record in enumerate(records):
-        kept = None
-        if journal is not None and last[record["person"]] == k:
-            kept = kept_particles(journal, record["person"], record["frames"][-1])
-        yield from_record(record, preset, *(kept or ()))
-
-
-def _assemble(rows: list[Decided]) -> PosedPeople:
-    """Tables in order of frame and person."""
+    Parameters
+    ----------
+    rows : sequence of Decided
+    """
     none = np.zeros((0, len(DOF_NAMES)))
     frames = np.array([frame for one in rows for frame in one.frames], int)
     persons = np.array([one.person for one in rows for _ in one.frames], int)

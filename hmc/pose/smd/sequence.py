@@ -1,8 +1,7 @@
-"""Everybody's poses in a recording by multi-cue descent: the counterpart of `hmc.pose.sequence`, with the same result."""
+"""Everybody's poses in a recording by multi-cue descent: the counterpart of `hmc.pose.sequence`, with the same result and journal."""
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -10,32 +9,32 @@ from pathlib import Path
 
 import numpy as np
 
-from hmc.frontend import FrontendSettings, HullStep, stream_hulls
-from hmc.landmarks import LANDMARKS
-from hmc.mask_store import kept_masks
+from hmc.frontend import FrontendSettings, HullStep
+from hmc.pose.annealed.apf import pose_init
 from hmc.pose.annealed.hull_target import HullTarget
 from hmc.pose.annealed.presets import pose_preset
 from hmc.pose.body.joints import DOF_NAMES
-from hmc.pose.body.kinematics import landmarks
-from hmc.pose.sequence import PosedPeople, frames_of_persons, targets_of, unfitted_notes
+from hmc.pose.person import NO_START, Decided, PersonTask
+from hmc.pose.records import keep_decided, kept_decided
+from hmc.pose.sequence import PosedPeople, frames_left, persons_of, posed_people, targets_of
 from hmc.pose.smd.begin import FirstPose, begin
+from hmc.pose.smd.color_cue import ColorModel
 from hmc.pose.smd.cues import Observed
 from hmc.pose.smd.observe import observe_people
 from hmc.pose.smd.start import find_da_vinci
-from hmc.pose.smd.tracker import SmdPreset, SmdTracker, TrackState, track_step
+from hmc.pose.smd.tracker import SmdPreset, SmdTracker, TrackInfo, TrackState, make_tracker, track_step
 from hmc.pose.start import start_person
 from hmc.recording import Recording
-from hmc.results import PoseStates, PoseTable, TrackTable
-from hmc.tracking.resumable import WARM_UP_FRAMES, person_grid
+from hmc.results import TrackTable
+from hmc.tracking.resumable import person_grid
 from hmc.voxels.grid import VoxelGrid
 
 __all__ = ["SmdTask", "pose_by_descent"]
 
-logger = logging.getLogger("hmc")
-
 #: How long a person is watched before body and first pose are decided, seconds.
 WINDOW_S = 1.5
-NO_START = "no hull to start from"
+#: Its start by the spectral route is this preset's, and so are the body's joint limits.
+ANNEALED = pose_preset("default")
 
 
 #: ``start(frame_rng, targets, velocities)`` finds a first pose in hulls of consecutive frames, or None.
@@ -67,17 +66,32 @@ class SmdTask:
         """The random numbers of a person's frame."""
         return np.random.default_rng([self.seed, person, frame])
 
+    @property
+    def window(self) -> int:
+        """Frames of `WINDOW_S`, three at least."""
+        return max(3, round(WINDOW_S * self.recording.fps))
 
-@dataclass
-class _Person:
-    """A person while the recording is read: changed from frame to frame."""
 
-    number: int
-    frames: np.ndarray
-    velocities: np.ndarray
-    watched: list[tuple[int, Observed | None, HullTarget | None]]
+@dataclass(frozen=True)
+class SmdPerson:
+    """What is known of a person between two frames.
+
+    Parameters
+    ----------
+    tracker : SmdTracker or None
+        None while the person is watched.
+    pose : TrackState or None
+        Of the last frame that was followed.
+    watched : tuple of (int, Observed or None, HullTarget or None)
+        Frames of the window that is not over, and what was seen in them.
+    done_to : int
+        The last decided frame; -1: none is.
+    """
+
     tracker: SmdTracker | None = None
-    state: TrackState | None = None
+    pose: TrackState | None = None
+    watched: tuple[tuple[int, Observed | None, HullTarget | None], ...] = ()
+    done_to: int = -1
 
 
 def pose_by_descent(
@@ -86,6 +100,7 @@ def pose_by_descent(
     voxel_size_m: float,
     *,
     frontend: FrontendSettings | None = None,
+    journal: str | Path | None = None,
     masks: str | Path | None = None,
     key: str = "",
     on_problem: Callable[[str], None] | None = None,
@@ -99,7 +114,7 @@ def pose_by_descent(
     tracks : TrackTable
         As from `hmc.tracking.resumable.track_recording`.
     voxel_size_m : float
-    frontend, masks, key, on_problem, progress
+    frontend, journal, masks, key, on_problem, progress
         As for `hmc.pose.sequence.pose_recording`.
 
     Returns
@@ -109,64 +124,88 @@ def pose_by_descent(
     """
     recording = task.recording
     grid = person_grid(recording, voxel_size_m)
-    end = recording.start + recording.n_frames
-    people = {number: _Person(number, *rows, []) for number, rows in frames_of_persons(recording, tracks).items()}
-    if not people:
-        return _assemble([], {})
-    rows: list[tuple[int, int, np.ndarray, float, str]] = []
-    first = min(int(person.frames[0]) for person in people.values())
-    kept = None if masks is None else kept_masks(masks, key, first, end)
-    stream = stream_hulls(
-        recording, grid, frontend, first=first, warm_up=WARM_UP_FRAMES, masks=kept, on_problem=on_problem or logger.warning
-    )
-    for hull in progress(stream, end - first) if progress else stream:
-        present = [people[number] for number in tracks.persons[tracks.frames == hull.index].tolist()]
+    persons = persons_of(recording, tracks)
+    states = dict.fromkeys(persons, SmdPerson())
+    done: list[Decided] = []
+    for decided in kept_decided(journal, key, ANNEALED):
+        done.append(replace(decided, pose=None))
+        states[decided.person] = _taken_up(task, states[decided.person], decided)
+    done_to = {number: state.done_to for number, state in states.items()}
+    for hull in frames_left(
+        recording, grid, persons, done_to, frontend=frontend, masks=masks, key=key, on_problem=on_problem, progress=progress
+    ):
+        left = [number for number in tracks.persons[tracks.frames == hull.index].tolist() if hull.index > states[number].done_to]
         seen = observe_people(recording, grid, tracks, hull)
-        waiting = any(person.tracker is None for person in present)
+        waiting = any(states[number].tracker is None for number in left)
         targets = targets_of(recording, grid, tracks, hull) if waiting else {}
-        for person in present:
-            observed = seen.get(person.number)
-            if person.tracker is None:
-                person.watched.append((hull.index, observed, targets.get(person.number)))
-                rows += _try_start(task, person, grid)
-            else:
-                rows.append(_follow(task, person, hull.index, observed))
-    return _assemble(rows, {number: person.tracker for number, person in people.items()})
+        for number in left:
+            before = states[number].done_to
+            states[number], new = _step(task, grid, persons[number], states[number], hull.index, seen.get(number), targets.get(number))
+            if new is not None:
+                keep_decided(journal, ANNEALED, new, before)
+                done.append(replace(new, pose=None))
+    return posed_people(done)
 
 
-def _try_start(task: SmdTask, person: _Person, grid: VoxelGrid) -> list:
-    """When the window is over: start from the first frame whose pose is da Vinci's, or from whatever pose there is."""
-    recording = task.recording
-    frames = [number for number, _, _ in person.watched]
-    if len(frames) < max(3, round(WINDOW_S * recording.fps)) and frames[-1] != int(person.frames[-1]):
-        return []
-    observed, targets = [one for _, one, _ in person.watched], [target for _, _, target in person.watched]
-    first, floor = None, float(recording.room[0, 2])
+def _step(
+    task: SmdTask,
+    grid: VoxelGrid,
+    person: PersonTask,
+    state: SmdPerson,
+    frame: int,
+    observed: Observed | None,
+    target: HullTarget | None,
+) -> tuple[SmdPerson, Decided | None]:
+    """One frame of a person, and the frames that it decides."""
+    if state.tracker is not None and state.pose is not None:
+        pose, info = track_step(task.rng(person.number, frame), state.tracker, state.pose, observed)
+        return replace(state, pose=pose, done_to=frame), _decided(person, state.tracker, {frame: (pose, info)})
+    state = replace(state, watched=(*state.watched, (frame, observed, target)))
+    if len(state.watched) < task.window and frame != int(person.frames[-1]):
+        return state, None
+    found = _start(task, grid, person, state)
+    if found is None:
+        # Nothing to start from yet: these frames stay without a pose, and the next window is tried.
+        frames = tuple(number for number, _, _ in state.watched)
+        nothing = np.full((len(frames), len(DOF_NAMES)), np.nan)
+        rows = Decided(person.number, frames, nothing, (np.nan,) * len(frames), (NO_START,) * len(frames))
+        return replace(state, watched=(), done_to=frame), rows
+    tracker, followed = found
+    return SmdPerson(tracker, followed[frame][0], done_to=frame), _decided(person, tracker, followed)
+
+
+def _start(
+    task: SmdTask, grid: VoxelGrid, person: PersonTask, state: SmdPerson
+) -> tuple[SmdTracker, dict[int, tuple[TrackState, TrackInfo]]] | None:
+    """The window is over: body and poses of its frames, from the first whose pose is da Vinci's on, or from whatever pose there is."""
+    frames = [frame for frame, _, _ in state.watched]
+    observed, targets = [one for _, one, _ in state.watched], [target for _, _, target in state.watched]
+    first, floor = None, float(task.recording.room[0, 2])
     for k, seen in enumerate(observed):
         spread = None if seen is None else find_da_vinci(seen.points, grid.voxel_size_m, floor, task.height_m)
         if spread is not None:
             first = FirstPose(k, spread.body, spread.state)
             break
     if first is None:
-        speed = person.velocities[np.searchsorted(person.frames, frames)]
         start = task.any_start or partial(_spectral_start, task)
-        first = start(lambda k: task.rng(person.number, frames[k]), targets, speed)
-    person.watched, watched = [], person.watched
+        first = start(lambda k: task.rng(person.number, frames[k]), targets, person.velocity(frames))
     if first is None:
-        return [(frame, person.number, np.full(len(DOF_NAMES), np.nan), np.nan, NO_START) for frame in frames]
+        return None
     rng = np.random.default_rng([task.seed, person.number, frames[first.place], 1])
-    person.tracker, state = begin(rng, task.preset, first, observed, targets, task.height_m is not None)
-    rows = []
+    tracker, settled = begin(rng, task.preset, first, observed, targets, task.height_m is not None)
+    followed = {}
     for places in (range(first.place - 1, -1, -1), range(first.place, len(frames))):
-        person.state = state
-        rows += [_follow(task, person, watched[k][0], watched[k][1]) for k in places]
-    return rows
+        pose = settled
+        for k in places:
+            pose, info = track_step(task.rng(person.number, frames[k]), tracker, pose, observed[k])
+            followed[frames[k]] = pose, info
+    return tracker, followed
 
 
 def _spectral_start(task: SmdTask, rng, targets, speed) -> FirstPose | None:
     """By the start of the annealed filters with candidates from the spectral skeleton, the waist taken into the trunk."""
     recording = task.recording
-    preset = replace(pose_preset("default"), start="spectral")
+    preset = replace(ANNEALED, start="spectral")
     started = start_person(rng, preset, recording.fps, targets, task.height_m, speed, recording.room)
     if started is None:
         return None
@@ -177,28 +216,29 @@ def _spectral_start(task: SmdTask, rng, targets, speed) -> FirstPose | None:
     return FirstPose(place, started.filter.body, state, is_fitted=True)
 
 
-def _follow(task: SmdTask, person: _Person, frame: int, observed: Observed | None) -> tuple:
-    if person.tracker is None or person.state is None:
-        return frame, person.number, np.full(len(DOF_NAMES), np.nan), np.nan, NO_START
-    person.state, info = track_step(task.rng(person.number, frame), person.tracker, person.state, observed)
-    return frame, person.number, person.state.state, info.value, info.status
+def _decided(person: PersonTask, tracker: SmdTracker, followed: dict[int, tuple[TrackState, TrackInfo]]) -> Decided:
+    """The rows of frames that were followed, with all that is needed to go on from the last."""
+    frames = tuple(sorted(followed))
+    rows = [followed[frame] for frame in frames]
+    last = rows[-1][0]
+    colors = {} if last.colors is None else {"mean": last.colors.mean, "deviation": last.colors.deviation}
+    return Decided(
+        person.number,
+        frames,
+        np.array([pose.state for pose, _ in rows]),
+        tuple(info.value for _, info in rows),
+        tuple(info.status for _, info in rows),
+        pose_init(last.state, last.velocity, memory=colors),
+        tracker.body.skeleton,
+    )
 
 
-def _assemble(rows: list, trackers: dict[int, SmdTracker | None]) -> PosedPeople:
-    """Tables in order of frame and person."""
-    rows = sorted(rows, key=lambda row: row[:2])
-    frames, persons = (np.array([row[k] for row in rows], int) for k in (0, 1))
-    states = np.array([row[2] for row in rows]).reshape(-1, len(DOF_NAMES))
-    fitted = np.array([row[4] == "fitted" for row in rows], bool)
-    positions = np.full((len(rows), len(LANDMARKS), 3), np.nan)
-    bodies = {}
-    for number, tracker in trackers.items():
-        if tracker is not None:
-            bodies[number] = tracker.body.skeleton.dimensions
-            own = fitted & (persons == number)
-            positions[own] = landmarks(tracker.body.skeleton, states[own])
-    notes = unfitted_notes(persons, (row[4] for row in rows))
-    return PosedPeople(
-        PoseTable(frames, persons, positions), PoseStates(frames, persons, states, DOF_NAMES, bodies), np.array([row[3] for row in rows]),
-        tuple(notes),
-    )  # fmt: skip
+def _taken_up(task: SmdTask, state: SmdPerson, decided: Decided) -> SmdPerson:
+    """The state of a person after these rows of a run that was stopped."""
+    done_to = decided.frames[-1]
+    if decided.body is None or decided.pose is None:
+        return replace(state, done_to=done_to)
+    tracker = state.tracker or make_tracker(decided.body, task.preset)
+    memory = decided.pose.memory
+    colors = ColorModel(memory["mean"], memory["deviation"]) if memory else None
+    return SmdPerson(tracker, TrackState(decided.pose.state, decided.pose.velocity, colors), done_to=done_to)

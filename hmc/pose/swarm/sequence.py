@@ -7,7 +7,6 @@ frames, in which it is not sure yet which way somebody faces, are gone through b
 from __future__ import annotations
 
 import csv
-import logging
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -17,28 +16,27 @@ import numpy as np
 
 from hmc.errors import InputError
 from hmc.files import atomic_write
-from hmc.frontend import FrontendSettings, HullStep, stream_hulls
+from hmc.frontend import FrontendSettings, HullStep
 from hmc.journal import append_journal, open_journal
 from hmc.landmarks import LANDMARKS
-from hmc.mask_store import kept_masks
 from hmc.pose.annealed.hull_target import make_target
 from hmc.pose.body.joints import DOF_NAMES
 from hmc.pose.body.proportions import default_body
-from hmc.pose.sequence import PosedPeople, frames_of_persons, unfitted_notes
+from hmc.pose.person import PersonTask
+from hmc.pose.sequence import PosedPeople, frames_left, persons_of, unfitted_notes
 from hmc.pose.spectral.graph import color_votes, face_neighbours
 from hmc.pose.spectral.reading import BodyReading, ReadingSettings, read_body
 from hmc.pose.spectral_start import body_state
 from hmc.pose.start import estimate_height
-from hmc.pose.swarm.model import N_PARAMETERS, SkeletonModel, model_of_height, skeleton_landmarks
+from hmc.pose.swarm.model import N_PARAMETERS, model_of_height, skeleton_landmarks
 from hmc.pose.swarm.temporal import SwarmInfo, SwarmSettings, SwarmState, missed, swarm_step
 from hmc.recording import Recording
 from hmc.results import PoseStates, PoseTable, TrackTable
-from hmc.tracking.resumable import WARM_UP_FRAMES, observe_step, person_grid
+from hmc.tracking.resumable import observe_step, person_grid
 from hmc.tracking.tracks import person_voxels
+from hmc.voxels.grid import VoxelGrid
 
 __all__ = ["FitRow", "SwarmPreset", "SwarmTask", "pose_by_swarm", "swarm_preset", "write_fits"]
-
-logger = logging.getLogger("hmc")
 
 #: Frames of the first window in which a start is tried.
 ANCHORS = 3
@@ -128,21 +126,30 @@ class FitRow:
     info: SwarmInfo
 
 
-@dataclass
-class _Person:
-    """A person while the recording is read: changed from frame to frame."""
+#: A person's voxels in a frame, their centres, metres, and the votes of their colours.
+Seen = tuple[np.ndarray, np.ndarray, tuple[np.ndarray, np.ndarray]]
 
-    number: int
-    frames: np.ndarray
-    velocities: np.ndarray
-    watched: list[tuple[int, np.ndarray, np.ndarray, tuple | None]] = field(default_factory=list)
-    model: SkeletonModel | None = None
-    height_m: float = np.nan
-    state: SwarmState | None = None
+
+@dataclass(frozen=True)
+class SwarmPerson:
+    """What is known of a person between two frames.
+
+    Parameters
+    ----------
+    height_m : float or None
+        Stature; None while the person is watched.
+    swarm : SwarmState or None
+        After the last frame; None while no pose was found.
+    watched : tuple of (int, tuple or None)
+        Frames of the window that is not over, and what was seen in them.
+    done_to : int
+        The last decided frame; -1: none is.
+    """
+
+    height_m: float | None = None
+    swarm: SwarmState | None = None
+    watched: tuple[tuple[int, Seen | None], ...] = ()
     done_to: int = -1
-
-    def velocity(self, frame: int) -> np.ndarray:
-        return self.velocities[int(np.searchsorted(self.frames, frame))]
 
 
 def pose_by_swarm(
@@ -177,37 +184,34 @@ def pose_by_swarm(
     """
     recording = task.recording
     grid = person_grid(recording, voxel_size_m)
-    end = recording.start + recording.n_frames
-    people = {number: _Person(number, *rows) for number, rows in frames_of_persons(recording, tracks).items()}
+    persons = persons_of(recording, tracks)
+    states = dict.fromkeys(persons, SwarmPerson())
     rows: list[FitRow] = []
     for record in open_journal(journal, key):
-        decided = [_from_record(one) for one in record["rows"]]
-        _take_up(task, people[record["person"]], decided, record["after"])
-        rows += decided
-    left = [int(frame) for person in people.values() for frame in person.frames[person.frames > person.done_to][:1]]
-    if left:
-        first = min(left)
-        kept = None if masks is None else kept_masks(masks, key, first, end)
-        stream = stream_hulls(
-            recording, grid, frontend, first=first, warm_up=WARM_UP_FRAMES, masks=kept, on_problem=on_problem or logger.warning
-        )
-        for hull in progress(stream, end - first) if progress else stream:
-            for number, seen in _seen(recording, grid, tracks, hull).items():
-                person = people[number]
-                if hull.index > person.done_to:
-                    decided = _advance(task, person, hull.index, seen, grid)
-                    rows += decided
-                    if journal is not None and decided:
-                        after = None if person.state is None else asdict(person.state)
-                        append_journal(journal, {"person": number, "rows": [_to_record(row) for row in decided], "after": after})
+        new = [_from_record(one) for one in record["rows"]]
+        states[record["person"]] = SwarmPerson(new[-1].height_m, _swarm_of(record["after"]), done_to=new[-1].frame)
+        rows += new
+    done_to = {number: state.done_to for number, state in states.items()}
+    for hull in frames_left(
+        recording, grid, persons, done_to, frontend=frontend, masks=masks, key=key, on_problem=on_problem, progress=progress
+    ):
+        for number, seen in _seen(recording, grid, tracks, hull).items():
+            if hull.index <= states[number].done_to:
+                continue
+            states[number], new = _person_step(task, grid, persons[number], states[number], hull.index, seen)
+            rows += new
+            if journal is not None and new:
+                swarm = states[number].swarm
+                after = None if swarm is None else asdict(swarm)
+                append_journal(journal, {"person": number, "rows": [_to_record(row) for row in new], "after": after})
     rows.sort(key=lambda row: (row.frame, row.person))
     return _assemble(task, rows), rows
 
 
-def _seen(recording: Recording, grid, tracks: TrackTable, hull: HullStep) -> dict[int, tuple | None]:
-    """Voxels, their centres and the colour votes of everybody in a frame; None where there are no voxels of somebody."""
+def _seen(recording: Recording, grid: VoxelGrid, tracks: TrackTable, hull: HullStep) -> dict[int, Seen | None]:
+    """What is seen of everybody in a frame; None where there are no voxels of somebody."""
     rows = np.flatnonzero(tracks.frames == hull.index)
-    out: dict[int, tuple | None] = dict.fromkeys(tracks.persons[rows].tolist())
+    out: dict[int, Seen | None] = dict.fromkeys(tracks.persons[rows].tolist())
     observation = observe_step(recording, grid, hull) if len(rows) else None
     if observation is None:
         return out
@@ -221,31 +225,25 @@ def _seen(recording: Recording, grid, tracks: TrackTable, hull: HullStep) -> dic
     return out
 
 
-def _advance(task: SwarmTask, person: _Person, frame: int, seen: tuple | None, grid) -> list[FitRow]:
+def _person_step(
+    task: SwarmTask, grid: VoxelGrid, person: PersonTask, state: SwarmPerson, frame: int, seen: Seen | None
+) -> tuple[SwarmPerson, list[FitRow]]:
     """One frame of a person, and the rows that it decides."""
-    last = frame == int(person.frames[-1])
-    if person.model is None:
-        person.watched.append((frame, *(seen or (np.zeros((0, 3), int), np.zeros((0, 3)), None))))
-        if len(person.watched) < task.window and not last:
-            return []
-        rows = _start(task, person, grid)
-    else:
-        reading = _read(task, person, seen, grid.voxel_size_m)
-        state, info = _step(task, person, frame, reading, person.state)
-        person.state = state
-        rows = [_row(person, frame, state, info)]
-    person.done_to = frame
-    return rows
+    if state.height_m is None:
+        state = replace(state, watched=(*state.watched, (frame, seen)))
+        if len(state.watched) < task.window and frame != int(person.frames[-1]):
+            return state, []
+        return _start(task, grid, person, state)
+    reading = _read(task, state.height_m, seen, grid.voxel_size_m)
+    found = _fit(task, person, state.height_m, frame, reading, state.swarm)
+    return replace(state, swarm=found[0], done_to=frame), [_row(person, state.height_m, frame, *found)]
 
 
-def _start(task: SwarmTask, person: _Person, grid) -> list[FitRow]:
+def _start(task: SwarmTask, grid: VoxelGrid, person: PersonTask, state: SwarmPerson) -> tuple[SwarmPerson, list[FitRow]]:
     """The window is over: stature, readings of its frames, and the poses from the frame that shows most on, both ways."""
-    targets = [make_target(grid, voxels, voxels) for _, voxels, _, _ in person.watched]
-    floor_z = float(task.recording.room[0, 2])
-    _set_height(task, person, task.height_m or estimate_height(targets, floor_z))
-    readings = [_read(task, person, (v, p, c) if len(v) else None, grid.voxel_size_m) for _, v, p, c in person.watched]
-    frames = [one[0] for one in person.watched]
-    person.watched = []
+    frames = [frame for frame, _ in state.watched]
+    height_m = task.height_m or _height_of(task, grid, state)
+    readings = [_read(task, height_m, seen, grid.voxel_size_m) for _, seen in state.watched]
     scores = [2 * r.segmentation.whole + 0.2 * len(r.curves) if r is not None and r.status == "read" else -1.0 for r in readings]
     feet = np.concatenate([np.zeros((0, 3)), *(r.feet for r in readings if r is not None)])
     # A frame can be misread and look whole: of those that show most, the one whose pose costs least.
@@ -255,50 +253,52 @@ def _start(task: SwarmTask, person: _Person, grid) -> list[FitRow]:
         if opening is not None and scores[k] > 0:
             # At the start, the feet of the whole window say which way the person faces.
             opening = replace(opening, feet=feet)
-        trials[k] = _step(task, person, frames[k], opening, None)
+        trials[k] = _fit(task, person, height_m, frames[k], opening, None)
     anchor = min(trials, key=lambda k: trials[k][1].cost_m if trials[k][0] is not None else np.inf)
     found = {anchor: trials[anchor]}
     for order in (range(anchor + 1, len(frames)), range(anchor - 1, -1, -1)):
-        state = found[anchor][0]
+        swarm = found[anchor][0]
         for k in order:
-            found[k] = _step(task, person, frames[k], readings[k], state)
-            state = found[k][0]
-    person.state = found[len(frames) - 1][0]
-    return [_row(person, frame, *found[k]) for k, frame in enumerate(frames)]
+            found[k] = _fit(task, person, height_m, frames[k], readings[k], swarm)
+            swarm = found[k][0]
+    rows = [_row(person, height_m, frame, *found[k]) for k, frame in enumerate(frames)]
+    return SwarmPerson(height_m, found[len(frames) - 1][0], done_to=frames[-1]), rows
 
 
-def _set_height(task: SwarmTask, person: _Person, height_m: float) -> None:
-    person.height_m = height_m
-    person.model = model_of_height(height_m, task.preset.thesis)
+def _height_of(task: SwarmTask, grid: VoxelGrid, state: SwarmPerson) -> float:
+    """The stature of somebody who was watched."""
+    nothing = np.zeros((0, 3), int)
+    hulls = [nothing if seen is None else seen[0] for _, seen in state.watched]
+    return estimate_height([make_target(grid, voxels, voxels) for voxels in hulls], float(task.recording.room[0, 2]))
 
 
-def _read(task: SwarmTask, person: _Person, seen: tuple | None, voxel_size_m: float) -> BodyReading | None:
+def _read(task: SwarmTask, height_m: float, seen: Seen | None, voxel_size_m: float) -> BodyReading | None:
     if seen is None:
         return None
     voxels, points, votes = seen
-    return read_body(voxels, points, voxel_size_m, person.height_m, task.preset.reading, votes)
+    return read_body(voxels, points, voxel_size_m, height_m, task.preset.reading, votes)
 
 
-def _step(task, person, frame, reading, state) -> tuple[SwarmState | None, SwarmInfo]:
+def _fit(
+    task: SwarmTask, person: PersonTask, height_m: float, frame: int, reading: BodyReading | None, swarm: SwarmState | None
+) -> tuple[SwarmState | None, SwarmInfo]:
+    """One frame from the state before it."""
     if reading is None:
-        return missed(state), SwarmInfo(NO_VOXELS, np.nan, False, False, 0, ())
-    return swarm_step(
-        task.rng(person.number, frame), person.model, state, reading, task.recording.fps, person.velocity(frame), task.preset.swarm
-    )
+        return missed(swarm), SwarmInfo(NO_VOXELS, np.nan, False, False, 0, ())
+    model = model_of_height(height_m, task.preset.thesis)
+    return swarm_step(task.rng(person.number, frame), model, swarm, reading, task.recording.fps, person.velocity(frame), task.preset.swarm)
 
 
-def _row(person: _Person, frame: int, state: SwarmState | None, info: SwarmInfo) -> FitRow:
-    found = np.full(N_PARAMETERS, np.nan) if state is None or info.status != "fitted" else state.state
-    return FitRow(frame, person.number, person.height_m, found, info)
+def _row(person: PersonTask, height_m: float, frame: int, swarm: SwarmState | None, info: SwarmInfo) -> FitRow:
+    found = np.full(N_PARAMETERS, np.nan) if swarm is None or info.status != "fitted" else swarm.state
+    return FitRow(frame, person.number, height_m, found, info)
 
 
-def _take_up(task: SwarmTask, person: _Person, rows: Sequence[FitRow], after: dict[str, Any] | None) -> None:
-    """A person as they were after these rows of a run that was stopped."""
-    if person.model is None:
-        _set_height(task, person, rows[-1].height_m)
-    if after is not None:
-        person.state = SwarmState(**after | {name: np.array(after[name], float) for name in ("state", "velocity")})
-    person.done_to = rows[-1].frame
+def _swarm_of(record: dict[str, Any] | None) -> SwarmState | None:
+    """A state from its record."""
+    if record is None:
+        return None
+    return SwarmState(**record | {name: np.array(record[name], float) for name in ("state", "velocity")})
 
 
 def _to_record(row: FitRow) -> dict[str, Any]:

@@ -1,0 +1,99 @@
+"""Multi-cue descent through a whole recording: a stopped run goes on to the same result, silhouettes kept or not, the command's files."""
+
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+from stopped import Stopped, noting, stopping
+
+from hmc.pose.body.model import neutral_state
+from hmc.pose.body.proportions import default_body
+from hmc.pose.smd import sequence
+from hmc.pose.smd.begin import FirstPose
+from hmc.pose.smd.presets import smd_preset
+from hmc.pose.smd.sequence import SmdTask
+from hmc.recording import open_recording
+from hmc.results import TrackTable, read_centroids
+
+TINY = Path(__file__).resolve().parents[1] / "data" / "synthetic" / "tiny"
+VOXEL_M, FRAMES = 0.05, 6
+
+
+@pytest.fixture(scope="module", autouse=True)
+def short_window():
+    """People are watched for three frames, so that frames are left to follow them."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sequence, "WINDOW_S", 0.2)
+        yield
+
+
+@pytest.fixture(scope="module")
+def tracks():
+    """The true centroids, and from the second frame on a track of nobody."""
+    truth = read_centroids(TINY / "truth" / "centroids.csv")
+    truth = truth.where(truth.frames < FRAMES)
+    ghost = np.arange(1, FRAMES)
+    return TrackTable(
+        np.r_[truth.frames, ghost],
+        np.r_[truth.persons, 0 * ghost + 7],
+        np.vstack([truth.positions, np.tile([2.2, 2.0, 0.9], (len(ghost), 1))]),
+    )
+
+
+@pytest.fixture(scope="module")
+def task(tracks):
+    def any_start(frame_rng, targets, velocities):
+        """Standing with the arms down in the middle one of the frames, of whoever has a hull."""
+        if targets[1] is None:
+            return None
+        state = neutral_state("down")
+        state[:3] = (*targets[1].surface[:, :2].mean(0), 0.93)
+        return FirstPose(1, default_body(1.74), state, is_fitted=True)
+
+    recording = open_recording(TINY, ["cam_00", "cam_02", "cam_03", "cam_05"], frames=FRAMES)
+    return SmdTask(recording, smd_preset("default"), 3, 1.76, any_start)
+
+
+@pytest.fixture(scope="module")
+def run(task, tracks):
+    return partial(sequence.pose_by_descent, task, tracks, VOXEL_M)
+
+
+@pytest.fixture(scope="module")
+def whole(run):
+    return run()
+
+
+def equal(one, other):
+    for a, b in ((one.poses, other.poses), (one.states, other.states)):
+        assert_array_equal(a.frames, b.frames)
+        assert_array_equal(a.persons, b.persons)
+    assert_array_equal(one.poses.positions, other.poses.positions)
+    assert_array_equal(one.states.states, other.states.states)
+    assert_array_equal(one.costs, other.costs)
+    assert one.states.bodies == other.states.bodies and one.notes == other.notes
+
+
+def test_everybody_has_a_row_a_frame(whole):
+    assert whole.poses.frames.tolist() == [0, *np.repeat(np.arange(1, FRAMES), 2)]
+    assert np.isfinite(whole.poses.of(0).positions).all() and np.isnan(whole.poses.of(7).positions).all()
+    assert whole.notes == ("person 7: 5 frames without a pose: no hull to start from",) and set(whole.states.bodies) == {0}
+
+
+@pytest.mark.parametrize(("after", "first"), [(3, 1), (4, 4)])
+def test_a_stopped_run_goes_on_and_comes_to_the_same(run, whole, tmp_path, after, first):
+    """Stopped when one is followed and one not yet started, and when it is known that one cannot start."""
+    kept = {"journal": tmp_path / "journal", "key": "k"}
+    with pytest.raises(Stopped):
+        run(**kept, progress=stopping(after))
+    with open(kept["journal"], "a") as file:
+        file.write('{"person":0,"frames":[2],"sta')  # the power went while a line was written
+    seen: list[int] = []
+    equal(run(**kept, progress=noting(seen)), whole)
+    assert seen == list(range(first, FRAMES))
+    # Nothing is left to do of a run that was finished.
+    seen.clear()
+    equal(run(**kept, progress=noting(seen)), whole)
+    assert seen == []
