@@ -23,7 +23,7 @@ from hmc.pose.body.model import PARTS, neutral_state
 from hmc.pose.scalable.limbs import LimbMemory, LimbSettings, limb_spread_deg, look_again
 from hmc.pose.scalable.methods import method_preset
 from hmc.pose.scalable.models import MODEL_1, MODEL_2, UNITIVE, UNITIVE_PIECES
-from hmc.pose.scalable.restrict import SymmetricData, coarser_table, nearest_part, part_mask, restrict_table
+from hmc.pose.scalable.restrict import ScoreData, SymmetricData, coarser_table, nearest_part, part_mask, restrict_table
 from hmc.pose.scalable.scouts import in_doubt, limb_occupancy, scout
 from hmc.pose.scalable.step import scalable_step, suited
 from hmc.voxels.grid import VoxelGrid
@@ -92,6 +92,24 @@ def test_a_coarser_table_is_that_of_fewer_points(filters, every):
     maps = score_maps(hull_of(standing()), None)
     assert_array_equal(scores(coarse, states, maps)[..., [0, 2, 3]], scores(expected, states, maps)[..., [0, 2, 3]])
     assert_array_equal(scores(coarse, states, maps)[..., 1], scores(table, states, maps)[..., 1])
+
+
+@pytest.mark.parametrize("name", ["default", "canton2009"])
+@pytest.mark.parametrize("missing", [(), ("r_thigh", "r_shank")])
+def test_the_limbs_shares_sum_to_the_likelihood_and_know_their_own_limb_only(filters, name, missing):
+    filt, target, keep = filters[name], hull_of(standing()), without(*missing)
+    rng = np.random.default_rng(1)
+    states = standing() + rng.normal(0, 0.03, (6, N_DOF))
+    part = nearest_part(filt.body, standing(), target.surface)
+    data = SymmetricData(target, target.surface, part) if name == "default" else ScoreData(score_maps(target, None))
+    shares = data.likelihood(filt, keep, by_limb=True)(states)
+    assert shares.shape == (6, 5)
+    assert_allclose(shares.sum(axis=1), data.likelihood(filt, keep)(states), rtol=1e-4)
+    moved = states.copy()
+    moved[:, dof_index("l_knee_y")] += 0.6
+    change = np.abs(data.likelihood(filt, keep, by_limb=True)(moved) - shares).mean(axis=0)
+    assert np.argmax(change) == 4  # the left leg
+    assert change[1:3].max() < 1e-2 * change[4]  # the arms know nothing of it
 
 
 def test_the_likelihood_of_some_parts_does_not_know_the_others(filters):

@@ -8,7 +8,16 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from hmc.errors import InputError
 from hmc.montecarlo.filters import AnnealedSettings, ParticleState, annealed_step, particle_init
-from hmc.pose.scalable.structure import StructuralSettings, backward, crossing, forward, ranked, spread_schedule, structural_step
+from hmc.pose.scalable.structure import (
+    StructuralSettings,
+    backward,
+    cross_limbs,
+    crossing,
+    forward,
+    ranked,
+    spread_schedule,
+    structural_step,
+)
 
 GROUP = np.array([0, 0, 1, 1, 2, 2])
 
@@ -120,6 +129,54 @@ def test_a_chain_is_found_from_its_root_outwards_and_every_model_has_an_estimate
         assert_array_equal(np.isnan(info.estimates[level]), level < GROUP)
         assert_allclose(info.estimates[level][level >= GROUP], goal[level >= GROUP], atol=0.35)
     assert info.evaluations == 2 * 3 * 80
+
+
+@given(st.integers(2, 40), st.integers(0, 1000))
+def test_limbs_are_drawn_each_by_its_own_share_of_the_likelihood(n, seed):
+    rng = np.random.default_rng(seed)
+    limb = np.array([1, 0, 2, 1, 0])
+    particles = np.arange(n)[:, None] + np.linspace(0, 0.4, 5)  # each number tells whose it was, and which variable
+    weights, shares = rng.normal(size=n), rng.normal(size=(n, 3))
+    possible = rng.choice(n, 2, replace=False)
+    shares[~np.isin(np.arange(n), possible), 2] = -np.inf
+    out = cross_limbs(rng, ParticleState(particles, weights), shares, limb, 0.5)
+    assert out.particles.shape == (n, 5) and not out.log_weights.any()
+    assert_allclose(out.particles % 1, np.tile(np.linspace(0, 0.4, 5), (n, 1)), atol=1e-9)
+    source = np.floor(out.particles + 1e-6).astype(int)
+    assert_array_equal(source[:, 0], source[:, 3])  # a limb stays whole
+    assert_array_equal(source[:, 1], source[:, 4])
+    trunks = np.bincount(source[:, 1], minlength=n)
+    assert np.all(np.abs(trunks - n * np.exp(weights) / np.exp(weights).sum()) < 1 + 1e-9)
+    assert set(source[:, 2]) <= set(possible.tolist())
+    if n >= 10:  # half of the possible ones survive, and the better a limb is the more often
+        counts = np.bincount(source[:, 0], minlength=n)
+        order = np.argsort(shares[:, 1])
+        assert counts[order[-1]] >= counts[order[0]] and np.all(np.diff(counts[order]) >= -1)
+
+
+def test_crossed_limbs_are_found_with_fewer_particles():
+    goal = np.linspace(-0.9, 0.9, 12)
+    group, limb = np.repeat([0, 1], [3, 9]), np.repeat(np.arange(4), 3)
+    settings = StructuralSettings(gamma=10, survival_rate=0.3)
+
+    def errors(by_limb):
+        def share(states):
+            shares = -30 * np.stack([((states - goal)[:, limb == k] ** 2).sum(axis=1) for k in range(4)], axis=1)
+            return shares if by_limb else shares.sum(axis=1)
+
+        out = []
+        for seed in range(12):
+            threads, rng = [particle_init(np.zeros((1, 12)))] * 2, np.random.default_rng(seed)
+            for _ in range(3):
+                threads, info = structural_step(
+                    rng, threads, [share, share], group, np.full(12, 0.4), np.full(12, -2.0), np.full(12, 2.0), settings, limb
+                )
+            out.append(np.linalg.norm(info.estimates[-1] - goal))
+        return np.array(out)
+
+    crossed, whole = errors(True), errors(False)
+    assert crossed.mean() < 0.8 * whole.mean()
+    assert np.mean(crossed < whole) > 0.8
 
 
 def test_variables_that_no_model_has_stay_where_they_are():

@@ -18,7 +18,7 @@ import numpy as np
 from hmc.experiments import marker_runs
 from hmc.experiments.experiment import Cell, Parameters, Plan, Results
 from hmc.experiments.filter_grids import QUICK_FRAMES
-from hmc.experiments.filter_runs import ANNEALING, VERSION, filter_preset, follow_from_truth
+from hmc.experiments.filter_runs import ANNEALING, filter_preset, follow_from_truth
 from hmc.experiments.inputs import Inputs
 from hmc.experiments.markerless_runs import FRONTEND, MASKS_KEY, action_sources, tracked
 from hmc.experiments.pose_runs import VOXEL_M, estimate_of, first_truth
@@ -48,6 +48,8 @@ __all__ = [
 ]
 
 FAMILY = "scalable-filter"
+#: Of these cells.
+VERSION = 3
 APF = "APF"
 #: Methods, and what they are on the command line.
 METHODS: dict[str, tuple[str, tuple[str, ...]]] = {

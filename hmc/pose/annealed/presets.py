@@ -140,7 +140,7 @@ PRESETS: dict[str, PosePreset] = {
         search=SearchSettings(),
         fit_body=FitBodySettings(),
         start="hypotheses",
-        structural=StructuralSettings(gamma=11.0, layers=2, inner=0.6, survival_rate=0.04),
+        structural=StructuralSettings(gamma=11.0, layers=2, inner=0.6, survival_rate=0.3, by_limb=True),
     ),
 }
 

@@ -19,10 +19,11 @@ from hmc.pose.annealed.penetration import AxisPoints, axis_points, depths_placed
 from hmc.pose.annealed.placing import place_segments
 from hmc.pose.annealed.rays import places_and_directions, slide_to_axis
 from hmc.pose.body.flesh import SurfaceSamples, surface_samples
-from hmc.pose.body.joints import DOF_NAMES
-from hmc.pose.body.model import BodyModel, Cones
+from hmc.pose.body.joints import DOF_NAMES, SEGMENTS
+from hmc.pose.body.model import PARTS, BodyModel, Cones
 
 __all__ = [
+    "PART_OF_SEGMENT",
     "POSTURE",
     "BodyPoints",
     "SymmetricSettings",
@@ -33,6 +34,7 @@ __all__ = [
     "posture_spread",
     "squared_distance",
     "symmetric_cost",
+    "symmetric_cost_by_part",
     "thinned",
 ]
 
@@ -40,7 +42,9 @@ __all__ = [
 MOST_CAP_M = 0.2
 #: Elements (pairs of a cone and a point x states) worked on at a time: what stays in the second-level cache.
 CHUNK = 16384
-
+#: The part that each segment carries, shape (n_segments,); the pelvis is of the torso.
+PART_OF_SEGMENT = np.array([PARTS.index(segment.name) if segment.name in PARTS else 0 for segment in SEGMENTS])
+_PART_OF_DOF = np.repeat(PART_OF_SEGMENT, [len(segment.axes) + 3 * (segment.parent < 0) for segment in SEGMENTS])
 
 # Angles at rest and how far people commonly go from there, degrees; what is not named rests at 0.
 _REST_DEG = {"r_shoulder_x": 75, "l_shoulder_x": -75, "r_elbow_z": 25, "l_elbow_z": -25, "torso_y": 5, "r_knee_y": 8, "l_knee_y": 8}
@@ -306,6 +310,58 @@ def symmetric_cost(
     ndarray, shape (n,)
         Square metres.
     """
+    outside, unexplained, _, depth, gap, posture = _terms(body, points, states, target, hull_points, settings)
+    return (
+        gap
+        + np.einsum("ij,ij->j", outside, outside) / len(outside)
+        + settings.explain_weight / len(hull_points) * np.einsum("ij,ij->j", unexplained, unexplained)
+        + settings.overlap_weight / len(depth) * np.einsum("ij,ij->j", depth, depth)
+        + posture.sum(axis=1)
+    )
+
+
+def symmetric_cost_by_part(
+    body: BodyModel,
+    points: BodyPoints,
+    states: np.ndarray,
+    target: HullTarget,
+    hull_points: np.ndarray,
+    hull_part: np.ndarray,
+    settings: SymmetricSettings,
+) -> np.ndarray:
+    """`symmetric_cost`, each part's own share of it.
+
+    Parameters
+    ----------
+    body, points, states, target, hull_points, settings
+        As of `symmetric_cost`.
+    hull_part : ndarray of int, shape (k,)
+        The part that is asked to explain each of `hull_points`.
+
+    Returns
+    -------
+    ndarray, shape (n, n_parts)
+        Square metres; standing on the floor is the torso's share.
+    """
+    outside, unexplained, asking, depth, gap, posture = _terms(body, points, states, target, hull_points, settings)
+    columns = np.eye(len(PARTS), dtype=outside.dtype)
+    cost = posture @ columns[_PART_OF_DOF]
+    for values, part, weight in (
+        (outside, points.surface.part, 1 / len(outside)),
+        (unexplained, hull_part[asking], settings.explain_weight / len(hull_points)),
+        (depth, PART_OF_SEGMENT[points.axes.segment], settings.overlap_weight / len(depth)),
+    ):
+        cost += weight * (values**2).T @ columns[part]
+    cost[:, 0] += gap
+    return cost
+
+
+def _terms(body, points, states, target, hull_points, settings) -> tuple[np.ndarray, ...]:
+    """What the cost is made of.
+
+    Metres, each of shape (., n): distances of body from hulls, of silhouettes from the body (of places that some cone is near, given next),
+    depths. Square metres: the cost of hanging in the air, shape (n,), and of each angle, shape (n, 27).
+    """
     cap = np.float32(settings.cap_m)
     places, directions = places_and_directions(hull_points)
     origin = places.mean(axis=0)
@@ -321,10 +377,5 @@ def symmetric_cost(
     if target.floor_z is not None:
         rotations, positions = np.moveaxis(placed[:, :, :3], -1, 0), np.moveaxis(placed[:, :, 3], -1, 0)
         gap = floor_gap(body, rotations, positions, target.floor_z - origin[2])
-    return (
-        settings.floor_weight * gap**2
-        + np.einsum("ij,ij->j", outside, outside) / len(outside)
-        + settings.explain_weight / len(places) * np.einsum("ij,ij->j", unexplained, unexplained)
-        + settings.overlap_weight / len(depth) * np.einsum("ij,ij->j", depth, depth)
-        + settings.posture_weight * (((states - POSTURE[0]) / posture_spread(states)) ** 2).sum(1)
-    )
+    posture = settings.posture_weight * ((states - POSTURE[0]) / posture_spread(states)) ** 2
+    return outside, unexplained, asking, depth, settings.floor_weight * gap**2, posture

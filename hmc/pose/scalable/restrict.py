@@ -13,11 +13,19 @@ import numpy as np
 from hmc.montecarlo.filters import LogLikelihood
 from hmc.pose.annealed.apf import PoseFilter
 from hmc.pose.annealed.hull_target import HullTarget
-from hmc.pose.annealed.scores import ScoreMaps, ScoreTable, ScoreVariances, log_likelihood_factorised, log_likelihood_global, scores
-from hmc.pose.annealed.symmetric import BodyPoints, body_distance, symmetric_cost, thinned
+from hmc.pose.annealed.scores import (
+    ScoreMaps,
+    ScoreTable,
+    ScoreVariances,
+    log_likelihood_by_part,
+    log_likelihood_factorised,
+    log_likelihood_global,
+    scores,
+)
+from hmc.pose.annealed.symmetric import PART_OF_SEGMENT, BodyPoints, body_distance, symmetric_cost, symmetric_cost_by_part, thinned
 from hmc.pose.body.flesh import SurfaceSamples
-from hmc.pose.body.joints import SEGMENTS
 from hmc.pose.body.model import PARTS, BodyModel, Cones
+from hmc.pose.scalable.models import LIMB_OF_PART
 
 __all__ = [
     "ScoreData",
@@ -30,6 +38,9 @@ __all__ = [
     "restrict_table",
     "restrict_target",
 ]
+
+#: Sums over the parts of each limb, shape (n_parts, n_limbs).
+_LIMBS = np.eye(LIMB_OF_PART.max() + 1)[LIMB_OF_PART]
 
 
 def part_mask(parts: Collection[str]) -> np.ndarray:
@@ -65,7 +76,7 @@ def restrict_filter(filt: PoseFilter, keep: np.ndarray) -> PoseFilter:
     rows = keep[surface.part]
     surface = SurfaceSamples(surface.points[rows], surface.normals[rows], surface.segment[rows], surface.part[rows])
     # Points on the axes stay, so that overlap weighs as much as ever; those of missing parts meet nothing.
-    there = keep[[PARTS.index(SEGMENTS[segment].name) for segment in axes.segment]]
+    there = keep[PART_OF_SEGMENT[axes.segment]]
     axes = replace(axes, against=axes.against[:, keep[cones.part]] & there[:, None])
     table = None if filt.table is None else restrict_table(filt.table, keep)
     return replace(filt, body=part_body(filt.body, keep), samples=BodyPoints(surface, axes), table=table)
@@ -156,12 +167,15 @@ class SymmetricData:
     points: np.ndarray
     part: np.ndarray
 
-    def likelihood(self, filt: PoseFilter, keep: np.ndarray, every: int = 1) -> LogLikelihood:
-        """Of the kept parts, at every so many-th point of the body's surface; `filt` is the whole body's."""
+    def likelihood(self, filt: PoseFilter, keep: np.ndarray, every: int = 1, by_limb: bool = False) -> LogLikelihood:
+        """Of the kept parts, at every so many-th point of the body's surface; `filt` is the whole body's. Whole, or a column a limb."""
         one, target, settings = restrict_filter(filt, keep), restrict_target(self.target, keep), filt.preset.symmetric
         samples = one.samples if every == 1 else thinned(one.samples, max(1, len(one.samples.surface.points) // every))
         points = self.points[keep[self.part]]
         points = points if len(points) else self.points[:1]
+        part = self.part[keep[self.part]] if keep[self.part].any() else self.part[:1]
+        if by_limb:
+            return lambda states: -symmetric_cost_by_part(one.body, samples, states, target, points, part, settings) @ _LIMBS
         return lambda states: -symmetric_cost(one.body, samples, states, target, points, settings)
 
 
@@ -171,12 +185,18 @@ class ScoreData:
 
     maps: ScoreMaps
 
-    def likelihood(self, filt: PoseFilter, keep: np.ndarray, every: int = 1) -> LogLikelihood:
-        """Of the kept parts, at every so many-th point of the flesh; `filt` is the whole body's, with a table of its flesh."""
+    def likelihood(self, filt: PoseFilter, keep: np.ndarray, every: int = 1, by_limb: bool = False) -> LogLikelihood:
+        """Of the kept parts, at every so many-th point of the flesh; `filt` is the whole body's, with a table of its flesh.
+
+        Whole; or a column a limb, if the likelihood is a product over the parts.
+        """
         if filt.table is None:
             raise ValueError("`filt` has no table of its flesh")
         table = coarser_table(restrict_table(filt.table, keep), every)
         variances, counts = ScoreVariances(), table.counts[keep]
         if filt.preset.likelihood == "global":
             return lambda states: log_likelihood_global(scores(table, states, self.maps)[:, keep], counts, variances.whole_body())
+        if by_limb:
+            kept = variances.by_part()[keep]
+            return lambda states: log_likelihood_by_part(scores(table, states, self.maps)[:, keep], kept) @ _LIMBS[keep]
         return lambda states: log_likelihood_factorised(scores(table, states, self.maps)[:, keep], variances.by_part()[keep])

@@ -28,7 +28,7 @@ from hmc.pose.annealed.symmetric import POSTURE
 from hmc.pose.body.joints import N_DOF, dof_index
 from hmc.pose.body.model import PARTS
 from hmc.pose.scalable.limbs import LimbMemory, LimbSettings, limb_spread_deg, look_again
-from hmc.pose.scalable.models import Inclusive
+from hmc.pose.scalable.models import LIMB_OF_DOF, Inclusive
 from hmc.pose.scalable.restrict import ScoreData, SymmetricData, nearest_part, part_mask, restrict_filter, restrict_target
 from hmc.pose.scalable.scouts import in_doubt, limb_dofs, scout
 from hmc.pose.scalable.structure import structural_step
@@ -173,7 +173,7 @@ def _structural(rng, filt, state, data, there) -> _Found:
         starts = [starting_particles(filt, state)] * n
     group = np.where(there.dofs, hierarchy.group, n)
     low, high = filt.body.limits.low, filt.body.limits.high
-    threads, info = structural_step(rng, starts, likelihoods, group, filt.drift, low, high, filt.preset.structural)
+    threads, info = structural_step(rng, starts, likelihoods, group, filt.drift, low, high, filt.preset.structural, LIMB_OF_DOF)
     return _Found(threads[-1].mean, info.best, info.best_log_likelihood, threads[-1], info.evaluations, threads[:-1], info.estimates)
 
 
@@ -196,7 +196,8 @@ def suited(hierarchies: Sequence[Inclusive], state: np.ndarray, there: np.ndarra
 
 def _likelihood(filt, data, hierarchy, level, there):
     keep = part_mask(hierarchy.models[level].parts) & there.parts
-    log_likelihood = data.likelihood(filt, keep, 1 if level == len(hierarchy.models) - 1 else hierarchy.thinning)
+    every = 1 if level == len(hierarchy.models) - 1 else hierarchy.thinning
+    log_likelihood = data.likelihood(filt, keep, every, by_limb=filt.preset.structural.by_limb)
     if hierarchy.held == "last":
         return log_likelihood
     lacking = hierarchy.group > level

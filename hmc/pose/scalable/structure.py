@@ -12,10 +12,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from hmc.errors import InputError
+from hmc.montecarlo.annealing import find_beta, temper
 from hmc.montecarlo.filters import LayerInfo, LogLikelihood, ParticleState, filter_layer, truncated_drift
 from hmc.montecarlo.weights import normalise, systematic
 
-__all__ = ["StructuralInfo", "StructuralSettings", "backward", "crossing", "forward", "ranked", "spread_schedule", "structural_step"]
+__all__ = [
+    "StructuralInfo",
+    "StructuralSettings",
+    "backward",
+    "cross_limbs",
+    "crossing",
+    "forward",
+    "ranked",
+    "spread_schedule",
+    "structural_step",
+]
 
 
 @dataclass(frozen=True)
@@ -38,6 +49,9 @@ class StructuralSettings:
         Parts of equal size into which ranked particles are divided for the crossing.
     crossed : float
         Share of each part that is paired with the part of opposite rank.
+    by_limb : bool
+        Between the inner layers of a model particles exchange limbs, each by its own share of the likelihood (`cross_limbs`); beyond
+        the thesis. A likelihood that is not told by limbs is not touched by it.
 
     Raises
     ------
@@ -52,6 +66,7 @@ class StructuralSettings:
     survival_rate: float = 0.5
     partitions: int = 5
     crossed: float = 0.2
+    by_limb: bool = False
 
     def __post_init__(self) -> None:
         for name in ("gamma", "inner", "structural", "survival_rate"):
@@ -149,6 +164,41 @@ def crossing(n: int, partitions: int, crossed: float) -> np.ndarray:
     return pairs
 
 
+def cross_limbs(
+    rng: np.random.Generator, state: ParticleState, log_likelihood: np.ndarray, limb: np.ndarray, survival_rate: float
+) -> ParticleState:
+    """Children with the trunk of one particle and each limb of another, drawn by what the likelihood says of that limb alone.
+
+    A particle is rarely right in all limbs at once; where the likelihood is a product over limbs, the best of each may be joined.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    state : ParticleState
+        Weighted; trunks are drawn by these weights.
+    log_likelihood : ndarray, shape (n, n_limbs)
+        Of each limb; the first column is the trunk.
+    limb : ndarray of int, shape (d,)
+        The column to which each variable belongs.
+    survival_rate : float
+        Wanted survival rate of each limb's draw.
+
+    Returns
+    -------
+    ParticleState
+        As many, of equal weights.
+    """
+    n = len(state.particles)
+    children = state.particles[systematic(rng, normalise(state.log_weights), n)]
+    for k in range(1, log_likelihood.shape[1]):
+        own = log_likelihood[:, k]
+        beta, _ = find_beta(own, survival_rate)
+        # Shuffled: the draw keeps the order, and limbs are not to meet by it.
+        drawn = rng.permutation(systematic(rng, normalise(temper(own, beta)), n))
+        children[:, limb == k] = state.particles[np.ix_(drawn, limb == k)]
+    return ParticleState(children, np.zeros(n))
+
+
 def forward(
     rng: np.random.Generator, lower: ParticleState, upper: ParticleState, known: np.ndarray, n: int, settings: StructuralSettings
 ) -> ParticleState:
@@ -222,6 +272,7 @@ def structural_step(
     low: np.ndarray,
     high: np.ndarray,
     settings: StructuralSettings,
+    limb: np.ndarray | None = None,
 ) -> tuple[tuple[ParticleState, ...], StructuralInfo]:
     """One instant: every model in turn, then back (section 7.3.1).
 
@@ -231,12 +282,14 @@ def structural_step(
     threads : sequence of ParticleState
         One a model, from the instant before; each particle has all variables, those of later models included.
     log_likelihoods : sequence of callable
-        One a model, ``(n, d) -> (n,)``.
+        One a model, ``(n, d) -> (n,)``; or ``(n, d) -> (n, n_limbs)``, to be summed.
     group : ndarray of int, shape (d,)
         The first model that has each variable.
     sd, low, high : ndarray, shape (d,)
         First spread and limits.
     settings : StructuralSettings
+    limb : ndarray of int, shape (d,), optional
+        The column of the likelihoods to which each variable belongs; by default limbs are not crossed.
 
     Returns
     -------
@@ -251,10 +304,12 @@ def structural_step(
     for level, thread in enumerate(threads):
         n = int(counts[level])
         state = forward(rng, filtered[-1], thread, group < level, n, settings) if level else thread
-        layers = []
+        layers, shares = [], None
         for layer in range(settings.layers):
+            if limb is not None and shares is not None and limb[group <= level].any():
+                state = cross_limbs(rng, state, shares, limb, settings.survival_rate)
             drift = truncated_drift(sd * spread_schedule(group, level, layer, settings), low, high)
-            state, info = filter_layer(rng, state, log_likelihoods[level], drift, n, settings.survival_rate)
+            state, info, shares = _weighed(rng, state, log_likelihoods[level], drift, n, settings.survival_rate)
             layers.append(info)
         filtered.append(state)
         infos.append(tuple(layers))
@@ -262,3 +317,19 @@ def structural_step(
     best = max(infos[-1], key=lambda info: info.best_log_likelihood)
     evaluations = sum(info.evaluations for layers in infos for info in layers)
     return backward(rng, filtered, group, counts), StructuralInfo(estimates, best.best, best.best_log_likelihood, evaluations, tuple(infos))
+
+
+def _weighed(rng, state, log_likelihood, drift, n, survival_rate) -> tuple[ParticleState, LayerInfo, np.ndarray | None]:
+    """One layer, and each limb's share of the likelihood if that is told."""
+    shares = None
+
+    def total(states: np.ndarray) -> np.ndarray:
+        nonlocal shares
+        values = np.asarray(log_likelihood(states), float)
+        if values.ndim == 1:
+            return values
+        shares = values
+        return shares.sum(axis=1)
+
+    state, info = filter_layer(rng, state, total, drift, n, survival_rate)
+    return state, info, shares
