@@ -40,6 +40,7 @@ __all__ = [
     "METHODS",
     "SHBM",
     "VERSION",
+    "WHOLE",
     "by_method",
     "cell",
     "chain",
@@ -60,6 +61,8 @@ METHODS: dict[str, tuple[str, tuple[str, ...]]] = {
     "DDM-APF": ("ddm-apf", ()),
     "SHBM-DDM-APF": ("shbm-ddm-apf", ("1",)),
 }
+#: Model 1 as the thesis has it: particles stay whole, and as few survive as the plain filter keeps.
+WHOLE = "SHBM-APF, model 1, no exchange of limbs"
 MARKERS = "marker-based APF"
 #: Whole chains by the preset `default`, and their methods.
 CHAINS = {"default, APF": APF, "default, SHBM-APF": "SHBM-APF, model 1"}
@@ -79,7 +82,10 @@ def run_preset(parameters: Parameters) -> PosePreset:
     preset = filter_preset(base | {"annealing": parameters["annealing"]})
     structural = StructuralSettings() if annealing == "canton2009" else pose_preset(annealing).structural
     structural = replace(structural, gamma=evaluations / (N_DOF * structural.layers))
-    name, models = METHODS[parameters["method"]]
+    method = parameters["method"]
+    if method == WHOLE:
+        method, structural = SHBM[0], replace(structural, by_limb=False, survival_rate=preset.annealed.layer_survival(0))
+    name, models = METHODS[method]
     return method_preset(replace(preset, structural=structural), name, models)
 
 
@@ -90,8 +96,8 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
     ----------
     parameters : mapping
         ``recording``, ``cameras`` (0: all), ``frames`` (0: all), ``voxel_mm``, ``annealing``, ``method`` (a key of `METHODS` or
-        `CHAINS`, or `MARKERS`, which has settings of its own), ``evaluations`` (of the likelihood, a frame), ``removed_percent`` and
-        ``removed`` (`hmc.experiments.removal`), ``repeat``.
+        `CHAINS`; or `WHOLE`; or `MARKERS`, which has settings of its own), ``evaluations`` (of the likelihood, a frame),
+        ``removed_percent`` and ``removed`` (`hmc.experiments.removal`), ``repeat``.
     inputs : Inputs
     rng : numpy.random.Generator
     """

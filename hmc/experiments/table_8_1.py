@@ -19,7 +19,7 @@ from hmc.experiments.table_7_1 import PAPER as SHBM_PAPER
 __all__ = ["EXPERIMENT"]
 
 #: Evaluations a frame: the thesis's APF, and a third of it.
-EVALUATIONS = {runs.APF: runs.APF_EVALUATIONS} | dict.fromkeys(runs.SHBM, runs.APF_EVALUATIONS // 3)
+EVALUATIONS = {runs.APF: runs.APF_EVALUATIONS} | dict.fromkeys((*runs.SHBM, runs.WHOLE), runs.APF_EVALUATIONS // 3)
 PAPERS = {runs.MARKERS: MARKER_PAPER, runs.APF: APF_PAPER} | SHBM_PAPER
 METHODS = (runs.MARKERS, *EVALUATIONS, *runs.CHAINS)
 
