@@ -1,4 +1,4 @@
-"""Multi-cue descent through a whole recording: a stopped run goes on to the same result, silhouettes kept or not, the command's files."""
+"""Multi-cue descent through a whole recording: a stopped run goes on to the same result, with silhouettes kept or made."""
 
 from functools import partial
 from pathlib import Path
@@ -8,6 +8,8 @@ import pytest
 from numpy.testing import assert_array_equal
 from stopped import Stopped, noting, stopping
 
+from hmc.frontend import stream_masks
+from hmc.mask_store import keep_masks
 from hmc.pose.body.model import neutral_state
 from hmc.pose.body.proportions import default_body
 from hmc.pose.smd import sequence
@@ -62,6 +64,15 @@ def run(task, tracks):
 
 
 @pytest.fixture(scope="module")
+def masks(task, tmp_path_factory):
+    """Silhouettes that the tracker would have kept: without images, which are read again."""
+    path = tmp_path_factory.mktemp("kept") / "masks"
+    for _ in keep_masks(path, "k", 0, stream_masks(task.recording), pytest.fail):
+        pass
+    return path
+
+
+@pytest.fixture(scope="module")
 def whole(run):
     return run()
 
@@ -83,9 +94,9 @@ def test_everybody_has_a_row_a_frame(whole):
 
 
 @pytest.mark.parametrize(("after", "first"), [(3, 1), (4, 4)])
-def test_a_stopped_run_goes_on_and_comes_to_the_same(run, whole, tmp_path, after, first):
+def test_a_stopped_run_goes_on_and_comes_to_the_same(run, masks, whole, tmp_path, after, first):
     """Stopped when one is followed and one not yet started, and when it is known that one cannot start."""
-    kept = {"journal": tmp_path / "journal", "key": "k"}
+    kept = {"journal": tmp_path / "journal", "masks": masks, "key": "k"}
     with pytest.raises(Stopped):
         run(**kept, progress=stopping(after))
     with open(kept["journal"], "a") as file:

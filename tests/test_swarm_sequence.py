@@ -10,13 +10,14 @@ from numpy.testing import assert_array_equal
 from stopped import Stopped, noting, stopping
 
 from hmc.cli import main
+from hmc.frontend import stream_hulls
 from hmc.pose.swarm import sequence
 from hmc.pose.swarm.fit import FitSettings
 from hmc.pose.swarm.sequence import SwarmPreset, SwarmTask, pose_by_swarm, swarm_preset
 from hmc.pose.swarm.temporal import SwarmSettings
 from hmc.recording import open_recording
 from hmc.results import TrackTable, read_joints, read_run
-from hmc.tracking.resumable import track_recording
+from hmc.tracking.resumable import person_grid, track_recording
 
 TINY = Path(__file__).resolve().parents[1] / "data" / "synthetic" / "tiny"
 VOXEL_M = 0.04
@@ -31,8 +32,14 @@ def task():
 
 
 @pytest.fixture(scope="module")
-def tracks(task):
-    return track_recording(task.recording, 0.05)
+def masks(tmp_path_factory):
+    """Silhouettes that the tracker kept: without images, which are read again."""
+    return tmp_path_factory.mktemp("kept") / "masks"
+
+
+@pytest.fixture(scope="module")
+def tracks(task, masks):
+    return track_recording(task.recording, 0.05, masks=masks, key="k")
 
 
 def watched(patch):
@@ -57,9 +64,9 @@ def whole(task, tracks):
 
 
 @pytest.mark.parametrize("after", [4])
-def test_a_stopped_run_goes_on_and_comes_to_the_same(task, tracks, whole, tmp_path, monkeypatch, after):
+def test_a_stopped_run_goes_on_and_comes_to_the_same(task, tracks, masks, whole, tmp_path, monkeypatch, after):
     people, rows, states = whole
-    kept = {"journal": tmp_path / "journal", "masks": tmp_path / "masks", "key": "k"}
+    kept = {"journal": tmp_path / "journal", "masks": masks, "key": "k"}
     with pytest.raises(Stopped):
         pose_by_swarm(task, tracks, VOXEL_M, **kept, progress=stopping(after))
     seen, resumed = [], watched(monkeypatch)
@@ -79,6 +86,20 @@ def test_a_stopped_run_goes_on_and_comes_to_the_same(task, tracks, whole, tmp_pa
     # Nothing is left to do of a run that was finished.
     assert_array_equal(pose_by_swarm(task, tracks, VOXEL_M, **kept)[0].poses.positions, people.poses.positions)
     assert len(resumed) <= len(states)
+
+
+@pytest.mark.parametrize(("every", "taken"), [(3, "strict"), (40, "tolerant")])
+def test_a_strict_hull_that_is_whole_is_taken_however_fat_the_tolerant_one(task, tracks, every, taken):
+    """Of few cameras it is less than half of the tolerant one; only where nearly nothing is left of it a camera lost the person."""
+    grid = person_grid(task.recording, VOXEL_M)
+    hull = next(stream_hulls(task.recording, grid, last=1))
+    strict = np.zeros_like(hull.tolerant)
+    few = np.argwhere(hull.tolerant)[::every]
+    strict[tuple(few.T)] = True
+    (seen,) = sequence._seen(task.recording, grid, tracks, replace(hull, strict=strict)).values()
+    voxels = seen[0]
+    assert len(voxels) > 0 and len(voxels) <= (len(few) if taken == "strict" else hull.tolerant.sum())
+    assert strict[tuple(voxels.T)].all() == (taken == "strict")
 
 
 def test_notes_of_one_reason_are_one_line(task, tracks):

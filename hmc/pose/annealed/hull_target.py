@@ -11,7 +11,7 @@ from hmc.pose.annealed.near_distance import near_distance
 from hmc.voxels.grid import VoxelGrid
 from hmc.voxels.surface import surface
 
-__all__ = ["FAR_M", "HullTarget", "distance_at", "distance_gradient", "make_target", "sample_points"]
+__all__ = ["FAR_M", "HullTarget", "distance_at", "distance_gradient", "make_target", "sample_points", "sound_hull"]
 
 #: Room left around a person's voxels in the distance field, metres: limbs of wrong guesses still see the way back.
 MARGIN_M = 0.35
@@ -64,6 +64,19 @@ class HullTarget:
     rays: np.ndarray | None = None
 
 
+def sound_hull(strict: np.ndarray, tolerant: np.ndarray) -> np.ndarray:
+    """A person's voxels in the strict hull, or in the tolerant one where the strict one is nearly empty: there a camera lost the person.
+
+    Of few cameras the strict hull is less than half of the tolerant one, and whole.
+
+    Parameters
+    ----------
+    strict, tolerant : ndarray of int, shape (n, 3) and (m, 3)
+        The person's voxels (i, j, k).
+    """
+    return tolerant if len(strict) < LEAST_STRICT_SHARE * len(tolerant) else strict
+
+
 def make_target(
     grid: VoxelGrid,
     strict: np.ndarray,
@@ -96,8 +109,7 @@ def make_target(
     """
     if not len(tolerant):
         tolerant = strict
-    if len(strict) < LEAST_STRICT_SHARE * len(tolerant):
-        strict = tolerant
+    strict = sound_hull(strict, tolerant)
     if not len(strict):
         return None
     pad = int(np.ceil(MARGIN_M / grid.voxel_size_m))

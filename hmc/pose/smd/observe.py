@@ -6,6 +6,7 @@ import numpy as np
 
 from hmc.camera.model import Rig
 from hmc.frontend import HullStep
+from hmc.pose.annealed.hull_target import sound_hull
 from hmc.pose.smd.color_cue import to_yuv
 from hmc.pose.smd.cues import Observed
 from hmc.pose.smd.edge_cue import Crop
@@ -27,6 +28,8 @@ MARGIN_M = 0.15
 def observe_people(recording: Recording, grid: VoxelGrid, tracks: TrackTable, hull: HullStep) -> dict[int, Observed]:
     """What is seen of everybody in a frame: the surface of the strict hull's part that is theirs, its colours, and the images around it.
 
+    Where the strict hull has nearly nothing of somebody, the tolerant one stands for it (`hmc.pose.annealed.hull_target.sound_hull`).
+
     Parameters
     ----------
     recording : Recording
@@ -44,10 +47,12 @@ def observe_people(recording: Recording, grid: VoxelGrid, tracks: TrackTable, hu
     if observation is None:
         return {}
     out = {}
-    for number, voxels in zip(tracks.persons[rows].tolist(), person_voxels(observation, tracks.positions[rows]), strict=True):
-        strict = voxels[hull.strict[tuple(voxels.T)]]
-        if len(strict):
-            out[number] = observe_voxels(grid, recording.rig, hull.strict, strict, hull.images, hull.masks)
+    for number, tolerant in zip(tracks.persons[rows].tolist(), person_voxels(observation, tracks.positions[rows]), strict=True):
+        strict = tolerant[hull.strict[tuple(tolerant.T)]]
+        voxels = sound_hull(strict, tolerant)
+        occupied = hull.strict if voxels is strict else hull.tolerant
+        if len(voxels):
+            out[number] = observe_voxels(grid, recording.rig, occupied, voxels, hull.images, hull.masks)
     return out
 
 

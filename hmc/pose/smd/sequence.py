@@ -132,7 +132,7 @@ def pose_by_descent(
         states[decided.person] = _taken_up(task, states[decided.person], decided)
     done_to = {number: state.done_to for number, state in states.items()}
     for hull in frames_left(
-        recording, grid, persons, done_to, frontend=frontend, masks=masks, key=key, on_problem=on_problem, progress=progress
+        recording, grid, persons, done_to, frontend=frontend, masks=masks, key=key, on_problem=on_problem, progress=progress, images=True
     ):
         left = [number for number in tracks.persons[tracks.frames == hull.index].tolist() if hull.index > states[number].done_to]
         seen = observe_people(recording, grid, tracks, hull)

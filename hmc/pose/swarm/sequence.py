@@ -19,7 +19,7 @@ from hmc.files import atomic_write
 from hmc.frontend import FrontendSettings, HullStep
 from hmc.journal import append_journal, open_journal
 from hmc.landmarks import LANDMARKS
-from hmc.pose.annealed.hull_target import make_target
+from hmc.pose.annealed.hull_target import make_target, sound_hull
 from hmc.pose.body.joints import DOF_NAMES
 from hmc.pose.body.proportions import default_body
 from hmc.pose.person import PersonTask
@@ -193,7 +193,7 @@ def pose_by_swarm(
         rows += new
     done_to = {number: state.done_to for number, state in states.items()}
     for hull in frames_left(
-        recording, grid, persons, done_to, frontend=frontend, masks=masks, key=key, on_problem=on_problem, progress=progress
+        recording, grid, persons, done_to, frontend=frontend, masks=masks, key=key, on_problem=on_problem, progress=progress, images=True
     ):
         for number, seen in _seen(recording, grid, tracks, hull).items():
             if hull.index <= states[number].done_to:
@@ -216,9 +216,7 @@ def _seen(recording: Recording, grid: VoxelGrid, tracks: TrackTable, hull: HullS
     if observation is None:
         return out
     for number, tolerant in zip(list(out), person_voxels(observation, tracks.positions[rows]), strict=True):
-        strict = tolerant[hull.strict[tuple(tolerant.T)]]
-        # Where a camera lost the person, the tolerant hull stands for the strict one.
-        voxels = strict if len(strict) > 0.5 * len(tolerant) else tolerant
+        voxels = sound_hull(tolerant[hull.strict[tuple(tolerant.T)]], tolerant)
         if len(voxels):
             votes = color_votes(face_neighbours(voxels), voxels, grid, recording.rig, hull.images, 40.0)
             out[number] = voxels, grid.centres(voxels), votes
