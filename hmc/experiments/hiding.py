@@ -30,7 +30,7 @@ from hmc.pose.body.proportions import default_body
 from hmc.pose.scalable.methods import method_preset
 from hmc.pose.scalable.models import UNITIVE_PIECES
 from hmc.pose.scalable.restrict import part_mask
-from hmc.pose.scalable.scouts import limb_occupancy
+from hmc.pose.scalable.shown import limb_signs, place_flesh
 from hmc.pose.sequence import targets_of
 from hmc.results import TrackTable
 from hmc.tracking.resumable import person_grid
@@ -98,8 +98,9 @@ def _limb_views(inputs: Inputs, label: str) -> LimbViews:
             continue
         state, _ = fit_landmarks(body, truth.positions[row[0]], state)
         maps, transforms = score_maps(target, recording.room), segment_transforms(body, state)
+        flesh = place_flesh(table, state, maps, target, [part for limb in limbs for part in limb.parts])
         for k, limb in enumerate(limbs):
-            occupancy[row[0], k] = limb_occupancy(table, state, maps, limb.parts, whole)
+            occupancy[row[0], k] = limb_signs(flesh, limb.parts, whole).occupancy
             own = part_mask(limb.parts)[table.flesh.part]
             points = place_points(*transforms, table.flesh.points[own], table.flesh.segment[own])
             cameras[row[0], k] = sum(share >= 0.5 for share in _shares(recording.rig, hull, points))

@@ -26,13 +26,19 @@ class LimbSettings:
         annealed so strongly that they say nothing of it.
     lost_occupancy : float
         ... and when less than this share of its flesh is in occupied voxels that no other part fills.
+    lost_strict : float
+        ... or when less than this share of its free flesh is in the strict hull, and it has found room where everything is occupied, by one
+        of the next two; 0: this does not matter.
     lost_closeness : float
-        ... or, where it lies folded against what it hangs on, when its skin is less close than this to the hull's surface
-        (`hmc.pose.scalable.scouts.limb_closeness`); 0: it does not matter.
+        It lies folded against other parts, and its skin is less close than this to the hull's surface, 0 to 1.
+    lost_inside : float
+        More than this share of it is in other parts.
     found_spread_deg : float
         A missing limb is shown when its angles vary by less than this (in the median) among its scouts, degrees.
     found_occupancy : float
-        ... and when more than this share of it is in such voxels.
+        ... and when more than this share of it is in such voxels,
+    found_strict : float
+        ... or more than this share in the strict hull; 1: that is not enough.
     lost_frames, found_frames : int
         For how many frames on end a limb must be in doubt, and shown, before it is lost, and found.
     scouts : int
@@ -47,9 +53,12 @@ class LimbSettings:
     tree: Unitive = field(default_factory=lambda: UNITIVE)
     lost_spread_deg: float = 15.0
     lost_occupancy: float = 0.05
+    lost_strict: float = 0.0
     lost_closeness: float = 0.0
+    lost_inside: float = 1.0
     found_spread_deg: float = 5.0
     found_occupancy: float = 0.7
+    found_strict: float = 1.0
     lost_frames: int = 3
     found_frames: int = 3
     scouts: int = 120

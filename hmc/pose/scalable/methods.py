@@ -16,7 +16,15 @@ __all__ = ["SCALABLE_METHODS", "method_preset"]
 SCALABLE_METHODS = ("shbm-apf", "ddm-apf", "shbm-ddm-apf")
 #: For presets that refine. Strong annealing leaves particles close together whatever the data: the spread says nothing of a tracked limb.
 _REFINED_LIMBS = LimbSettings(
-    UNITIVE_PIECES, lost_spread_deg=0.0, lost_occupancy=0.4, lost_closeness=0.45, found_spread_deg=8.0, found_occupancy=0.7
+    UNITIVE_PIECES,
+    lost_spread_deg=0.0,
+    lost_occupancy=0.4,
+    lost_strict=0.7,
+    lost_closeness=0.45,
+    lost_inside=0.5,
+    found_spread_deg=8.0,
+    found_occupancy=0.7,
+    found_strict=0.4,
 )
 _SHIPPED = {"1": (MODEL_1,), "2": (MODEL_2,), "auto": (MODEL_1, MODEL_2)}
 

@@ -22,10 +22,11 @@ from hmc.pose.annealed.scores import (
     log_likelihood_global,
     scores,
 )
-from hmc.pose.annealed.symmetric import PART_OF_SEGMENT, BodyPoints, body_distance, symmetric_cost, symmetric_cost_by_part, thinned
+from hmc.pose.annealed.symmetric import PART_OF_SEGMENT, BodyPoints, symmetric_cost, symmetric_cost_by_part, thinned
 from hmc.pose.body.flesh import SurfaceSamples
 from hmc.pose.body.model import PARTS, BodyModel, Cones
 from hmc.pose.scalable.models import LIMB_OF_PART
+from hmc.pose.scalable.part_distances import part_distances
 
 __all__ = [
     "ScoreData",
@@ -135,8 +136,7 @@ def nearest_part(body: BodyModel, state: np.ndarray, points: np.ndarray) -> np.n
     ndarray of int, shape (k,)
         Places in `hmc.pose.body.model.PARTS`.
     """
-    distances = [body_distance(part_body(body, one), state[None], points)[0] for one in np.eye(len(PARTS), dtype=bool)]
-    return np.argmin(distances, axis=0)
+    return np.argmin(part_distances(body, state, points), axis=0)
 
 
 def restrict_target(target: HullTarget, keep: np.ndarray) -> HullTarget:

@@ -30,7 +30,8 @@ from hmc.pose.body.model import PARTS
 from hmc.pose.scalable.limbs import LimbMemory, LimbSettings, limb_spread_deg, look_again
 from hmc.pose.scalable.models import LIMB_OF_DOF, Inclusive
 from hmc.pose.scalable.restrict import ScoreData, SymmetricData, nearest_part, part_mask, restrict_filter, restrict_target
-from hmc.pose.scalable.scouts import in_doubt, limb_dofs, scout
+from hmc.pose.scalable.scouts import limb_dofs, scout
+from hmc.pose.scalable.shown import in_doubt, place_flesh
 from hmc.pose.scalable.structure import structural_step
 
 __all__ = ["PoseStep", "scalable_step", "step_of", "suited"]
@@ -109,7 +110,7 @@ def scalable_step(rng: np.random.Generator, filt: PoseFilter, state: PoseState, 
     particles = found.particles
     if limbs is not None and memory is not None and filt.table is not None and maps is not None:
         tracked = estimate
-        memory, estimate, looked = _look(rng, filt.table, maps, tracked, particles, memory, limbs)
+        memory, estimate, looked = _look(rng, filt.table, maps, target, tracked, particles, memory, limbs)
         particles = replace(particles, particles=np.where(estimate != tracked, estimate, particles.particles))
         there, more = _there(limbs, memory), more + looked
         kept |= memory.kept()
@@ -226,6 +227,7 @@ def _look(
     rng: np.random.Generator,
     table: ScoreTable,
     maps: ScoreMaps,
+    target: HullTarget,
     estimate: np.ndarray,
     particles: ParticleState,
     memory: LimbMemory,
@@ -236,17 +238,17 @@ def _look(
     weights = normalise(particles.log_weights)
     evidence = np.zeros(len(tree.limbs), bool)
     found, evaluations = {}, 0
+    flesh = place_flesh(table, estimate, maps, target, [part for limb in tree.limbs for part in limb.parts])
     for k, limb in enumerate(tree.limbs):
         if memory.active[k]:
             evaluations += 1
             spread = limb_spread_deg(particles.particles[:, limb.dofs], weights).min()
             if spread > limbs.lost_spread_deg:
-                evidence[k] = in_doubt(table, maps, estimate, k, memory.active, limbs)
+                evidence[k] = in_doubt(flesh, k, memory.active, limbs)
         elif tree.parent[k] < 0 or memory.active[tree.parent[k]]:
-            report = scout(rng, table, maps, estimate, k, memory.active, limbs)
+            report = scout(rng, table, maps, target, estimate, k, memory.active, limbs)
             evaluations += report.evaluations
-            found[k] = report.state
-            evidence[k] = report.spread_deg < limbs.found_spread_deg and report.occupancy > limbs.found_occupancy
+            found[k], evidence[k] = report.state, report.shown
     after = look_again(memory, evidence, limbs)
     for k in np.flatnonzero(after.active & ~memory.active).tolist():
         estimate = np.where(np.isin(np.arange(N_DOF), limb_dofs(limbs, k)), found[k], estimate)
