@@ -66,7 +66,7 @@ def main() -> int:
     strong = AnnealedSettings(layers=6, particles=APF_PARTICLES // 6, survival_rate=0.04, spread=0.6)
     apf = replace(scores, annealed=strong)
     structural = replace(PRESETS["default"].structural, gamma=SHBM_PARTICLES / N_DOF)
-    for voxel_m, least in ((0.02, None), (0.03, 15.0)):
+    for voxel_m in (0.02, 0.03):
         size = f"{voxel_m * 100:.0f} cm"
         targets = [target_of(body, pose, voxel_m) for pose in poses[1:]]
         for model in ("1", "2"):
@@ -74,10 +74,13 @@ def main() -> int:
             rounds = [[run(one, body, voxel_m, poses, targets, k) for one in (apf, shbm)] for k in range(ROUNDS)]
             (apf_s, apf_m), (shbm_s, shbm_m) = np.median(rounds, axis=0)
             note = f"error {1000 * shbm_m:.0f} mm, APF {1000 * apf_m:.0f} mm; {1 / shbm_s:.0f} and {1 / apf_s:.0f} frames a second"
-            good &= report("5g", f"SHBM-APF model {model} / APF, frames a second, {size}", apf_s / shbm_s, 1.5, at_least=True, note=note)
+            if voxel_m == 0.02:
+                good &= report(
+                    "5g", f"SHBM-APF model {model} / APF, frames a second, {size}", apf_s / shbm_s, 1.5, at_least=True, note=note
+                )
+            else:
+                good &= report("5g", f"SHBM-APF model {model}, frames a second, {size}", 1 / shbm_s, 15.0, at_least=True, note=note)
             good &= report("5g", f"SHBM-APF model {model} / APF, error, {size}", shbm_m / apf_m, 1.0)
-            if least is not None:
-                good &= report("5g", f"SHBM-APF model {model}, frames a second, {size}", 1 / shbm_s, least, at_least=True)
     hidden = [without_shanks(body, pose, 0.03) for pose in poses[1:]] * 2
     ddm = method_preset(PRESETS["default"], "ddm-apf")
     still = replace(ddm, limbs=replace(ddm.limbs, found_frames=10**6))
