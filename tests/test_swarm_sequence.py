@@ -112,7 +112,7 @@ def test_notes_of_one_reason_are_one_line(task, tracks):
 
 
 def run(out, *more):
-    return main(["pose", str(TINY), "--out", str(out), "--quiet", "--method", "pso", "--frames", "3", "--voxel", "0.04", *more])
+    return main(["pose", str(TINY), "--out", str(out), "--quiet", "--method", "pso", "--frames", "5", "--voxel", "0.04", *more])
 
 
 def test_the_command_leaves_a_row_a_frame(tmp_path):
@@ -123,7 +123,7 @@ def test_the_command_leaves_a_row_a_frame(tmp_path):
     assert list(rows[0]) == ["frame", "person", "status", "error_m", "started", "turned", "doubts"]
     joints = read_joints(tmp_path / "out" / "joints.csv")
     fitted = [int(row["frame"]) for row in rows if row["status"] == "fitted"]
-    assert [int(row["frame"]) for row in rows] == list(range(3)) and fitted == sorted(set(joints.frames.tolist()))
+    assert [int(row["frame"]) for row in rows] == list(range(5)) and fitted == sorted(set(joints.frames.tolist()))
     assert all(0 < float(row["error_m"]) < 0.3 for row in rows if row["status"] == "fitted")
     told = read_run(tmp_path / "out" / "run.toml")
     assert told["method"] == "pso" and told["parameters"]["preset"]["swarm"]["voxels"] is True
