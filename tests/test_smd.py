@@ -22,7 +22,7 @@ from hmc.pose.body.proportions import default_body
 from hmc.pose.smd.body import CHAINS, FREE
 from hmc.pose.smd.color_cue import ColorSettings, color_fits, learn_colors, update_colors
 from hmc.pose.smd.cues import CueSettings, Observed, draw_of_groups
-from hmc.pose.smd.descent import Evaluation, SmdSettings, converged, smd_init, smd_run, smd_step
+from hmc.pose.smd.descent import Evaluation, SmdSettings, converged, curvature_axes, smd_init, smd_run, smd_step
 from hmc.pose.smd.edge_cue import Crop, edge_maps, match_edges, shown_contours
 from hmc.pose.smd.levenberg import robust_residuals
 from hmc.pose.smd.observe import crop_images
@@ -244,20 +244,21 @@ def test_leclerc_is_bounded_and_rises(error, width):
 def quadratic(matrix, goal):
     def objective(at, going):
         gradient = matrix @ (at - goal)
-        return Evaluation(float(0.5 * (at - goal) @ gradient), gradient, lambda v: matrix @ v, np.diag(matrix))
+        return Evaluation(float(0.5 * (at - goal) @ gradient), gradient, lambda v: matrix @ v, lambda: matrix)
 
     return objective
 
 
 @settings(max_examples=20, deadline=None)
-@given(st.integers(0, 2**32 - 1))
-def test_descent_finds_the_minimum_of_a_quadratic(seed):
+@given(st.integers(0, 2**32 - 1), st.booleans())
+def test_descent_finds_the_minimum_of_a_quadratic(seed, by_curvature):
     rng = np.random.default_rng(seed)
     root = rng.normal(size=(5, 5))
     # Steps for each parameter alone suit it, and its values are below 1, as the robust objective's are.
     matrix = 0.01 * (root @ root.T + 5 * np.diag(rng.uniform(0.5, 5, 5)))
     goal, wide = rng.normal(size=5), np.full(5, np.inf)
-    found, info = smd_run(quadratic(matrix, goal), np.zeros(5), -wide, wide, np.full(5, 1e-7), SmdSettings(iterations=2000, reach=1e6))
+    chosen = SmdSettings(first_step=0.5, meta_step=3e-4, iterations=2000, reach=1e6, by_curvature=by_curvature)
+    found, info = smd_run(quadratic(matrix, goal), np.zeros(5), -wide, wide, np.full(5, 1e-7), chosen)
     np.testing.assert_allclose(found, goal, atol=1e-4)
     assert info.iterations[0] < 2000
 
@@ -265,10 +266,10 @@ def test_descent_finds_the_minimum_of_a_quadratic(seed):
 def test_step_sizes_grow_where_gradients_agree_and_halve_at_most():
     state = smd_init(np.zeros(2), np.full(2, 0.1), np.array([1.0, 1.0]))
     wide, chosen = np.full(2, np.inf), SmdSettings(memory=0.3)
-    first = Evaluation(0.0, np.array([1.0, 1.0]), lambda v: 0 * v, np.ones(2))
+    first = Evaluation(0.0, np.array([1.0, 1.0]), lambda v: 0 * v, lambda: np.eye(2))
     state = smd_step(state, first, -wide, wide, chosen)
     np.testing.assert_allclose(state.trace, 0.1)  # v = a g
-    again = Evaluation(0.0, np.array([1.0, -100.0]), lambda v: 0 * v, np.ones(2))
+    again = Evaluation(0.0, np.array([1.0, -100.0]), lambda v: 0 * v, lambda: np.eye(2))
     after = smd_step(state, again, -wide, wide, chosen)
     np.testing.assert_allclose(after.steps, [0.1 * (1 + 0.1), 0.05])
     sure = smd_step(replace(state, meta=np.full(2, 1000.0)), again, -wide, wide, chosen)
@@ -278,7 +279,7 @@ def test_step_sizes_grow_where_gradients_agree_and_halve_at_most():
 def test_the_descent_does_not_depend_on_the_units():
     """Degrees for radians, with step sizes learnt in degrees either way: the same path."""
     matrix, goal, wide = np.diag([1.0, 4.0]), np.array([0.3, -0.2]), np.full(2, np.inf)
-    factor, chosen = np.degrees(1.0), SmdSettings(iterations=12, first_step=0.05, meta_step=0.1)
+    factor, chosen = np.degrees(1.0), SmdSettings(iterations=12, first_step=0.05, by_curvature=False)
     tight = np.full(2, 1e-9)
     _, radians = smd_run(quadratic(matrix, goal), np.zeros(2), -wide, wide, tight, replace(chosen, reach=1e9), None, 1 / factor)
     scaled = quadratic(matrix / factor**2, goal * factor)
@@ -290,15 +291,62 @@ def test_the_descent_does_not_depend_on_the_units():
     assert np.linalg.norm(radians.path[-1] - goal) < 0.9 * np.linalg.norm(fixed.path[-1] - goal)
 
 
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_along_the_curvatures_axes_the_descent_does_not_depend_on_the_parameters(seed):
+    """Other parameters for the same thing: the same path, for step sizes that stay; and a step of one leads to the minimum."""
+    rng = np.random.default_rng(seed)
+    root, goal, start = rng.uniform(-1, 1, (4, 4)), rng.normal(size=4), np.zeros(4)
+    mixed = np.eye(4) + 0.2 * rng.uniform(-1, 1, (4, 4))
+    matrix, wide, tight = 0.1 * (root @ root.T + np.eye(4)), np.full(4, np.inf), np.full(4, 1e-2)
+    chosen = SmdSettings(first_step=0.4, iterations=6, meta_step=0.0, damping=0.0, reach=1e9)
+    other = np.linalg.inv(mixed)
+    _, one = smd_run(quadratic(matrix, goal), start, -wide, wide, tight, chosen)
+    _, two = smd_run(quadratic(other.T @ matrix @ other, mixed @ goal), start, -wide, wide, tight, chosen)
+    np.testing.assert_allclose(two.path @ other.T, one.path, atol=1e-3)
+    _, quick = smd_run(quadratic(matrix, goal), start, -wide, wide, tight, replace(chosen, first_step=1.0))
+    np.testing.assert_allclose(quick.path[1], goal, atol=1e-3)
+
+
+def test_axes_make_the_curvature_the_unit_matrix_group_by_group():
+    root = np.random.default_rng(4).normal(size=(5, 8))
+    matrix, groups = root @ root.T, [np.array([0, 3]), np.array([1, 2])]
+    axes = curvature_axes(matrix, groups, np.full(5, 1.0), 0.0)
+    product = axes.T @ matrix @ axes
+    for group in groups:
+        np.testing.assert_allclose(product[np.ix_(group, group)], np.eye(2), atol=1e-3)
+    np.testing.assert_array_equal(axes[4], np.eye(5)[4])
+    assert not axes[np.ix_(groups[0], groups[1])].any()
+    assert np.isfinite(curvature_axes(np.zeros((5, 5)), groups, np.full(5, 0.02), 0.1)).all()
+
+
+def test_the_average_of_the_last_states_is_nearer_than_the_last():
+    """Every gradient is off by chance; what is found is the mean of the states that the moving average is over."""
+    goal, wide, tight, errors = np.array([0.3, -0.2]), np.full(2, np.inf), np.full(2, 1e-6), []
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+
+        def objective(at, going, rng=rng):
+            return Evaluation(0.0, at - goal + 0.3 * rng.normal(size=2), lambda v: v, lambda: np.eye(2))
+
+        found, info = smd_run(objective, np.zeros(2), -wide, wide, tight, SmdSettings(first_step=1.0, iterations=12, reach=1e9))
+        np.testing.assert_allclose(found, info.path[-4:].mean(axis=0))
+        errors.append([np.linalg.norm(found - goal), np.linalg.norm(info.path[-1] - goal)])
+    averaged, last = np.mean(errors, axis=0)
+    assert averaged < 0.7 * last
+
+
 def test_limits_hold_and_the_constrained_gradient_leads_to_them():
     low, high = np.array([-1.0, -1.0]), np.array([0.05, 1.0])
-    found = Evaluation(0.0, np.array([-1.0, -1.0]), lambda v: 0 * v, np.ones(2))
+    found = Evaluation(0.0, np.array([-1.0, -1.0]), lambda v: 0 * v, lambda: np.eye(2))
     state = smd_step(smd_init(np.zeros(2), np.full(2, 0.1), np.zeros(2)), found, low, high, SmdSettings())
     np.testing.assert_allclose(state.parameters, [0.05, 0.1])
     # Eq. 23: the trace is the change that was made, with its sign.
     np.testing.assert_allclose(state.trace, [-0.05, -0.1])
     goal = np.array([2.0, 0.5])
-    at, _ = smd_run(quadratic(np.eye(2), goal), np.zeros(2), low, high, np.full(2, 1e-6), SmdSettings(iterations=300, reach=1e5))
+    at, _ = smd_run(
+        quadratic(np.eye(2), goal), np.zeros(2), low, high, np.full(2, 1e-6), SmdSettings(iterations=300, reach=1e5, first_step=0.5)
+    )
     np.testing.assert_allclose(at, [0.05, 0.5], atol=1e-4)
 
 
@@ -315,7 +363,7 @@ def test_chains_together_are_the_chains_one_by_one():
     matrix = np.diag([1.0, 2.0, 5.0, 0.5])
     matrix[:2, :2] += 0.3
     goal, wide, groups = np.arange(4.0), np.full(4, np.inf), [np.array([0, 1]), np.array([2]), np.array([3])]
-    chosen = SmdSettings(iterations=100)
+    chosen = SmdSettings(iterations=100, first_step=0.5, reach=20.0)
     together, info = smd_run(quadratic(matrix, goal), np.zeros(4), -wide, wide, np.full(4, 0.01), chosen, groups)
     for group, count in zip(groups, info.iterations, strict=True):
         alone, one = smd_run(quadratic(matrix, goal), np.zeros(4), -wide, wide, np.full(4, 0.01), chosen, [group])
@@ -382,7 +430,8 @@ def test_a_moved_body_is_found_again(tracker, optimiser):
     )
     assert info.status == "fitted"
     assert len(info.views) == 3
-    assert after < 0.35 * before
+    # Samples that stay for the frame, and a descent that stops early, leave more of it.
+    assert after < (0.5 if optimiser == "deterministic" else 0.35) * before
     assert np.all(now.state[6:9] == 0)
 
 

@@ -2,6 +2,10 @@
 
 It knows nothing of bodies. An objective is a function that gives, for parameters, the gradient and the product of (what stands for) the
 Hessian with a vector; a stochastic one draws other samples every time it is called.
+
+The step sizes are a diagonal conditioner: of parameters that pull at the same points, such as a trunk's place and the hips' angles, it
+knows nothing, and the descent winds down a valley. With `SmdSettings.by_curvature` the same descent runs along other axes, in which the
+curvature at the start is the unit matrix. The paper's runs along the parameters themselves.
 """
 
 from __future__ import annotations
@@ -11,9 +15,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-__all__ = ["Evaluation", "SmdInfo", "SmdSettings", "SmdState", "converged", "smd_init", "smd_run", "smd_step"]
+__all__ = ["Evaluation", "SmdInfo", "SmdSettings", "SmdState", "converged", "curvature_axes", "smd_init", "smd_run", "smd_step"]
 
 Product = Callable[[np.ndarray], np.ndarray]
+#: A parameter of which one tolerance changes the objective by less than this share of what the strongest does is held back.
+_FLAT = 1e-5
 
 
 @dataclass(frozen=True)
@@ -26,14 +32,14 @@ class Evaluation:
     gradient : ndarray, shape (n,)
     product : callable
         Vector (n,) to the Hessian's product with it (n,).
-    curvature : ndarray, shape (n,)
-        The Hessian's diagonal, or what it is at most: first step sizes are taken from it.
+    curvature : callable
+        Gives the Hessian, or what it is at most, (n, n), positive semidefinite: asked for once, at the start, for axes and step sizes.
     """
 
     value: float
     gradient: np.ndarray
     product: Product
-    curvature: np.ndarray
+    curvature: Callable[[], np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -43,10 +49,10 @@ class SmdSettings:
     Parameters
     ----------
     first_step : float
-        First step sizes, in shares of the inverse curvature ("observe the value of the gradient in the first few iterations").
+        First step sizes, in shares of the inverse curvature ("observe the value of the gradient in the first few iterations"). More than
+        1 is well for points that are matched anew at every iteration: along a limb the matches come along, and the way is farther.
     meta_step : float
-        mu of Eq. 18, in shares of the first step sizes, for parameters in degrees and centimetres. "Values of one-tenth of the initial
-        step sizes" worked best in the paper (section 7); first steps that are half the inverse curvature leave little to learn.
+        mu of Eq. 18, in shares of the first step sizes: "values of one-tenth of the initial step sizes" worked best (section 7).
     memory : float
         lambda of Eq. 19.
     average : int
@@ -55,14 +61,24 @@ class SmdSettings:
         Most of them, Eq. 21.
     reach : float
         An iteration changes a parameter by so many tolerances at most, so that no descent runs away; the paper has no such bound.
+    by_curvature : bool
+        Descend along axes in which the curvature at the start is the unit matrix; otherwise along the parameters, as in the paper.
+    damping : float
+        So large a share of the curvature's diagonal is added before axes are taken from it.
+    averaged : bool
+        The moving average of Eq. 20 is what is found; otherwise the last state, as in the paper. Every state comes from samples of
+        its own, so the average rests on more of them.
     """
 
-    first_step: float = 0.5
-    meta_step: float = 0.0003
+    first_step: float = 1.5
+    meta_step: float = 0.1
     memory: float = 0.3
-    average: int = 3
-    iterations: int = 25
-    reach: float = 20.0
+    average: int = 4
+    iterations: int = 12
+    reach: float = 5.0
+    by_curvature: bool = True
+    damping: float = 0.1
+    averaged: bool = True
 
 
 @dataclass(frozen=True)
@@ -71,10 +87,12 @@ class SmdState:
 
     Parameters
     ----------
-    parameters, steps, trace : ndarray, shape (n,)
-        p, a and v of Eq. 17 to 19.
-    meta : ndarray, shape (n,)
-        mu of Eq. 18.
+    parameters : ndarray, shape (n,)
+        p of Eq. 17.
+    steps, trace, meta : ndarray, shape (n,)
+        a, v and mu of Eq. 17 to 19, along the axes.
+    axes, inverse : ndarray, shape (n, n)
+        Columns: what a step of one along each axis changes in the parameters; and the inverse of that.
     history : tuple of ndarray
         The last parameters, `SmdSettings.average` of them at most, the newest last.
     """
@@ -83,6 +101,8 @@ class SmdState:
     steps: np.ndarray
     trace: np.ndarray
     meta: np.ndarray
+    axes: np.ndarray
+    inverse: np.ndarray
     history: tuple[np.ndarray, ...]
 
 
@@ -104,15 +124,20 @@ class SmdInfo:
     path: np.ndarray
 
 
-def smd_init(parameters: np.ndarray, steps: np.ndarray, meta: np.ndarray) -> SmdState:
+def smd_init(parameters: np.ndarray, steps: np.ndarray, meta: np.ndarray, axes: np.ndarray | None = None) -> SmdState:
     """A state that has not moved.
 
     Parameters
     ----------
     parameters, steps, meta : ndarray, shape (n,)
+    axes : ndarray, shape (n, n), optional
+        The parameters' own by default.
     """
     parameters = np.asarray(parameters, float)
-    return SmdState(parameters, np.asarray(steps, float), np.zeros_like(parameters), np.asarray(meta, float), (parameters,))
+    axes = np.eye(len(parameters)) if axes is None else axes
+    return SmdState(
+        parameters, np.asarray(steps, float), np.zeros_like(parameters), np.asarray(meta, float), axes, np.linalg.inv(axes), (parameters,)
+    )
 
 
 def smd_step(state: SmdState, found: Evaluation, low: np.ndarray, high: np.ndarray, settings: SmdSettings) -> SmdState:
@@ -127,12 +152,40 @@ def smd_step(state: SmdState, found: Evaluation, low: np.ndarray, high: np.ndarr
         Limits into which parameters are put back.
     settings : SmdSettings
     """
-    steps = state.steps * np.clip(1 + state.meta * state.trace * found.gradient, 0.5, 2.0)
-    parameters = np.clip(state.parameters - steps * found.gradient, low, high)
+    gradient = found.gradient @ state.axes
+    steps = state.steps * np.clip(1 + state.meta * state.trace * gradient, 0.5, 2.0)
+    parameters = np.clip(state.parameters - state.axes @ (steps * gradient), low, high)
     # The gradient that would have led there without limits.
-    constrained = (state.parameters - parameters) / steps
-    trace = settings.memory * state.trace + steps * (constrained - settings.memory * found.product(state.trace))
-    return SmdState(parameters, steps, trace, state.meta, (*state.history, parameters)[-settings.average - 1 :])
+    constrained = state.inverse @ (state.parameters - parameters) / steps
+    product = found.product(state.axes @ state.trace) @ state.axes
+    trace = settings.memory * state.trace + steps * (constrained - settings.memory * product)
+    return SmdState(parameters, steps, trace, state.meta, state.axes, state.inverse, (*state.history, parameters)[-settings.average - 1 :])
+
+
+def curvature_axes(curvature: np.ndarray, groups: Sequence[np.ndarray], tolerance: np.ndarray, damping: float) -> np.ndarray:
+    """Axes in which a curvature is the unit matrix, group by group; what is in no group keeps its own.
+
+    Parameters
+    ----------
+    curvature : ndarray, shape (n, n)
+    groups : sequence of ndarray of int
+    tolerance : ndarray, shape (n,)
+    damping : float
+        Share of the diagonal that is added.
+
+    Returns
+    -------
+    ndarray, shape (n, n)
+        ``axes.T @ curvature @ axes`` is the unit matrix within each group, but for the damping.
+    """
+    axes = np.eye(len(curvature))
+    for group in groups:
+        block = curvature[np.ix_(group, group)]
+        effect = np.diag(block) * tolerance[group] ** 2
+        least = _FLAT * effect.max() if effect.max() > 0 else 1.0
+        block = block + np.diag(damping * np.diag(block) + least / tolerance[group] ** 2)
+        axes[np.ix_(group, group)] = np.linalg.inv(np.linalg.cholesky(block)).T
+    return axes
 
 
 def converged(state: SmdState, tolerance: np.ndarray, settings: SmdSettings, group: np.ndarray | slice = slice(None)) -> bool:
@@ -176,7 +229,7 @@ def smd_run(
     groups : sequence of ndarray of int, optional
         One group of all parameters by default. What is in no group stays.
     units : ndarray, shape (n,), optional
-        Of the parameters: what counts as a change of one in Eq. 18.
+        Of the parameters: what counts as a change of one in Eq. 18, where the descent is along them.
 
     Returns
     -------
@@ -193,8 +246,7 @@ def smd_run(
         at = path[-1]
         found = objective(at, going)
         if state is None:
-            steps = settings.first_step / np.maximum(found.curvature, 1e-9)
-            state = smd_init(at, steps, settings.meta_step * steps / np.square(units))
+            state = _begun(at, found.curvature(), groups, tolerance, settings, units)
         free = np.zeros(len(at), bool)
         free[np.concatenate([group for group, moving in zip(groups, going, strict=True) if moving])] = True
         found = replace(found, gradient=np.where(free, found.gradient, 0.0))
@@ -204,4 +256,17 @@ def smd_run(
         values.append(found.value)
         counts += going
         going &= [not converged(state, tolerance, settings, group) for group in groups]
-    return path[-1], SmdInfo(counts, np.array(values), np.array(path))
+    end = path[-1].copy()
+    for group, count in zip(groups, counts, strict=True):
+        last = path[1 : count + 1][-settings.average if settings.averaged else -1 :]
+        end[group] = np.mean([one[group] for one in last], axis=0)
+    return end, SmdInfo(counts, np.array(values), np.array(path))
+
+
+def _begun(at: np.ndarray, curvature: np.ndarray, groups, tolerance: np.ndarray, settings: SmdSettings, units) -> SmdState:
+    """The state before the first iteration, with axes and step sizes by the curvature."""
+    if settings.by_curvature:
+        steps = np.full(len(at), settings.first_step)
+        return smd_init(at, steps, settings.meta_step * steps, curvature_axes(curvature, groups, tolerance, settings.damping))
+    steps = settings.first_step / np.maximum(np.diag(curvature), 1e-9)
+    return smd_init(at, steps, settings.meta_step * steps / np.square(units))

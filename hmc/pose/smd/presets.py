@@ -9,15 +9,13 @@ from hmc.pose.smd.tracker import SmdPreset
 
 __all__ = ["SMD_PRESETS", "smd_preset"]
 
-#: `kehl2006` has the paper's cues, counts and tolerances (section 7); `default` adds voxels that look for the
-#: body, and takes more iterations.
+#: `kehl2006` has the paper's cues, counts and tolerances (section 7); `default` adds voxels that look for the body, and descends along
+#: axes taken from the curvature, which needs fewer iterations.
 SMD_PRESETS: dict[str, SmdPreset] = {
     "default": SmdPreset(),
     "kehl2006": SmdPreset(
         cues=CueSettings(voxel_points=0, full_edges=True, width=0.5),
-        descent=SmdSettings(meta_step=0.1, iterations=40),
-        tolerance_m=0.02,
-        tolerance_deg=2.0,
+        descent=SmdSettings(first_step=0.5, average=3, iterations=40, reach=20.0, by_curvature=False, averaged=False),
         predict=0.0,
         rescue=None,
     ),

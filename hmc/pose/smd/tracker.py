@@ -62,8 +62,8 @@ class SmdPreset:
     levenberg: LmSettings = field(default_factory=LmSettings)
     optimiser: str = "smd"
     times: int = 1
-    tolerance_m: float = 0.005
-    tolerance_deg: float = 0.5
+    tolerance_m: float = 0.02
+    tolerance_deg: float = 2.0
     refine_share: float = 0.5
     predict: float = 0.5
     rescue: RescueSettings | None = field(default_factory=RescueSettings)
@@ -298,7 +298,11 @@ def _moved_groups(dofs: np.ndarray) -> np.ndarray:
 def evaluation(matches: Matches, rows: np.ndarray, width: float) -> Evaluation:
     """The objective in the form the descent takes. Its curvature is that of matches without error, the most there is."""
     value, gradient, slopes = evaluate(matches, rows, width)
-    curvature = np.repeat(matches.weight / width, 3) @ rows.reshape(-1, rows.shape[-1]) ** 2
+
+    def curvature() -> np.ndarray:
+        flat = rows.reshape(-1, rows.shape[-1])
+        return (flat * np.repeat(matches.weight / width, 3)[:, None]).T @ flat
+
     return Evaluation(value, gradient, lambda vector: gauss_newton_product(rows, slopes, vector), curvature)
 
 
