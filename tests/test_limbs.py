@@ -284,6 +284,21 @@ def test_a_forearm_in_the_trunk_is_in_doubt_unless_what_sticks_out_is_in_the_str
     assert not doubted(whole, ALL, replace(settings, lost_inside=1.0))
 
 
+def test_a_thigh_is_in_doubt_in_the_trunk_only_and_not_where_it_is_joined_to_it(filters):
+    filt = filters["default"]
+    settings, active = filt.preset.limbs, np.ones(len(LIMBS), bool)
+    found = []
+    for bent_deg in (0, 90, 120):
+        state = standing()
+        state[dof_index("r_hip_y", "torso_y")] = np.radians([-bent_deg, bent_deg / 2])
+        target = hull_of(state)
+        flesh = place_flesh(filt.table, state, score_maps(target, None), target, LIMBS)
+        found.append((limb_signs(flesh, ("r_thigh",), ALL).inside, in_doubt(flesh, LIMBS.index("r_thigh"), active, settings)))
+    (standing_in, no), (sitting_in, neither), (folded_in, yes) = found
+    assert 0.1 < standing_in < sitting_in < 0.8 < folded_in
+    assert yes and not no and not neither
+
+
 def test_scouts_find_a_shank_although_its_thigh_has_gone_astray(filters):
     filt = filters["default"]
     state = standing()

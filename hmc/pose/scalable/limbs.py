@@ -32,7 +32,7 @@ class LimbSettings:
     lost_closeness : float
         It lies folded against other parts, and its skin is less close than this to the hull's surface, 0 to 1.
     lost_inside : float
-        More than this share of it is in other parts.
+        More than this share of it is in other parts; of an upper arm or thigh, `hmc.pose.scalable.shown.JOINED` more.
     found_spread_deg : float
         A missing limb is shown when its angles vary by less than this (in the median) among its scouts, degrees.
     found_occupancy : float

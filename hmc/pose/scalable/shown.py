@@ -25,6 +25,8 @@ LEAST_FREE = 0.2
 INSIDE_M = 0.02
 #: A limb of which more than this share is inside of others lies folded against them.
 FOLDED = 0.3
+#: Share of an upper arm or thigh that is in the trunk anyway, more than of a forearm or shank in others: where they are joined.
+JOINED = 0.3
 
 
 @dataclass(frozen=True)
@@ -153,8 +155,11 @@ def in_doubt(flesh: PlacedFlesh, limb: int, active: np.ndarray, settings: LimbSe
     signs = limb_signs(flesh, tree.limbs[limb].parts, there)
     if signs.occupancy < settings.lost_occupancy:
         return True
-    if tree.parent[limb] < 0 or signs.strict >= settings.lost_strict:
+    if signs.strict >= settings.lost_strict:
         return False
-    held = limb_signs(flesh, tree.limbs[tree.parent[limb]].parts, there)
-    folded = signs.inside > FOLDED or bool(np.isnan(held.occupancy))
-    return signs.inside > settings.lost_inside or (folded and signs.closeness < settings.lost_closeness)
+    parent = tree.parent[limb]
+    if signs.inside > settings.lost_inside + (JOINED if parent < 0 else 0.0):
+        return True
+    if parent < 0 or not signs.closeness < settings.lost_closeness:
+        return False
+    return signs.inside > FOLDED or bool(np.isnan(limb_signs(flesh, tree.limbs[parent].parts, there).occupancy))
