@@ -1,7 +1,7 @@
 """Figure 7.15: DDM-APF against APF behind furniture: hidden limbs are dropped and taken back, the rest is kept.
 
 Source: Canton (2009), section 7.5.2, which shows pictures. Here it is measured, limb by limb (`hmc.experiments.hiding`). The thresholds of
-DDM-APF were found on `counter`; `workbench` has another room, table, person and motion, and nothing was fitted to it.
+DDM-APF were found on `counter` and `workbench`, which has another room, table, person and motion.
 """
 
 from __future__ import annotations
