@@ -225,7 +225,7 @@ def test_occupancy_and_scouts_tell_a_limb_that_is_there_from_one_that_is_not(fil
     there, missing = hull_of(state), hull_of(state, without(*gone))
     parts = settings.tree.limbs[limb].parts
 
-    def looked(target, seed):
+    def looked(target, seed, settings=settings):
         return scout(np.random.default_rng(seed), table, score_maps(target, None), target, state, limb, active, settings)
 
     assert signs(table, state, there, parts, others).occupancy > 0.9
@@ -234,6 +234,9 @@ def test_occupancy_and_scouts_tell_a_limb_that_is_there_from_one_that_is_not(fil
     assert np.median([one.occupancy for one in found]) > settings.found_occupancy
     assert np.median([one.spread_deg for one in found]) < settings.found_spread_deg
     assert sum(one.shown for one in found) >= 2
+    by_strict = replace(settings, found_occupancy=1.0)  # no share is above 1
+    assert sum(looked(there, seed, by_strict).shown for seed in range(4)) >= 2
+    assert not any(looked(there, seed, replace(by_strict, found_strict=1.0)).shown for seed in range(2))
     lost = [looked(missing, seed) for seed in range(4)]
     assert max(one.occupancy for one in lost) < settings.found_occupancy
     assert not any(one.shown for one in lost)
