@@ -15,8 +15,11 @@ from hmc.pose.swarm.fit import FitSettings, Fitted, Prior, bounds_around, fine_t
 from hmc.pose.swarm.heading import facing_evidence, heading_of, spin_towards
 from hmc.pose.swarm.lost_limbs import free_limbs
 from hmc.pose.swarm.model import SkeletonModel
+from hmc.pose.swarm.start import is_upright, pose_near, rest_poses
 
 __all__ = ["SwarmInfo", "SwarmSettings", "SwarmState", "missed", "start_fits", "swarm_step"]
+
+FAR = "the nearest pose is too far from the curves"
 
 
 @dataclass(frozen=True)
@@ -38,8 +41,12 @@ class SwarmSettings:
     doubt_m, doubt_ratio : float
         A start is tried beside the temporal fit when its cost is larger than the first, metres, and than the second times the cost that
         was usual.
+    retry_frames : int
+        A pose whose cost is larger than `doubt_m` is compared with a fresh one as often, whatever is usual.
     margin_m : float
         The start is taken when its cost is smaller by this, metres.
+    margin_share : float
+        And a fresh pose only when its cost is smaller by this share too: of a fat hull every pose costs much, and says little.
     facing_m : float
         By how much facing straight backwards raises an error, metres.
     backwards : float
@@ -48,6 +55,10 @@ class SwarmSettings:
         A curve that is farther than this from every part of the last pose is not taken for one, metres.
     lost_m : float
         A frame whose cost is larger has no fit, metres.
+    rest_weight : float
+        How much a body at rest counts in the first pose (`Prior`).
+    first_facing_m : float
+        By how much facing as the heading says lowers the cost of a first pose, metres.
     last_weight : float
         How much the last pose counts in a new start (`Prior`).
     spin_weight : float
@@ -68,11 +79,15 @@ class SwarmSettings:
     iterations: int = 15
     doubt_m: float = 0.055
     doubt_ratio: float = 1.4
+    retry_frames: int = 5
     margin_m: float = 0.012
+    margin_share: float = 0.15
     facing_m: float = 0.02
     backwards: float = -2.5
     farthest_m: float = 0.25
     lost_m: float = 0.15
+    rest_weight: float = 0.02
+    first_facing_m: float = 0.02
     last_weight: float = 0.02
     spin_weight: float = 0.01
     always_check: bool = False
@@ -93,6 +108,8 @@ class SwarmState:
         Sum of the evidence for the heading since the last start; negative: probably back to front.
     missed : int
         Frames without a fit since the last one.
+    untried : int
+        Frames since a fresh pose was tried.
     """
 
     state: np.ndarray
@@ -100,6 +117,7 @@ class SwarmState:
     usual_m: float
     facing: float = 0.0
     missed: int = 0
+    untried: int = 0
 
 
 @dataclass(frozen=True)
@@ -216,7 +234,11 @@ def swarm_step(
         return missed(state), SwarmInfo(f"no fit: {reading.status}", np.nan, False, False, 0, doubts)
     heading = heading_of(reading.feet, velocity)
     if state is None:
-        found = start_fits(rng, model, reading, heading, settings)[0]
+        first = _first_pose(rng, model, reading, heading, settings)
+        if first is None or (settings.voxels and first.cost_m > settings.lost_m):
+            why = "nobody is upright in the curves or the voxels" if first is None else FAR
+            return None, SwarmInfo(f"no fit: {why}", np.nan, False, False, 0, doubts)
+        found = first
         facing = facing_evidence(found.state, heading)
         return SwarmState(found.state, np.zeros_like(found.state), found.cost_m, facing), _info(found, True, False, 0, doubts)
     frames = 1 + state.missed
@@ -250,15 +272,59 @@ def swarm_step(
             facing = facing_evidence(trial.state, heading)
         elif backwards:
             facing = 0.0
+    untried = state.untried + 1
+    if settings.voxels and not started and cost_m > settings.doubt_m and untried >= settings.retry_frames:
+        # What is wrong costs much in frame after frame, and is what is usual then.
+        trial = _fresh_pose(rng, model, reading, found, replace(prior, weight=settings.last_weight), settings)
+        spent, untried = spent + trial.evaluations, 0
+        if trial.cost_m < found.cost_m - max(settings.margin_m, settings.margin_share * found.cost_m):
+            found, started = trial, True
     if found.cost_m > settings.lost_m:
         read = reading.status == "read"
-        why = "the nearest pose is too far from the curves" if read else reading.status
+        why = FAR if read else reading.status
         error_m = found.error_m if read else np.nan
         return missed(state), SwarmInfo(f"no fit: {why}", error_m, False, False, found.evaluations + spent, doubts, found.cost_m)
     change = np.zeros_like(found.state) if started else (found.state - state.state) / frames
     # Sums of evidence fade, so that a wrong start can be seen after a while.
-    now = SwarmState(found.state, change, 0.9 * state.usual_m + 0.1 * found.cost_m, 0.97 * facing)
+    now = SwarmState(found.state, change, 0.9 * state.usual_m + 0.1 * found.cost_m, 0.97 * facing, 0, untried)
     return now, _info(found, started, turned, spent, doubts)
+
+
+def _first_pose(
+    rng: np.random.Generator, model: SkeletonModel, reading: BodyReading, heading: np.ndarray | None, settings: SwarmSettings
+) -> Fitted | None:
+    """The upright pose that explains a frame best; None where there is none."""
+    trials = start_fits(rng, model, reading, heading, settings)
+    if settings.voxels:
+        rest = rest_poses(rng, model, reading, heading, settings.particles, settings.iterations, settings.fit)
+        likely = Prior(rest_state(model, np.zeros(3), np.array([0.0, 0.0, 1.0])), settings.rest_weight)
+        trials = _led_near(rng, model, reading, [*trials[:2], *rest], likely, settings)
+        if heading is not None:
+            way = heading / np.linalg.norm(heading)
+            trials.sort(key=lambda one: _unlikely(one, likely) - settings.first_facing_m * facing_evidence(one.state, way))
+    return next((one for one in trials if is_upright(one.state)), None)
+
+
+def _fresh_pose(
+    rng: np.random.Generator, model: SkeletonModel, reading: BodyReading, found: Fitted, likely: Prior, settings: SwarmSettings
+) -> Fitted:
+    """The better of a pose with its limbs tried anew, and of a body at rest in its place that is led into the voxels."""
+    rest = rest_poses(rng, model, reading, None, settings.particles, settings.iterations, settings.fit, found.state)
+    trials = _led_near(rng, model, reading, [found, *rest], likely, settings)
+    return replace(trials[0], evaluations=sum(one.evaluations for one in (*trials, *rest)))
+
+
+def _led_near(
+    rng: np.random.Generator, model: SkeletonModel, reading: BodyReading, rough: list[Fitted], likely: Prior, settings: SwarmSettings
+) -> list[Fitted]:
+    """Rough poses made better, the likeliest first."""
+    near = (settings.nodes, settings.farthest_m, settings.fit, likely)
+    return sorted((pose_near(rng, model, reading, one.state, *near) for one in rough), key=lambda one: _unlikely(one, likely))
+
+
+def _unlikely(found: Fitted, likely: Prior) -> float:
+    """What a pose costs, and what it has of angles that are not likely, metres."""
+    return found.cost_m + likely.weight * float(np.abs(found.state[7:] - likely.state[7:]).mean())
 
 
 def missed(state: SwarmState | None) -> SwarmState | None:
