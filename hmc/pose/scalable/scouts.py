@@ -43,6 +43,8 @@ class ScoutReport:
         Share of the limb's free flesh in occupied voxels, at that mean.
     shown : bool
         They agree on a place of which enough is in the hulls, and there the limb would not be in doubt.
+    held_occupancy : float
+        Of the limb on which it hangs, where the scouts have that; NaN where it hangs on none.
     evaluations : int
     """
 
@@ -50,6 +52,7 @@ class ScoutReport:
     spread_deg: float
     occupancy: float
     shown: bool
+    held_occupancy: float
     evaluations: int
 
 
@@ -128,7 +131,9 @@ def scout(
     signs = limb_signs(flesh, own_parts, others)
     enough = signs.occupancy > settings.found_occupancy or signs.strict > settings.found_strict
     shown = spread < settings.found_spread_deg and enough and not in_doubt(flesh, limb, active, settings)
-    return ScoutReport(found, spread, signs.occupancy, shown, info.evaluations + 1)
+    parent = tree.parent[limb]
+    held = limb_signs(flesh, tree.limbs[parent].parts, others).occupancy if parent >= 0 else np.nan
+    return ScoutReport(found, spread, signs.occupancy, shown, held, info.evaluations + 1)
 
 
 def _with(state: np.ndarray, dofs: np.ndarray, angles: np.ndarray) -> np.ndarray:

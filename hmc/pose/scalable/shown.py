@@ -15,7 +15,7 @@ from hmc.pose.scalable.limbs import LimbSettings
 from hmc.pose.scalable.part_distances import part_distances
 from hmc.pose.scalable.restrict import part_mask
 
-__all__ = ["LimbSigns", "PlacedFlesh", "in_doubt", "limb_signs", "place_flesh"]
+__all__ = ["LimbSigns", "PlacedFlesh", "covered", "in_doubt", "limb_signs", "place_flesh"]
 
 #: Flesh nearer than this to another part says nothing of its own part, metres.
 FREE_M = 0.05
@@ -132,6 +132,18 @@ def limb_signs(flesh: PlacedFlesh, parts: Collection[str], others: np.ndarray) -
 
 def _mean(values: np.ndarray) -> float:
     return float(values.mean()) if len(values) else np.nan
+
+
+def covered(flesh: PlacedFlesh, limb: int, active: np.ndarray, settings: LimbSettings) -> bool:
+    """Whether a limb lies in other parts, so that the data says nothing of it; never where `LimbSettings.lost_inside` does not matter.
+
+    Parameters
+    ----------
+    flesh, limb, active, settings
+        As of `in_doubt`.
+    """
+    signs = limb_signs(flesh, settings.tree.limbs[limb].parts, part_mask(settings.tree.model(active).parts))
+    return settings.lost_inside < 1 and bool(np.isnan(signs.occupancy))
 
 
 def in_doubt(flesh: PlacedFlesh, limb: int, active: np.ndarray, settings: LimbSettings) -> bool:

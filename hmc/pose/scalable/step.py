@@ -31,7 +31,7 @@ from hmc.pose.scalable.limbs import LimbMemory, LimbSettings, limb_spread_deg, l
 from hmc.pose.scalable.models import LIMB_OF_DOF, Inclusive
 from hmc.pose.scalable.restrict import ScoreData, SymmetricData, nearest_part, part_mask, restrict_filter, restrict_target
 from hmc.pose.scalable.scouts import limb_dofs, scout
-from hmc.pose.scalable.shown import in_doubt, place_flesh
+from hmc.pose.scalable.shown import covered, in_doubt, place_flesh
 from hmc.pose.scalable.structure import structural_step
 
 __all__ = ["PoseStep", "scalable_step", "step_of", "suited"]
@@ -237,7 +237,7 @@ def _look(
     tree = limbs.tree
     weights = normalise(particles.log_weights)
     evidence = np.zeros(len(tree.limbs), bool)
-    found, evaluations = {}, 0
+    found, freed, evaluations = {}, {}, 0
     flesh = place_flesh(table, estimate, maps, target, [part for limb in tree.limbs for part in limb.parts])
     for k, limb in enumerate(tree.limbs):
         if memory.active[k]:
@@ -249,7 +249,12 @@ def _look(
             report = scout(rng, table, maps, target, estimate, k, memory.active, limbs)
             evaluations += report.evaluations
             found[k], evidence[k] = report.state, report.shown
+            # Without its lower part an upper one that went into the trunk would stay there: nothing asks for it elsewhere.
+            if report.held_occupancy > limbs.found_occupancy and covered(flesh, tree.parent[k], memory.active, limbs):
+                freed[tree.parent[k]] = report.state
     after = look_again(memory, evidence, limbs)
+    for k, state in freed.items():
+        estimate = np.where(np.isin(np.arange(N_DOF), tree.limbs[k].dofs), state, estimate)
     for k in np.flatnonzero(after.active & ~memory.active).tolist():
         estimate = np.where(np.isin(np.arange(N_DOF), limb_dofs(limbs, k)), found[k], estimate)
     return after, estimate, evaluations
