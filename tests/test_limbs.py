@@ -11,6 +11,7 @@ from posed import body_of
 from scipy.ndimage import binary_dilation, binary_fill_holes
 
 from hmc.errors import InputError
+from hmc.landmarks import landmark_index
 from hmc.pose.annealed.apf import make_filter, pose_init, score_maps
 from hmc.pose.annealed.hull_target import make_target
 from hmc.pose.annealed.presets import PRESETS
@@ -314,6 +315,22 @@ def test_scouts_find_a_shank_although_its_thigh_has_gone_astray(filters):
     found = [scout(np.random.default_rng(seed), filt.table, maps, target, astray, limb, active, filt.preset.limbs) for seed in range(5)]
     away = [np.linalg.norm(landmarks(filt.body, one.state) - landmarks(filt.body, state), axis=1).max() for one in found]
     assert np.median(away) < 0.12
+
+
+def test_an_upper_arm_that_went_into_the_trunk_without_its_forearm_is_put_where_the_scouts_have_it(filters):
+    filt, astray = filters["default"], standing()
+    astray[dof_index("l_shoulder_x", "l_shoulder_y", "l_shoulder_z")] = np.radians([29.0, -56.0, -127.0])
+    target, elbow = hull_of(standing()), landmark_index("l_elbow")  # the forearm is shown again, for the first frame
+    memory = replace(LimbMemory.first(filt.preset.limbs), active=np.array([name != "l_forearm" for name in LIMBS]))
+
+    def elbow_off(settings):
+        part = replace(filt, preset=replace(filt.preset, limbs=settings))
+        pose, info = scalable_step(np.random.default_rng(0), part, pose_init(astray, memory=memory.kept()), target)
+        assert info.missing is not None
+        return np.linalg.norm((landmarks(filt.body, pose.state) - landmarks(filt.body, standing()))[elbow])
+
+    settings = filt.preset.limbs
+    assert elbow_off(settings) < 0.1 < elbow_off(replace(settings, lost_inside=1.0))
 
 
 def test_a_hidden_shank_is_dropped_and_taken_back_and_the_rest_stays(filters):
