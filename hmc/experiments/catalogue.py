@@ -151,7 +151,7 @@ CATALOGUE = (
         "fig-7.15", CANTON, "DDM-APF against APF behind a table", "DDM drops the hidden limbs and takes them back; APF loses the track",
         _OWN_VIDEOS,
         "Measured limb by limb, where the thesis has pictures. A limb that is hidden for a few frames only is not dropped, as three frames "
-        "on end must speak against it, and a hidden forearm that is folded into a fat hull may stay.",
+        "on end must speak against it, and now and then a hidden forearm that is folded into a fat hull stays.",
     ),
     Entry("table-8.1", CANTON, "all methods together", "in the order marker-based, SHBM 2, SHBM 1, APF", _HUMANEVA,
         why=_FEW_FRAMES,
@@ -202,9 +202,9 @@ CATALOGUE = (
     Entry(
         "kehl-13", KEHL, "SMD against Levenberg-Marquardt",
         "2.89 cm at 1.3 frames a second against 4.27 cm at .73 with five times the points; LM loses the track with as many", _OWN_VIDEOS,
-        why="Levenberg-Marquardt with equal points does not lose the track here, and the descent is not nearer: both have analytic "
-        "derivatives, the same cues and the same search for lost limbs, and the samples of the chain that moves alone. The trunk of the "
-        "person in this recording is unusually long, which hulls hardly show, so that the fitted legs are too long.",
+        why="Levenberg-Marquardt with equal points loses limbs for some frames rather than the track for good: it has analytic derivatives "
+        "and the same search for lost limbs. With five times the points it is as near as the descent. The descent runs along axes taken "
+        "from the curvature at the start and returns the moving average; the paper's step sizes are set by hand.",
     ),
     Entry("kehl-14", KEHL, "fast motion", "up to 31 degrees between frames, still tracked", _OWN_VIDEOS,
         why="A descent follows and does not search: limbs that move farther than their own thickness between two frames are lost for "
