@@ -494,6 +494,16 @@ def test_other_poses_are_not_da_vincis(tracker):
     assert find_da_vinci(placed(tracker, state), 0.02, 0.0) is None
 
 
+def test_without_voxels_at_the_soles_nobody_is_da_vinci(tracker):
+    """The feet tell which way he faces."""
+    state = neutral_state("sideways")
+    state[dof_index("r_hip_x", "l_hip_x")] = np.radians([-14, 14])
+    state[2] = -placed(tracker, state)[:, 2].min()
+    points = placed(tracker, state)
+    assert find_da_vinci(points, 0.02, 0.0) is not None
+    assert find_da_vinci(points[points[:, 2] > 0.1], 0.02, 0.0) is None
+
+
 def test_unknown_preset():
     with pytest.raises(InputError, match="kehl2006"):
         smd_preset("canton2009")

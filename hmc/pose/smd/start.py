@@ -70,9 +70,10 @@ def find_da_vinci(points: np.ndarray, voxel_size_m: float, floor_z: float, heigh
     spread = high[:, :2] - high[:, :2].mean(axis=0)
     across = np.linalg.svd(spread, full_matrices=False)[2][0]
     feet = _two_feet(between(_SHANK), across)
-    if feet is None or np.linalg.norm(feet[0] - feet[1]) < _LEAST_STEP * stature:
+    soles = between(_SOLE)
+    if feet is None or np.linalg.norm(feet[0] - feet[1]) < _LEAST_STEP * stature or not len(soles):
         return None
-    toes = between(_SOLE)[:, :2].mean(axis=0) - between(_SHANK)[:, :2].mean(axis=0)
+    toes = soles[:, :2].mean(axis=0) - between(_SHANK)[:, :2].mean(axis=0)
     forward = np.array([-across[1], across[0]])
     if forward @ toes < 0:
         forward = -forward
