@@ -210,6 +210,8 @@ def test_thresholds_without_hysteresis_are_refused():
         LimbSettings(lost_occupancy=0.8)
     with pytest.raises(InputError, match="`lost_frames`"):
         LimbSettings(lost_frames=0)
+    with pytest.raises(InputError, match="`lost_inside` must lie in 0 to 1"):
+        LimbSettings(lost_inside=2.0)
 
 
 @pytest.mark.parametrize("name", ["r_shank", "l_forearm", "l_thigh"])

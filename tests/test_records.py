@@ -59,11 +59,11 @@ def kept(journal: Path, person: int, frame: int) -> np.ndarray:
 
 def test_particles_of_the_last_record_outlive_the_next_ones_until_those_are_recorded(tmp_path):
     journal = tmp_path / "journal"
-    before = None
+    before = -1
     for frame in (3, 4, 6, 7):
         keep_particles(journal, 2, frame, before, particles(frame))
         for number in (frame, before):
-            if number is not None:
+            if number >= 0:
                 assert_array_equal(kept(journal, 2, number), number)
         before = frame
     # The run died after the particles of frame 9, before its record, and goes on after frame 7.
@@ -77,9 +77,9 @@ def test_particles_of_the_last_record_outlive_the_next_ones_until_those_are_reco
 
 def test_particles_of_an_earlier_run_are_not_taken_for_this_one_s(tmp_path):
     journal = tmp_path / "journal"
-    keep_particles(journal, 0, 3, None, particles(-3))
+    keep_particles(journal, 0, 3, -1, particles(-3))
     keep_particles(journal, 0, 4, 3, particles(-4))
-    before = None
+    before = -1
     for frame in (3, 4, 5):  # begun anew
         keep_particles(journal, 0, frame, before, particles(frame))
         assert_array_equal(kept(journal, 0, frame), frame)

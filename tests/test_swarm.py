@@ -436,3 +436,5 @@ def test_who_is_followed_badly_is_found_anew():
         gaps[info.started] = info.cost_m
         assert after.untried == (1 if untried == 0 else 0)
     assert gaps[True] < 0.85 * gaps[False]
+    after, info = swarm_step(np.random.default_rng(0), MODEL, replace(before, untried=1), reading, 30.0, None, replace(slow, lost_m=0.001))
+    assert info.status.startswith("no fit") and after.untried == 2  # lost, the turn comes too

@@ -159,4 +159,4 @@ def _draw(rows: Sequence[dict[str, Any]]) -> plt.Figure:
     return figure
 
 
-EXPERIMENT = Experiment("all-methods", "all pose methods side by side", "ours; README.md", grid, cell, report)
+EXPERIMENT = Experiment("all-methods", "all pose methods side by side", "ours; README.md", grid, cell, report, version=2)

@@ -109,14 +109,14 @@ def from_record(
     )
 
 
-def keep_particles(journal: str | Path, person: int, frame: int, before: int | None, pose: PoseState) -> None:
+def keep_particles(journal: str | Path, person: int, frame: int, before: int, pose: PoseState) -> None:
     """Keep a person's particles and the filter's memory beside the journal, to be called before the frame's record is added.
 
     There are two files a person, and that of the frame `before`, which the last record is of, is left alone: it is needed should
     the run stop between the two writes.
     """
     first, second = _particle_files(journal, person)
-    with atomic_write(second if before is not None and _frame_of(first) == before else first, "wb") as out:
+    with atomic_write(second if _frame_of(first) == before else first, "wb") as out:
         arrays: dict[str, Any] = {f"{_MEMORY}{name}": values for name, values in pose.memory.items()}
         np.savez(out, frame=frame, particles=pose.particles.particles, log_weights=pose.particles.log_weights, **arrays)
 

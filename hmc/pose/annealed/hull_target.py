@@ -177,7 +177,7 @@ def sample_points(rng: np.random.Generator, points: np.ndarray, n: int) -> np.nd
 
 
 def distance_at(target: HullTarget, points: np.ndarray) -> np.ndarray:
-    """Distance of points to the tolerant hull, metres; 0 inside. Beyond the crop the distance to its border is added.
+    """`HullTarget.distance` at points, metres; 0 in the strict hull alone. Beyond the crop the distance to its border is added.
 
     Parameters
     ----------

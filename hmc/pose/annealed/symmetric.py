@@ -359,8 +359,8 @@ def symmetric_cost_by_part(
 def _terms(body, points, states, target, hull_points, settings) -> tuple[np.ndarray, ...]:
     """What the cost is made of.
 
-    Metres, each of shape (., n): distances of body from hulls, of silhouettes from the body (of places that some cone is near, given next),
-    depths. Square metres: the cost of hanging in the air, shape (n,), and of each angle, shape (n, 27).
+    Metres, each of shape (., n): distances of body from hulls; of silhouettes from the body, of places that are not in it in every
+    state, and which these are; depths. Square metres: the cost of hanging in the air, shape (n,), and of each angle, shape (n, 27).
     """
     cap = np.float32(settings.cap_m)
     places, directions = places_and_directions(hull_points)

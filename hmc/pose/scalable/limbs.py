@@ -72,6 +72,9 @@ class LimbSettings:
                 "`lost_occupancy` must be at most `found_occupancy`, both from 0 to 1, or limbs come and go; got "
                 f"{self.lost_occupancy} and {self.found_occupancy}"
             )
+        for name in ("lost_strict", "lost_closeness", "lost_inside", "found_strict"):
+            if not 0 <= getattr(self, name) <= 1:
+                raise InputError(f"`{name}` must lie in 0 to 1; got {getattr(self, name)}")
         for name, least in (("lost_spread_deg", 0), ("found_spread_deg", 0), ("lost_frames", 1), ("found_frames", 1)):
             if not getattr(self, name) >= least:
                 raise InputError(f"`{name}` must be at least {least}; got {getattr(self, name)}")

@@ -171,9 +171,9 @@ class SymmetricData:
         """Of the kept parts, at every so many-th point of the body's surface; `filt` is the whole body's. Whole, or a column a limb."""
         one, target, settings = restrict_filter(filt, keep), restrict_target(self.target, keep), filt.preset.symmetric
         samples = one.samples if every == 1 else thinned(one.samples, max(1, len(one.samples.surface.points) // every))
-        points = self.points[keep[self.part]]
-        points = points if len(points) else self.points[:1]
-        part = self.part[keep[self.part]] if keep[self.part].any() else self.part[:1]
+        rows = np.flatnonzero(keep[self.part])
+        rows = rows if len(rows) else np.arange(1)
+        points, part = self.points[rows], self.part[rows]
         if by_limb:
             return lambda states: -symmetric_cost_by_part(one.body, samples, states, target, points, part, settings) @ _LIMBS
         return lambda states: -symmetric_cost(one.body, samples, states, target, points, settings)

@@ -105,16 +105,16 @@ def scalable_step(rng: np.random.Generator, filt: PoseFilter, state: PoseState, 
         if not there.parts[part_mask(_LIMB_PARTS)].any():
             part = replace(part, preset=replace(preset, search=None))
         estimate, cost, searched, more = polish(rng, part, [found.best, state.state], state.state, seen)
-    estimate = np.where(there.dofs, estimate, state.state)
+    estimate = tracked = np.where(there.dofs, estimate, state.state)
     kept = {} if preset.refine is not None else _kept(found.lower)
     particles = found.particles
     if limbs is not None and memory is not None and filt.table is not None and maps is not None:
-        tracked = estimate
         memory, estimate, looked = _look(rng, filt.table, maps, target, tracked, particles, memory, limbs)
         particles = replace(particles, particles=np.where(estimate != tracked, estimate, particles.particles))
         there, more = _there(limbs, memory), more + looked
         kept |= memory.kept()
-    pose = PoseState(estimate, np.where(there.dofs, estimate - state.state, 0.0), particles, kept)
+    # A limb that was put elsewhere has not moved there.
+    pose = PoseState(estimate, np.where(there.dofs & (estimate == tracked), estimate - state.state, 0.0), particles, kept)
     missing = None if there.dofs.all() else ~there.dofs
     return pose, PoseInfo(cost, tuple(searched), found.evaluations + more, None, "fitted", missing, found.levels)
 
@@ -250,7 +250,11 @@ def _look(
             evaluations += report.evaluations
             found[k], evidence[k] = report.state, report.shown
             # Without its lower part an upper one that went into the trunk would stay there: nothing asks for it elsewhere.
-            if report.held_occupancy > limbs.found_occupancy and covered(flesh, tree.parent[k], memory.active, limbs):
+            if (
+                report.spread_deg < limbs.found_spread_deg
+                and report.held_occupancy > limbs.found_occupancy
+                and covered(flesh, tree.parent[k], memory.active, limbs)
+            ):
                 freed[tree.parent[k]] = report.state
     after = look_again(memory, evidence, limbs)
     for k, state in freed.items():

@@ -321,15 +321,14 @@ def structural_step(
 
 def _weighed(rng, state, log_likelihood, drift, n, survival_rate) -> tuple[ParticleState, LayerInfo, np.ndarray | None]:
     """One layer, and each limb's share of the likelihood if that is told."""
-    shares = None
+    shares: list[np.ndarray] = []
 
     def total(states: np.ndarray) -> np.ndarray:
-        nonlocal shares
         values = np.asarray(log_likelihood(states), float)
         if values.ndim == 1:
             return values
-        shares = values
-        return shares.sum(axis=1)
+        shares.append(values)
+        return values.sum(axis=1)
 
     state, info = filter_layer(rng, state, total, drift, n, survival_rate)
-    return state, info, shares
+    return state, info, shares[0] if shares else None

@@ -94,7 +94,7 @@ class SmdState:
     axes, inverse : ndarray, shape (n, n)
         Columns: what a step of one along each axis changes in the parameters; and the inverse of that.
     history : tuple of ndarray
-        The last parameters, `SmdSettings.average` of them at most, the newest last.
+        The last parameters, `SmdSettings.average` and one more of them at most, the newest last.
     """
 
     parameters: np.ndarray
@@ -259,7 +259,8 @@ def smd_run(
     end = path[-1].copy()
     for group, count in zip(groups, counts, strict=True):
         last = path[1 : count + 1][-settings.average if settings.averaged else -1 :]
-        end[group] = np.mean([one[group] for one in last], axis=0)
+        if last:
+            end[group] = np.mean([one[group] for one in last], axis=0)
     return end, SmdInfo(counts, np.array(values), np.array(path))
 
 

@@ -105,7 +105,7 @@ class TrackInfo:
     status : str
         "fitted", or why not.
     value : float
-        The objective at the end, on the last samples.
+        The objective at the last iteration's parameters and samples.
     iterations : ndarray of int, shape (6,)
         Of the full pose and of each chain.
     views : ndarray of int
@@ -262,7 +262,7 @@ def optimise(
     parameters : ndarray, shape (24,)
     iterations : ndarray of int, one a group
     value : float
-        Of the objective at the end, on the last samples.
+        Of the objective at the last iteration's parameters and samples.
     """
     preset, limits = scene.tracker.preset, scene.tracker.body.skeleton.limits
     low, high = limits.low[FREE], limits.high[FREE]

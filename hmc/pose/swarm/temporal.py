@@ -131,7 +131,7 @@ class SwarmInfo:
     error_m : float
         Mean distance of corresponding nodes, metres; NaN without a fit.
     started : bool
-        Whether the pose was found without the last one.
+        Whether the pose is a new start, or one found anew in the last one's place, and not the followed one.
     turned : bool
         Whether the skeleton was turned about, because it had faced backwards.
     evaluations : int
@@ -283,7 +283,9 @@ def swarm_step(
         read = reading.status == "read"
         why = FAR if read else reading.status
         error_m = found.error_m if read else np.nan
-        return missed(state), SwarmInfo(f"no fit: {why}", error_m, False, False, found.evaluations + spent, doubts, found.cost_m)
+        return missed(replace(state, untried=untried)), SwarmInfo(
+            f"no fit: {why}", error_m, False, False, found.evaluations + spent, doubts, found.cost_m
+        )
     change = np.zeros_like(found.state) if started else (found.state - state.state) / frames
     # Sums of evidence fade, so that a wrong start can be seen after a while.
     now = SwarmState(found.state, change, 0.9 * state.usual_m + 0.1 * found.cost_m, 0.97 * facing, 0, untried)
