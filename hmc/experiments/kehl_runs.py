@@ -27,6 +27,8 @@ from hmc.pose.annealed.rays import with_rays
 from hmc.pose.body.kinematics import landmarks
 from hmc.pose.smd.begin import FirstPose, begin
 from hmc.pose.smd.cues import Observed
+from hmc.pose.smd.descent import SmdSettings
+from hmc.pose.smd.levenberg import LmSettings
 from hmc.pose.smd.observe import observe_voxels
 from hmc.pose.smd.presets import smd_preset
 from hmc.pose.smd.sequence import WINDOW_S
@@ -40,6 +42,8 @@ __all__ = ["FAMILY", "VARIANTS", "cell", "cell_grid", "errors_mm", "observations
 FAMILY = "kehl"
 VOXEL_M = 0.03
 _SURFACE = {"edge_weight": 0.0, "colors": None}
+#: The descent along the parameters themselves, with the settings found best for that.
+ALONG_PARAMETERS = SmdSettings(first_step=0.5, meta_step=3e-4, iterations=25, by_curvature=False, averaged=False)
 #: Variants by name: what differs from the default preset, in the cues and elsewhere.
 VARIANTS: dict[str, tuple[dict, dict]] = {
     "SMD": ({}, {}),
@@ -47,6 +51,8 @@ VARIANTS: dict[str, tuple[dict, dict]] = {
     "deterministic": ({}, {"optimiser": "deterministic"}),
     "LM": ({}, {"optimiser": "lm"}),
     "LM, 5 times the points": ({}, {"optimiser": "lm", "times": 5}),
+    "LM that stops early": ({}, {"optimiser": "lm", "levenberg": LmSettings(tolerance=1e-2)}),
+    "SMD along the parameters": ({}, {"descent": ALONG_PARAMETERS, "tolerance_m": 0.005, "tolerance_deg": 0.5}),
     "surface": (_SURFACE, {}),
     "surface, edges": ({"colors": None}, {}),
     "surface, colour": ({"edge_weight": 0.0}, {}),

@@ -19,11 +19,10 @@ from hmc.pose.annealed.penetration import AxisPoints, axis_points, depths_placed
 from hmc.pose.annealed.placing import place_segments
 from hmc.pose.annealed.rays import places_and_directions, slide_to_axis
 from hmc.pose.body.flesh import SurfaceSamples, surface_samples
-from hmc.pose.body.joints import DOF_NAMES, SEGMENTS
-from hmc.pose.body.model import PARTS, BodyModel, Cones
+from hmc.pose.body.joints import DOF_NAMES
+from hmc.pose.body.model import PART_OF_DOF, PART_OF_SEGMENT, PARTS, BodyModel, Cones
 
 __all__ = [
-    "PART_OF_SEGMENT",
     "POSTURE",
     "BodyPoints",
     "SymmetricSettings",
@@ -42,9 +41,6 @@ __all__ = [
 MOST_CAP_M = 0.2
 #: Elements (pairs of a cone and a point x states) worked on at a time: what stays in the second-level cache.
 CHUNK = 16384
-#: The part that each segment carries, shape (n_segments,); the pelvis is of the torso.
-PART_OF_SEGMENT = np.array([PARTS.index(segment.name) if segment.name in PARTS else 0 for segment in SEGMENTS])
-_PART_OF_DOF = np.repeat(PART_OF_SEGMENT, [len(segment.axes) + 3 * (segment.parent < 0) for segment in SEGMENTS])
 
 # Angles at rest and how far people commonly go from there, degrees; what is not named rests at 0.
 _REST_DEG = {"r_shoulder_x": 75, "l_shoulder_x": -75, "r_elbow_z": 25, "l_elbow_z": -25, "torso_y": 5, "r_knee_y": 8, "l_knee_y": 8}
@@ -345,7 +341,7 @@ def symmetric_cost_by_part(
     """
     outside, unexplained, asking, depth, gap, posture = _terms(body, points, states, target, hull_points, settings)
     columns = np.eye(len(PARTS), dtype=outside.dtype)
-    cost = posture @ columns[_PART_OF_DOF]
+    cost = posture @ columns[PART_OF_DOF]
     for values, part, weight in (
         (outside, points.surface.part, 1 / len(outside)),
         (unexplained, hull_part[asking], settings.explain_weight / len(hull_points)),

@@ -7,9 +7,9 @@ from functools import cached_property
 
 import numpy as np
 
-from hmc.pose.body.joints import N_DOF, JointLimits, default_limits, dof_index
+from hmc.pose.body.joints import N_DOF, SEGMENTS, JointLimits, default_limits, dof_index
 
-__all__ = ["PARTS", "BodyModel", "Cones", "neutral_state"]
+__all__ = ["PARTS", "PART_OF_DOF", "PART_OF_SEGMENT", "BodyModel", "Cones", "neutral_state"]
 
 #: Fleshed parts (Canton's torso and the links of its five limbs), in the order of every per-part result.
 PARTS: tuple[str, ...] = (
@@ -17,6 +17,10 @@ PARTS: tuple[str, ...] = (
     "r_upper_arm", "r_forearm", "l_upper_arm", "l_forearm",
     "r_thigh", "r_shank", "l_thigh", "l_shank",
 )  # fmt: skip
+#: The part that each segment carries, shape (n_segments,); the pelvis is of the torso.
+PART_OF_SEGMENT = np.array([PARTS.index(segment.name) if segment.name in PARTS else 0 for segment in SEGMENTS])
+#: The part that each degree of freedom moves first, shape (27,). The root has three translations beside its angles.
+PART_OF_DOF = np.repeat(PART_OF_SEGMENT, [len(segment.axes) + 3 * (segment.parent < 0) for segment in SEGMENTS])
 
 
 @dataclass(frozen=True)

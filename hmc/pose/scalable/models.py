@@ -16,25 +16,14 @@ import numpy as np
 
 from hmc.errors import InputError
 from hmc.pose.body.joints import DOF_NAMES, dof_index
-from hmc.pose.body.model import PARTS
+from hmc.pose.body.model import PART_OF_DOF, PARTS
 
 __all__ = ["LIMB_OF_DOF", "LIMB_OF_PART", "MODEL_1", "MODEL_2", "UNITIVE", "UNITIVE_PIECES", "Inclusive", "Model", "Union", "Unitive"]
 
-#: Beginnings of the names of what belongs to a limb; all else is the trunk's.
-_LIMBS = tuple(
-    tuple(f"{side}_{name}" for name in names)
-    for names in (("shoulder", "elbow", "upper_arm", "forearm"), ("hip", "knee", "thigh", "shank"))
-    for side in "rl"
-)
-
-
-def _limb_of(names: Sequence[str]) -> np.ndarray:
-    return np.array([next((k for k, limb in enumerate(_LIMBS, 1) if name.startswith(limb)), 0) for name in names])
-
-
-#: The limb of each degree of freedom, shape (27,), and of each part, shape (n_parts,): 0 the trunk with the head, then right and left arm,
-#: right and left leg.
-LIMB_OF_DOF, LIMB_OF_PART = _limb_of(DOF_NAMES), _limb_of(PARTS)
+#: The limb of each part, in the order of `PARTS`: 0 the trunk with the head, then right and left arm, right and left leg.
+LIMB_OF_PART = np.array([0, 0, 1, 1, 2, 2, 3, 3, 4, 4])
+#: The same of each degree of freedom, shape (27,).
+LIMB_OF_DOF = LIMB_OF_PART[PART_OF_DOF]
 
 
 @dataclass(frozen=True)

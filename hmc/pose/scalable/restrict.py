@@ -22,9 +22,9 @@ from hmc.pose.annealed.scores import (
     log_likelihood_global,
     scores,
 )
-from hmc.pose.annealed.symmetric import PART_OF_SEGMENT, BodyPoints, symmetric_cost, symmetric_cost_by_part, thinned
+from hmc.pose.annealed.symmetric import BodyPoints, symmetric_cost, symmetric_cost_by_part, thinned
 from hmc.pose.body.flesh import SurfaceSamples
-from hmc.pose.body.model import PARTS, BodyModel, Cones
+from hmc.pose.body.model import PART_OF_SEGMENT, PARTS, BodyModel, Cones
 from hmc.pose.scalable.models import LIMB_OF_PART
 from hmc.pose.scalable.part_distances import part_distances
 
