@@ -12,18 +12,18 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 from _timing import interleaved, report
 
+from hmc.body.kinematics import landmarks
+from hmc.body.marker_places import place_tips
+from hmc.body.model import neutral_state
+from hmc.body.proportions import default_body
 from hmc.camera.model import Rig, look_at, project
-from hmc.montecarlo import truncated_normal
-from hmc.pose.annealed.apf import pose_init
-from hmc.pose.annealed.presets import drift
-from hmc.pose.body.kinematics import landmarks
-from hmc.pose.body.model import neutral_state
-from hmc.pose.body.proportions import default_body
-from hmc.pose.markers.body import place_tips
-from hmc.pose.markers.filter import make_marker_filter, marker_preset, marker_step
-from hmc.pose.markers.likelihood import marker_cost, marker_views, observe_markers, project_markers
-from hmc.pose.markers.nearest import nearest_detections
-from hmc.pose.markers.synthetic import SyntheticDetector, detect_synthetic, seen_by_ideal_detector
+from hmc.pose.objectives.epipolar import marker_cost, marker_views, observe_markers, project_markers
+from hmc.pose.objectives.nearest_detections import nearest_detections
+from hmc.pose.steps.annealed import pose_init
+from hmc.pose.steps.marker_filter import make_marker_filter, marker_preset, marker_step
+from hmc.pose.steps.preset import drift
+from hmc.search import truncated_normal
+from hmc.synthetic.marker_detector import SyntheticDetector, detect_synthetic, seen_by_ideal_detector
 
 VIEWS, PARTICLES = 7, 700
 

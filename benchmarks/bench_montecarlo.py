@@ -13,10 +13,10 @@ import numpy as np
 from _timing import interleaved, report
 from scipy import stats
 
-from hmc.montecarlo import find_beta, systematic, truncated_normal
-from hmc.pose.annealed.presets import drift
-from hmc.pose.body.model import neutral_state
-from hmc.pose.body.proportions import default_body
+from hmc.body.model import neutral_state
+from hmc.body.proportions import default_body
+from hmc.pose.steps.preset import drift
+from hmc.search import find_beta, systematic, truncated_normal
 
 
 def loop(rng, weights, n):

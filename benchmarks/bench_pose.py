@@ -20,19 +20,19 @@ from _scene import ROOM, ring_rig
 from _timing import interleaved, report
 from scipy import ndimage
 
+from hmc.body.flesh import flesh_points, place_points
+from hmc.body.joints import dof_index
+from hmc.body.kinematics import segment_transforms
+from hmc.body.model import BodyModel, neutral_state
+from hmc.body.proportions import default_body
 from hmc.camera.model import project
-from hmc.montecarlo.filters import AnnealedSettings
-from hmc.pose.annealed.apf import PoseFilter, make_filter, pose_init, pose_step
-from hmc.pose.annealed.hull_target import FAR_M, HullTarget, make_target
-from hmc.pose.annealed.near_distance import near_distance
-from hmc.pose.annealed.presets import PRESETS
-from hmc.pose.annealed.rays import with_rays
-from hmc.pose.body.flesh import flesh_points, place_points
-from hmc.pose.body.joints import dof_index
-from hmc.pose.body.kinematics import segment_transforms
-from hmc.pose.body.model import BodyModel, neutral_state
-from hmc.pose.body.proportions import default_body
 from hmc.pose.legs import leg_choice
+from hmc.pose.steps.annealed import PoseFilter, make_filter, pose_init, pose_step
+from hmc.pose.steps.preset import PRESETS
+from hmc.pose.views.hull_target import FAR_M, HullTarget, make_target
+from hmc.pose.views.near_distance import near_distance
+from hmc.pose.views.rays import with_rays
+from hmc.search.filters import AnnealedSettings
 from hmc.voxels.grid import VoxelGrid
 
 FPS, FRAMES = 30.0, 10

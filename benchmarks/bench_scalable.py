@@ -18,17 +18,17 @@ from _scene import ROOM
 from _timing import report
 from bench_pose import FPS, target_of, walk
 
-from hmc.montecarlo.filters import AnnealedSettings
-from hmc.pose.annealed.apf import make_filter, pose_init
-from hmc.pose.annealed.hull_target import make_target
-from hmc.pose.annealed.presets import PRESETS, PosePreset
-from hmc.pose.body.flesh import flesh_points, place_points
-from hmc.pose.body.joints import N_DOF
-from hmc.pose.body.kinematics import landmarks, segment_transforms
-from hmc.pose.body.proportions import default_body
-from hmc.pose.scalable.methods import method_preset
-from hmc.pose.scalable.restrict import part_mask
-from hmc.pose.scalable.step import step_of
+from hmc.body.flesh import flesh_points, place_points
+from hmc.body.joints import N_DOF
+from hmc.body.kinematics import landmarks, segment_transforms
+from hmc.body.proportions import default_body
+from hmc.pose.methods.scalable import method_preset
+from hmc.pose.objectives.restrict import part_mask
+from hmc.pose.steps.annealed import make_filter, pose_init
+from hmc.pose.steps.preset import PRESETS, PosePreset
+from hmc.pose.steps.scalable import step_of
+from hmc.pose.views.hull_target import make_target
+from hmc.search.filters import AnnealedSettings
 from hmc.voxels.grid import VoxelGrid
 
 #: The thesis's particles: all models of SHBM-APF together, in 2 layers each; APF in 6 layers.

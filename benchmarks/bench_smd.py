@@ -16,15 +16,15 @@ import numpy as np
 from _scene import ring_rig
 from _timing import interleaved, report
 
+from hmc.body.joints import dof_index
+from hmc.body.model import neutral_state
+from hmc.body.proportions import default_body
 from hmc.camera.model import project
-from hmc.pose.body.joints import dof_index
-from hmc.pose.body.model import neutral_state
-from hmc.pose.body.proportions import default_body
-from hmc.pose.smd.observe import observe_voxels
-from hmc.pose.smd.presets import smd_preset
-from hmc.pose.smd.rows import pose_body
-from hmc.pose.smd.surface_cue import place
-from hmc.pose.smd.tracker import make_tracker, track_init, track_step
+from hmc.pose.methods.smd import smd_preset
+from hmc.pose.objectives.cue_rows import pose_body
+from hmc.pose.objectives.surface_cue import place
+from hmc.pose.steps.descent.tracker import make_tracker, track_init, track_step
+from hmc.pose.views.skin import observe_voxels
 from hmc.voxels.carving import carve, make_tables
 from hmc.voxels.grid import VoxelGrid
 

@@ -16,12 +16,12 @@ from _scene import ROOM, people, ring_rig, silhouette
 from _timing import interleaved, report
 from sklearn.manifold import spectral_embedding
 
+from hmc.body.spin_skeleton import model_of_height
 from hmc.pose.spectral.eigenmap import eigenmap
 from hmc.pose.spectral.graph import adjacency, build_graph
 from hmc.pose.spectral.reading import read_body
-from hmc.pose.swarm.model import model_of_height
-from hmc.pose.swarm.pso import PsoSettings, pso_run
-from hmc.pose.swarm.temporal import swarm_step
+from hmc.pose.steps.swarm.temporal import swarm_step
+from hmc.search.swarm import PsoSettings, pso_run
 from hmc.voxels.carving import carve, make_tables
 from hmc.voxels.components import components
 from hmc.voxels.grid import VoxelGrid

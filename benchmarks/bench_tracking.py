@@ -126,7 +126,7 @@ def particle_filter(rng: np.random.Generator) -> list[bool]:
 def whole_chain(rng: np.random.Generator) -> list[bool]:
     """Five cameras, three people, voxels of 4 cm, from images to tracks: each stage's share, and frames a second on one processor.
 
-    Stages are those of `hmc.frontend.stream_hulls` and `hmc.tracking.resumable.track_recording`, without reading the files. The background
+    Stages are those of `stream_hulls` and `hmc.tracking.resumable.track_recording`, without reading the files. The background
     learns as often as it does in a recording. Frames a second are by processor time, so that other work hardly disturbs them: what two
     processors reach is more.
     """

@@ -6,8 +6,8 @@ from functools import cache
 import numpy as np
 
 from hmc.camera.model import Rig, look_at, project
-from hmc.pose.annealed.hull_target import HullTarget, make_target
-from hmc.pose.annealed.rays import with_rays
+from hmc.pose.views.hull_target import HullTarget, make_target
+from hmc.pose.views.rays import with_rays
 from hmc.synthetic import actions, gait
 from hmc.synthetic.actor import make_actor, pose_mesh
 from hmc.synthetic.motions import place

@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 import pytest
 
-from hmc.camera.calibration import write_calibration
 from hmc.camera.model import Rig, look_at
+from hmc.io.calibration import write_calibration
 
 
 @pytest.fixture(scope="session")

@@ -5,8 +5,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from hmc.camera.calibration import write_calibration
 from hmc.camera.model import Camera, Rig, project
+from hmc.io.calibration import write_calibration
 
 RADIUS_M, HEIGHT_M = 0.24, 1.75
 

@@ -6,12 +6,12 @@ from functools import cache
 import numpy as np
 from acted import Act
 
-from hmc.pose.annealed.symmetric import BodyPoints, SymmetricSettings, body_points
-from hmc.pose.body.flesh import surface_coordinates
-from hmc.pose.body.inverse import fit_landmarks
-from hmc.pose.body.joints import N_DOF, dof_index
-from hmc.pose.body.model import BodyModel, neutral_state
-from hmc.pose.body.proportions import default_body
+from hmc.body.flesh import surface_coordinates
+from hmc.body.inverse import fit_landmarks
+from hmc.body.joints import N_DOF, dof_index
+from hmc.body.model import BodyModel, neutral_state
+from hmc.body.proportions import default_body
+from hmc.pose.objectives.symmetric import BodyPoints, SymmetricSettings, body_points
 
 #: Weights of the tests' own, so that tuning the presets does not move what is claimed here.
 COST = SymmetricSettings(cap_m=0.2, explain_weight=1.0, overlap_weight=2.0, posture_weight=3e-6)

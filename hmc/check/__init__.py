@@ -1,7 +1,7 @@
 """What is wrong with a recording, told before a run: every finding, and one picture of the rig.
 
 `findings` looks each part over, `silhouettes` compares silhouettes with calibration, room and floor by the hulls of `hull`;
-`hmc.rig_picture` draws the rig and its views.
+`hmc.camera.rig_picture` draws the rig and its views.
 """
 
 from hmc.check.findings import Finding, Inspection, check_recording, inspect_recording

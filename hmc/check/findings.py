@@ -1,6 +1,6 @@
 """What is wrong with a recording: everything that can be found, not only the first thing.
 
-`hmc.recording.open_recording` stops at the first fault that makes a recording useless; here each part is looked at by itself, and what is
+`hmc.io.recording.open_recording` stops at the first fault that makes a recording useless; here each part is looked at alone, and what is
 merely odd is told too.
 """
 
@@ -13,14 +13,14 @@ from pathlib import Path
 
 import numpy as np
 
-from hmc.camera.calibration import CalibrationEntry, build_camera, read_entries
 from hmc.camera.coverage import estimate_room, in_view
 from hmc.camera.model import Camera, Rig, undistort
 from hmc.check.silhouettes import hull_findings, probe_masks
 from hmc.errors import InputError
-from hmc.footage import IMAGE_SUFFIXES, VIDEO_SUFFIXES, Footage, read_footage
-from hmc.recording import Frame, Recording, find_views, gaps, iterate_frames, open_recording, wrong_sizes, wrong_units
-from hmc.settings import read_settings
+from hmc.io.calibration import CalibrationEntry, build_camera, read_entries
+from hmc.io.footage import IMAGE_SUFFIXES, VIDEO_SUFFIXES, Footage, read_footage
+from hmc.io.recording import Frame, Recording, find_views, gaps, iterate_frames, open_recording, wrong_sizes, wrong_units
+from hmc.io.settings import read_settings
 
 __all__ = ["Finding", "Inspection", "check_recording", "inspect_recording"]
 

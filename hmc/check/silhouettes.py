@@ -13,7 +13,7 @@ from hmc.camera.coverage import inside_image
 from hmc.camera.model import Camera, Rig, project
 from hmc.camera.segmentation import BackgroundModel, segment, train_background
 from hmc.check.hull import Hull, best_move, beyond_room, fine_hull, floor_height, misfit, odd_camera
-from hmc.recording import Frame, Recording, background_frames
+from hmc.io.recording import Frame, Recording, background_frames
 
 __all__ = ["disagreements", "hull_findings", "probe_masks", "silhouette_agreement"]
 

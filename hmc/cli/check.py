@@ -33,7 +33,7 @@ def run(args: argparse.Namespace) -> int:
         print(finding)
     name = args.recording.resolve().name
     if inspection.rig is not None and inspection.room is not None:
-        from hmc.rig_picture import save_rig_picture
+        from hmc.camera.rig_picture import save_rig_picture
 
         out = args.out or Path(f"{name}_check.png")
         save_rig_picture(out, inspection.rig, inspection.room, inspection.images, name)

@@ -36,7 +36,7 @@ def add_selection_options(parser: argparse.ArgumentParser) -> None:
 
 def open_selected(args: argparse.Namespace):
     """Open the recording that `add_selection_options` describes."""
-    from hmc.recording import open_recording
+    from hmc.io.recording import open_recording
 
     return open_recording(args.recording, cameras=args.cameras, start=args.start, frames=args.frames)
 
@@ -104,8 +104,8 @@ def was_finished(written: Sequence[Path], run_path: Path, depends_on: Mapping[st
     depends_on : mapping
         Method, seed, recording and parameters.
     """
-    from hmc.files import to_toml
-    from hmc.results import read_run
+    from hmc.io.files import to_toml
+    from hmc.io.results import read_run
 
     if not all(path.exists() for path in (*written, run_path)):
         return False

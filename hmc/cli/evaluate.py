@@ -11,7 +11,7 @@ from typing import Literal
 
 from hmc.cli.common import whole_number
 from hmc.errors import InputError
-from hmc.files import atomic_write, write_toml
+from hmc.io.files import atomic_write, write_toml
 
 __all__ = ["add_parser", "run"]
 
@@ -62,10 +62,10 @@ def _threshold(text: str) -> float | str:
 
 def run(args: argparse.Namespace) -> int:
     """Score, print, write."""
-    from hmc.evaluation import PoseEvaluation, angle_rows, evaluate_pose, evaluate_tracks, pelvis_tracks
-    from hmc.evaluation.poses import THRESHOLDS_M
+    from hmc.io.results import PoseTable, read_centroids, read_joints, read_tracks, run_selection
     from hmc.metrics.mot import MotScores
-    from hmc.results import PoseTable, read_centroids, read_joints, read_tracks, run_selection
+    from hmc.metrics.scores import PoseEvaluation, angle_rows, evaluate_pose, evaluate_tracks, pelvis_tracks
+    from hmc.metrics.scores.poses import THRESHOLDS_M
 
     if not args.directory.is_dir():
         raise InputError(f"{args.directory}: no such folder; a result is the folder that `hmc pose` or `hmc track` wrote")
@@ -142,8 +142,8 @@ def run(args: argparse.Namespace) -> int:
 
 def _in_images(args: argparse.Namespace, estimated, true_poses, truth_images: Path | None, selected):
     """Scores in images, against marked landmarks or the projected true joints."""
-    from hmc.camera.calibration.read import read_calibration
-    from hmc.evaluation.images import THRESHOLDS_PX, evaluate_images, image_landmarks, read_image_landmarks
+    from hmc.io.calibration.read import read_calibration
+    from hmc.metrics.scores.images import THRESHOLDS_PX, evaluate_images, image_landmarks, read_image_landmarks
 
     if args.recording is None:
         raise InputError("scores in images need the RECORDING, for its calibration")
@@ -185,7 +185,7 @@ def find_truth(recording: Path | None, truth: Path | None) -> tuple[Path | None,
 
 def made_from(directory: Path, recording: Path | None) -> list[str]:
     """A sentence where the result says that it was made from a recording of another name."""
-    from hmc.results import read_run
+    from hmc.io.results import read_run
 
     run = directory / "run.toml"
     made = read_run(run).get("recording") if run.is_file() else None

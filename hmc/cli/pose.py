@@ -95,20 +95,20 @@ def run(args: argparse.Namespace) -> int:
 
     import numpy as np
 
+    from hmc.body.proportions import stature
     from hmc.errors import InputError
-    from hmc.files import to_toml
-    from hmc.frontend import FrontendSettings
-    from hmc.pose.annealed.presets import pose_preset
-    from hmc.pose.body.proportions import stature
+    from hmc.io.files import to_toml
+    from hmc.io.results import write_joints, write_pose, write_run, write_tracks
+    from hmc.pose.methods.pso import SwarmTask, pose_by_swarm, swarm_preset, write_fits
+    from hmc.pose.methods.scalable import method_preset
+    from hmc.pose.methods.smd import smd_preset
+    from hmc.pose.methods.smd_sequence import SmdTask, pose_by_descent
     from hmc.pose.person import FollowSettings
-    from hmc.pose.scalable.methods import method_preset
     from hmc.pose.sequence import pose_recording
-    from hmc.pose.smd.presets import smd_preset
-    from hmc.pose.smd.sequence import SmdTask, pose_by_descent
     from hmc.pose.smoothing import smooth_people
-    from hmc.pose.swarm.sequence import SwarmTask, pose_by_swarm, swarm_preset, write_fits
-    from hmc.results import write_joints, write_pose, write_run, write_tracks
+    from hmc.pose.steps.preset import pose_preset
     from hmc.tracking.resumable import person_grid, track_recording
+    from hmc.voxels.hulls import FrontendSettings
 
     if args.smooth and args.method not in SMOOTHABLE:
         raise InputError(f"--smooth: not for --method {args.method}; it is for {', '.join(SMOOTHABLE)}")

@@ -52,14 +52,14 @@ def run_markers(args: argparse.Namespace, height_m: float | None, recording) -> 
     """
     import numpy as np
 
+    from hmc.camera.marker_color import ColourSettings
     from hmc.errors import InputError
-    from hmc.files import to_toml
+    from hmc.io.detections import write_detections
+    from hmc.io.files import to_toml
+    from hmc.io.results import TrackTable, write_joints, write_pose, write_run, write_tracks
     from hmc.landmarks import LANDMARKS
-    from hmc.pose.markers.colour import ColourSettings
-    from hmc.pose.markers.detections import write_detections
-    from hmc.pose.markers.filter import marker_preset
-    from hmc.pose.markers.sequence import pose_from_markers
-    from hmc.results import TrackTable, write_joints, write_pose, write_run, write_tracks
+    from hmc.pose.methods.marker_apf import pose_from_markers
+    from hmc.pose.steps.marker_filter import marker_preset
 
     preset, colour = marker_preset(args.preset), ColourSettings()
     used, ready = _source(args, recording)
@@ -124,8 +124,8 @@ def _source(args: argparse.Namespace, recording) -> tuple[Path, bool]:
 
 def _read(path: Path, recording):
     """The detections of the recording's selection."""
-    from hmc.camera.calibration import read_entries
-    from hmc.pose.markers.detections import DetectionTable, read_detections
+    from hmc.io.calibration import read_entries
+    from hmc.io.detections import DetectionTable, read_detections
 
     table = read_detections(path, [entry.name for entry in read_entries(recording.path)])
     chosen = (table.frames >= recording.start) & (table.frames < recording.start + recording.n_frames)
@@ -136,11 +136,11 @@ def _detect(args: argparse.Namespace, recording, labels: Path, settings, journal
     """Learn the colour and detect in every image; what is done is kept in the journal."""
     import numpy as np
 
+    from hmc.camera.marker_color import detect_markers, learn_marker_colour
     from hmc.errors import InputError
-    from hmc.journal import append_journal, open_journal
-    from hmc.pose.markers.colour import detect_markers, learn_marker_colour
-    from hmc.pose.markers.detections import DetectionTable, read_detections
-    from hmc.recording import background_frames, iterate_frames, open_recording
+    from hmc.io.detections import DetectionTable, read_detections
+    from hmc.io.journal import append_journal, open_journal
+    from hmc.io.recording import background_frames, iterate_frames, open_recording
 
     whole = open_recording(args.recording, cameras=args.cameras)
     points = read_detections(labels, whole.rig.names)

@@ -67,10 +67,10 @@ def selected_tracker(args: argparse.Namespace):
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
     from hmc.errors import InputError
-    from hmc.files import to_toml
-    from hmc.frontend import FrontendSettings
-    from hmc.results import read_tracks, write_run, write_tracks
+    from hmc.io.files import to_toml
+    from hmc.io.results import read_tracks, write_run, write_tracks
     from hmc.tracking.resumable import Timing, track_recording
+    from hmc.voxels.hulls import FrontendSettings
 
     recording = open_selected(args)
     tracker, frontend = selected_tracker(args), FrontendSettings()

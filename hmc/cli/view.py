@@ -39,8 +39,8 @@ def run(args: argparse.Namespace) -> int:
     import cv2
     import numpy as np
 
-    from hmc.files import atomic_write
-    from hmc.results import run_selection
+    from hmc.io.files import atomic_write
+    from hmc.io.results import run_selection
     from hmc.view.mosaic import read_result, stream_mosaics
 
     suffix = args.out.suffix.lower()
@@ -101,7 +101,7 @@ def write_video(path: Path, pictures: Iterable, fps: float) -> None:
     """
     import cv2
 
-    from hmc.files import sibling
+    from hmc.io.files import sibling
 
     codec = "mp4v" if path.suffix.lower() == ".mp4" else "MJPG"
     writer = None

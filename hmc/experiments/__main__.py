@@ -9,10 +9,10 @@ import traceback
 from pathlib import Path
 
 from hmc.errors import InputError
-from hmc.experiments.experiment import Experiment, Plan
-from hmc.experiments.library import EXPERIMENTS, find_experiment
-from hmc.experiments.sweep import plan_for, plan_of, run_experiment, stored_cells
-from hmc.experiments.writing import write_report
+from hmc.experiments.engine.experiment import Experiment, Plan
+from hmc.experiments.engine.library import EXPERIMENTS, find_experiment
+from hmc.experiments.engine.sweep import plan_for, plan_of, run_experiment, stored_cells
+from hmc.experiments.engine.writing import write_report
 
 #: What wrong input, a failed cell and an interrupt leave as exit code.
 EXIT_INPUT, EXIT_FAILED, EXIT_INTERRUPTED = 2, 1, 130
@@ -107,7 +107,7 @@ def _run_one(name: str, experiment: Experiment, out: Path, asked: Plan, args: ar
     """Compute an experiment, write its report and tell of it; False where cells failed."""
     from tqdm import tqdm
 
-    from hmc.experiments.style import house_style
+    from hmc.experiments.engine.style import house_style
 
     plan = plan_for(experiment, asked)
     if plan is not asked:
@@ -146,7 +146,7 @@ def _status(args: argparse.Namespace) -> int:
 
 
 def _merge(args: argparse.Namespace) -> int:
-    from hmc.experiments.merging import merge_stores
+    from hmc.experiments.engine.merging import merge_stores
 
     merged = merge_stores(_folder(args.out), args.others)
     _tell(f"{args.out}: {_cells(merged.copied)} copied, {merged.same + len(merged.different)} were here")
@@ -163,10 +163,10 @@ def _merge(args: argparse.Namespace) -> int:
 
 
 def _report(args: argparse.Namespace) -> int:
-    from hmc.experiments.booklet import write_booklet
-    from hmc.experiments.page import to_html, verdict_counts
-    from hmc.experiments.summary import summarise
-    from hmc.files import atomic_write
+    from hmc.experiments.engine.booklet import write_booklet
+    from hmc.experiments.engine.page import to_html, verdict_counts
+    from hmc.experiments.engine.summary import summarise
+    from hmc.io.files import atomic_write
 
     rows = summarise(args.out)
     page, booklet = _folder(args.out) / "report.html", args.out / "report.pdf"

@@ -14,21 +14,21 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from hmc.experiments.by_action import pose_scores
-from hmc.experiments.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
+from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
+from hmc.experiments.engine.inputs import Inputs
+from hmc.experiments.engine.style import COLOURS
 from hmc.experiments.five_actions import action_title
-from hmc.experiments.inputs import Inputs
 from hmc.experiments.markerless_runs import FRONTEND, MASKS_KEY, action_sources, tracked
 from hmc.experiments.pose_runs import VOXEL_M, estimate_of, first_truth
-from hmc.experiments.style import COLOURS
-from hmc.frontend import HullStep
-from hmc.pose.annealed.presets import PosePreset, pose_preset
-from hmc.pose.scalable.methods import method_preset
+from hmc.io.recording import Recording
+from hmc.io.results import TrackTable
+from hmc.pose.methods.pso import SwarmTask, pose_by_swarm, swarm_preset
+from hmc.pose.methods.scalable import method_preset
+from hmc.pose.methods.smd import smd_preset
+from hmc.pose.methods.smd_sequence import SmdTask, pose_by_descent
 from hmc.pose.sequence import PosedPeople, pose_recording
-from hmc.pose.smd.presets import smd_preset
-from hmc.pose.smd.sequence import SmdTask, pose_by_descent
-from hmc.pose.swarm.sequence import SwarmTask, pose_by_swarm, swarm_preset
-from hmc.recording import Recording
-from hmc.results import TrackTable
+from hmc.pose.steps.preset import PosePreset, pose_preset
+from hmc.voxels.hulls import HullStep
 
 __all__ = ["EXPERIMENT", "METHODS", "effort"]
 

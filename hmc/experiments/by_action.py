@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from hmc.experiments.experiment import Cell
+from hmc.experiments.engine.experiment import Cell
 from hmc.experiments.five_actions import action_title
 from hmc.experiments.pose_runs import estimates
 from hmc.metrics.angles import angular_errors, score_angles

@@ -11,11 +11,11 @@ from collections.abc import Sequence
 import matplotlib.pyplot as plt
 import numpy as np
 
-from hmc.experiments.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
-from hmc.experiments.inputs import Inputs
-from hmc.experiments.style import COLOURS
+from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
+from hmc.experiments.engine.inputs import Inputs
+from hmc.experiments.engine.style import COLOURS
 from hmc.experiments.toy_likelihood import BOUNDS, PEAKS, log_mixture
-from hmc.montecarlo import AnnealedSettings, filter_layer, normalise, particle_init, sir_step, spread_scale, truncated_drift
+from hmc.search import AnnealedSettings, filter_layer, normalise, particle_init, sir_step, spread_scale, truncated_drift
 
 __all__ = ["EXPERIMENT"]
 

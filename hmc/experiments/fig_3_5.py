@@ -12,10 +12,10 @@ from collections.abc import Sequence
 import matplotlib.pyplot as plt
 import numpy as np
 
-from hmc.experiments.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
-from hmc.experiments.inputs import Inputs
+from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
+from hmc.experiments.engine.inputs import Inputs
 from hmc.experiments.toy_likelihood import BOUNDS, moving_log_likelihood, target_path
-from hmc.montecarlo import AnnealedSettings, annealed_step, particle_init
+from hmc.search import AnnealedSettings, annealed_step, particle_init
 
 __all__ = ["EXPERIMENT"]
 

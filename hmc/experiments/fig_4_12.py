@@ -10,12 +10,12 @@ from collections.abc import Sequence
 import matplotlib.pyplot as plt
 import numpy as np
 
-from hmc.evaluation import evaluate_tracks
 from hmc.experiments import tracking_runs as runs
-from hmc.experiments.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
-from hmc.experiments.inputs import Inputs, rendered
-from hmc.plotting import draw_tracks
-from hmc.results import TrackTable, read_centroids
+from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
+from hmc.experiments.engine.inputs import Inputs, rendered
+from hmc.io.results import TrackTable, read_centroids
+from hmc.metrics.scores import evaluate_tracks
+from hmc.view.plots import draw_tracks
 
 __all__ = ["EXPERIMENT"]
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from hmc.experiments import table_4_3
 from hmc.experiments import tracking_runs as runs
-from hmc.experiments.experiment import Cell, Claim, Experiment, Plan, Report, Table
-from hmc.experiments.style import COLOURS
+from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
+from hmc.experiments.engine.style import COLOURS
 
 __all__ = ["EXPERIMENT"]
 

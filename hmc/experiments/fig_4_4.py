@@ -11,10 +11,10 @@ from dataclasses import asdict
 import matplotlib.pyplot as plt
 import numpy as np
 
-from hmc.experiments.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
-from hmc.experiments.inputs import Inputs
-from hmc.experiments.store import digest
-from hmc.experiments.style import COLOURS
+from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
+from hmc.experiments.engine.inputs import Inputs
+from hmc.experiments.engine.store import digest
+from hmc.experiments.engine.style import COLOURS
 from hmc.tracking.features import FEATURES
 from hmc.tracking.person_tree import LEAF, default_tree
 

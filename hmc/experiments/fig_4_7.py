@@ -12,9 +12,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from hmc.experiments.ellipsoid import VOXEL_M, person_voxels
-from hmc.experiments.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
-from hmc.experiments.inputs import Inputs
-from hmc.experiments.style import COLOURS
+from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
+from hmc.experiments.engine.inputs import Inputs
+from hmc.experiments.engine.style import COLOURS
 
 __all__ = ["EXPERIMENT"]
 

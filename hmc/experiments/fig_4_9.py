@@ -13,10 +13,10 @@ import numpy as np
 from scipy.ndimage import uniform_filter
 
 from hmc.experiments.ellipsoid import VOXEL_M, person_voxels
-from hmc.experiments.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
-from hmc.experiments.inputs import Inputs
-from hmc.experiments.style import COLOURS
-from hmc.montecarlo import systematic
+from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
+from hmc.experiments.engine.inputs import Inputs
+from hmc.experiments.engine.style import COLOURS
+from hmc.search import systematic
 
 __all__ = ["EXPERIMENT"]
 

@@ -12,8 +12,8 @@ import numpy as np
 from scipy.stats import norm
 
 from hmc.experiments import pose_runs as runs
-from hmc.experiments.experiment import Cell, Claim, Experiment, Plan, Report, Table
-from hmc.experiments.style import COLOURS
+from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
+from hmc.experiments.engine.style import COLOURS
 from hmc.metrics.landmarks import score
 from hmc.metrics.threshold import choose_threshold
 

@@ -12,8 +12,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from hmc.experiments import pose_runs as runs
-from hmc.experiments.experiment import Cell, Claim, Experiment, Plan, Report, Table
-from hmc.experiments.style import COLOURS
+from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
+from hmc.experiments.engine.style import COLOURS
 from hmc.metrics.angles import REFERENCE_ANGLES, angular_errors, reference_angles, score_angles
 
 __all__ = ["EXPERIMENT"]

@@ -15,23 +15,23 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from scipy import ndimage
 
-from hmc.experiments.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
+from hmc.body.flesh import flesh_points
+from hmc.body.inverse import fit_landmarks
+from hmc.body.joints import DOF_NAMES
+from hmc.body.proportions import canton_body
+from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
+from hmc.experiments.engine.inputs import Inputs
+from hmc.experiments.engine.style import COLOURS
 from hmc.experiments.filter_runs import HEIGHT_M
-from hmc.experiments.inputs import Inputs
 from hmc.experiments.markerless_runs import FRONTEND, MASKS_KEY, action_sources, tracked
 from hmc.experiments.pose_runs import first_truth, standing_state
-from hmc.experiments.style import COLOURS
-from hmc.frontend import stream_hulls
-from hmc.mask_store import kept_masks
-from hmc.pose.annealed.scores import SCORES, ScoreVariances, log_likelihood_factorised, make_score_table, observe, scores
-from hmc.pose.body.flesh import flesh_points
-from hmc.pose.body.inverse import fit_landmarks
-from hmc.pose.body.joints import DOF_NAMES
-from hmc.pose.body.proportions import canton_body
+from hmc.io.masks import kept_masks
+from hmc.io.results import TrackTable
+from hmc.pose.objectives.four_scores import SCORES, ScoreVariances, log_likelihood_factorised, make_score_table, observe, scores
 from hmc.pose.sequence import targets_of
-from hmc.results import TrackTable
 from hmc.tracking.resumable import person_grid
 from hmc.voxels.grid import VoxelGrid
+from hmc.voxels.hulls import stream_hulls
 
 __all__ = ["EXPERIMENT", "count_modes"]
 

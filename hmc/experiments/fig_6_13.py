@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 
 from hmc.experiments import marker_runs as runs
 from hmc.experiments.by_action import pose_scores
-from hmc.experiments.experiment import Cell, Claim, Experiment, Plan, Report, Table
+from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
 from hmc.experiments.filter_grids import mmta_bar
 from hmc.experiments.markerless_runs import action_sources
 

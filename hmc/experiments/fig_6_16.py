@@ -11,7 +11,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from hmc.experiments import filter_runs as runs
-from hmc.experiments.experiment import Cell, Claim, Experiment, Plan, Report, Table
+from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
 from hmc.experiments.filter_grids import LAYERS, PARTICLES, filter_grid, grouped_rows, layer_map, matrix, mmta_bar
 
 __all__ = ["EXPERIMENT"]

@@ -16,7 +16,7 @@ import numpy as np
 
 from hmc.experiments import filter_runs as runs
 from hmc.experiments.by_action import pose_scores
-from hmc.experiments.experiment import Cell, Claim, Experiment, Plan, Report, Table
+from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
 from hmc.experiments.filter_grids import LAYERS, PARTICLES, REPEATS, STUDIED, filter_grid, grouped_rows, layer_map, matrix, mmta_bar
 from hmc.experiments.five_actions import action_title
 

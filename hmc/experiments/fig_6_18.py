@@ -11,9 +11,9 @@ from collections.abc import Sequence
 import matplotlib.pyplot as plt
 
 from hmc.experiments import filter_runs as runs
-from hmc.experiments.experiment import Cell, Claim, Experiment, Plan, Report, Table
+from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
+from hmc.experiments.engine.style import COLOURS
 from hmc.experiments.filter_grids import filter_grid, grouped_rows
-from hmc.experiments.style import COLOURS
 
 __all__ = ["EXPERIMENT"]
 

@@ -11,9 +11,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from hmc.experiments import markerless_runs as runs
-from hmc.experiments.experiment import Cell, Claim, Experiment, Plan, Report, Table
+from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
+from hmc.experiments.engine.style import COLOURS
 from hmc.experiments.pose_runs import estimates
-from hmc.experiments.style import COLOURS
 from hmc.experiments.table_6_4 import PRESETS
 from hmc.experiments.table_6_4 import grid as table_grid
 from hmc.landmarks import LANDMARKS

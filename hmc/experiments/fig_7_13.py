@@ -10,11 +10,11 @@ from typing import Any
 
 import matplotlib.pyplot as plt
 
+from hmc.body.joints import N_DOF
 from hmc.experiments import scalable_runs as runs
 from hmc.experiments.by_action import pose_scores
-from hmc.experiments.experiment import Cell, Claim, Experiment, Plan, Report, Table
+from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
 from hmc.experiments.five_actions import action_title
-from hmc.pose.body.joints import N_DOF
 
 __all__ = ["EXPERIMENT"]
 

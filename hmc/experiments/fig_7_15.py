@@ -13,15 +13,15 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from hmc.experiments import scalable_runs as runs
-from hmc.experiments.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
+from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
+from hmc.experiments.engine.inputs import Inputs, rendered
 from hmc.experiments.hiding import ENDS, hidden_and_shown, limb_views, rest_of, waits
-from hmc.experiments.inputs import Inputs, rendered
 from hmc.experiments.markerless_runs import tracked
 from hmc.experiments.pose_runs import estimates, first_truth
 from hmc.landmarks import landmark_index
 from hmc.metrics.landmarks import landmark_errors
-from hmc.pose.annealed.presets import pose_preset
-from hmc.pose.scalable.methods import method_preset
+from hmc.pose.methods.scalable import method_preset
+from hmc.pose.steps.preset import pose_preset
 
 __all__ = ["EXPERIMENT"]
 

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 import matplotlib.pyplot as plt
 import numpy as np
 
-from hmc.experiments.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
-from hmc.experiments.inputs import Inputs
-from hmc.pose.scalable.structure import StructuralSettings, spread_schedule
+from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
+from hmc.experiments.engine.inputs import Inputs
+from hmc.search.structural import StructuralSettings, spread_schedule
 
 __all__ = ["EXPERIMENT"]
 

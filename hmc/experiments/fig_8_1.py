@@ -13,7 +13,7 @@ import matplotlib.pyplot as plt
 
 from hmc.experiments import scalable_runs as runs
 from hmc.experiments.by_action import pose_scores
-from hmc.experiments.experiment import Cell, Claim, Experiment, Plan, Report, Table
+from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
 from hmc.experiments.filter_grids import STUDIED
 from hmc.experiments.filter_runs import ANNEALING
 

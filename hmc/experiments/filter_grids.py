@@ -12,7 +12,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from hmc.experiments.by_action import pose_scores
-from hmc.experiments.experiment import Cell, Plan
+from hmc.experiments.engine.experiment import Cell, Plan
 from hmc.experiments.filter_runs import ANNEALING
 from hmc.experiments.markerless_runs import action_sources
 

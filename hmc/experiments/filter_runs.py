@@ -14,24 +14,24 @@ from time import thread_time
 
 import numpy as np
 
+from hmc.body.inverse import fit_landmarks
+from hmc.body.joints import N_DOF
+from hmc.body.kinematics import landmark_masks, landmarks
+from hmc.body.model import BodyModel
+from hmc.body.proportions import canton_body
 from hmc.camera.model import Rig
-from hmc.experiments.experiment import Parameters, Results
-from hmc.experiments.inputs import Inputs, once, read_hulls, write_hulls
+from hmc.experiments.engine.experiment import Parameters, Results
+from hmc.experiments.engine.inputs import Inputs, once, read_hulls, write_hulls
 from hmc.experiments.markerless_runs import FRONTEND, MASKS_KEY, tracked
 from hmc.experiments.pose_runs import first_truth, standing_state
-from hmc.frontend import HullStep, MaskStep, stream_hulls, stream_masks
-from hmc.mask_store import kept_masks
-from hmc.pose.annealed.apf import make_filter, pose_init
-from hmc.pose.annealed.presets import PosePreset, pose_preset
-from hmc.pose.body.inverse import fit_landmarks
-from hmc.pose.body.joints import N_DOF
-from hmc.pose.body.kinematics import landmark_masks, landmarks
-from hmc.pose.body.model import BodyModel
-from hmc.pose.body.proportions import canton_body
-from hmc.pose.scalable.step import step_of
+from hmc.io.masks import MaskStep, kept_masks
+from hmc.io.results import TrackTable
 from hmc.pose.sequence import targets_of
-from hmc.results import TrackTable
+from hmc.pose.steps.annealed import make_filter, pose_init
+from hmc.pose.steps.preset import PosePreset, pose_preset
+from hmc.pose.steps.scalable import step_of
 from hmc.tracking.resumable import person_grid
+from hmc.voxels.hulls import HullStep, stream_hulls, stream_masks
 
 __all__ = ["ANNEALING", "FAMILY", "VERSION", "action_drift", "cell", "filter_preset", "follow_from_truth"]
 

@@ -13,27 +13,27 @@ from pathlib import Path
 
 import numpy as np
 
+from hmc.body.flesh import place_points
+from hmc.body.inverse import fit_landmarks
+from hmc.body.kinematics import segment_transforms
+from hmc.body.proportions import default_body
+from hmc.body.scalable_models import UNITIVE_PIECES
 from hmc.camera.model import project
+from hmc.experiments.engine.inputs import Inputs, once
 from hmc.experiments.filter_runs import HEIGHT_M
-from hmc.experiments.inputs import Inputs, once
 from hmc.experiments.markerless_runs import FRONTEND, MASKS_KEY, tracked
 from hmc.experiments.pose_runs import VOXEL_M, first_truth, standing_state
-from hmc.frontend import HullStep, stream_hulls
+from hmc.io.masks import kept_masks
+from hmc.io.results import TrackTable
 from hmc.landmarks import LANDMARKS, landmark_index
-from hmc.mask_store import kept_masks
-from hmc.pose.annealed.apf import make_filter, score_maps
-from hmc.pose.annealed.presets import pose_preset
-from hmc.pose.body.flesh import place_points
-from hmc.pose.body.inverse import fit_landmarks
-from hmc.pose.body.kinematics import segment_transforms
-from hmc.pose.body.proportions import default_body
-from hmc.pose.scalable.methods import method_preset
-from hmc.pose.scalable.models import UNITIVE_PIECES
-from hmc.pose.scalable.restrict import part_mask
-from hmc.pose.scalable.shown import limb_signs, place_flesh
+from hmc.pose.methods.scalable import method_preset
+from hmc.pose.objectives.restrict import part_mask
 from hmc.pose.sequence import targets_of
-from hmc.results import TrackTable
+from hmc.pose.steps.annealed import make_filter, score_maps
+from hmc.pose.steps.hidden.shown import limb_signs, place_flesh
+from hmc.pose.steps.preset import pose_preset
 from hmc.tracking.resumable import person_grid
+from hmc.voxels.hulls import HullStep, stream_hulls
 
 __all__ = ["ENDS", "LimbViews", "hidden_and_shown", "limb_views", "rest_of", "waits"]
 

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import matplotlib.pyplot as plt
 import numpy as np
 
-from hmc.experiments.experiment import Cell, Claim, Experiment, Plan, Report, Table
+from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
 from hmc.experiments.hsiao_3_15 import COLOURS_OF_PARTS, FAMILY, cell, grid
 from hmc.landmarks import LANDMARKS
 from hmc.pose.spectral.parts import PART_NAMES

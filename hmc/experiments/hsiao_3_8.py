@@ -11,11 +11,11 @@ from collections.abc import Sequence
 import matplotlib.pyplot as plt
 import numpy as np
 
-from hmc.experiments.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
+from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
+from hmc.experiments.engine.inputs import Inputs
 from hmc.experiments.hsiao_runs import person_hulls, scene_of, sequences
-from hmc.experiments.inputs import Inputs
+from hmc.io.recording import open_recording
 from hmc.pose.spectral.ghosts import check_ghosts, remove_ghosts
-from hmc.recording import open_recording
 from hmc.synthetic.truth import true_parts
 from hmc.tracking.ghosts import Views
 

@@ -11,11 +11,11 @@ from collections.abc import Sequence
 import matplotlib.pyplot as plt
 import numpy as np
 
-from hmc.experiments.experiment import Cell, Claim, Experiment, Plan, Report, Table
+from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
+from hmc.experiments.engine.style import COLOURS
 from hmc.experiments.hsiao_runs import pose_cell, sequences
 from hmc.experiments.nine_actions import NINE_ACTIONS, QUICK_SUFFIX
 from hmc.experiments.pose_runs import estimates
-from hmc.experiments.style import COLOURS
 from hmc.metrics.landmarks import landmark_errors
 
 __all__ = ["EXPERIMENT"]

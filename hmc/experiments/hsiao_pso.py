@@ -13,17 +13,17 @@ import matplotlib.pyplot as plt
 import numpy as np
 from scipy.optimize import differential_evolution, dual_annealing
 
-from hmc.experiments.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
+from hmc.body.spin_skeleton import model_of_height, skeleton_landmarks
+from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
+from hmc.experiments.engine.inputs import Inputs
+from hmc.experiments.engine.style import COLOURS
 from hmc.experiments.hsiao_runs import VOXEL_M, person_hulls, sequences
-from hmc.experiments.inputs import Inputs
 from hmc.experiments.pose_runs import first_truth
-from hmc.experiments.style import COLOURS
+from hmc.pose.objectives.curves import curves_of, observe_curves, skeleton_error
 from hmc.pose.spectral.reading import read_body
-from hmc.pose.swarm.error import curves_of, observe_curves, skeleton_error
-from hmc.pose.swarm.fit import FitSettings, Prior, bounds_around, fit_cost, fit_flat, fit_hierarchical, rest_state
-from hmc.pose.swarm.heading import heading_of, spin_towards
-from hmc.pose.swarm.model import model_of_height, skeleton_landmarks
-from hmc.pose.swarm.pso import PsoSettings
+from hmc.pose.steps.swarm.fit import FitSettings, Prior, bounds_around, fit_cost, fit_flat, fit_hierarchical, rest_state
+from hmc.pose.steps.swarm.heading import heading_of, spin_towards
+from hmc.search.swarm import PsoSettings
 
 __all__ = ["EXPERIMENT"]
 

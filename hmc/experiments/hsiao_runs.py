@@ -7,19 +7,19 @@ from collections.abc import Iterator
 import numpy as np
 
 from hmc.errors import InputError
-from hmc.experiments.experiment import Parameters, Plan, Results, Source
-from hmc.experiments.inputs import Inputs, rendered
+from hmc.experiments.engine.experiment import Parameters, Plan, Results, Source
+from hmc.experiments.engine.inputs import Inputs, rendered
 from hmc.experiments.nine_actions import NINE_ACTIONS, QUICK_SUFFIX, nine_recipes
 from hmc.experiments.pose_runs import estimate_of, first_truth
-from hmc.frontend import FrontendSettings, HullStep, stream_hulls
+from hmc.io.recording import Recording
 from hmc.landmarks import LANDMARKS
+from hmc.pose.methods.pso import SwarmTask, pose_by_swarm
 from hmc.pose.spectral.graph import color_votes, face_neighbours
-from hmc.pose.swarm.sequence import SwarmTask, pose_by_swarm
-from hmc.recording import Recording
 from hmc.synthetic.scene import Scene, build_scene
 from hmc.tracking.resumable import track_recording
 from hmc.voxels.components import components
 from hmc.voxels.grid import VoxelGrid
+from hmc.voxels.hulls import FrontendSettings, HullStep, stream_hulls
 
 __all__ = ["VOXEL_M", "limbs_apart", "person_hulls", "pose_cell", "scene_of", "sequences"]
 

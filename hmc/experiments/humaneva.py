@@ -18,15 +18,15 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from hmc.c3d import PointData, read_c3d
-from hmc.camera.calibration import build_camera, natural_key, write_calibration
-from hmc.camera.calibration.cal import read_cal
 from hmc.errors import InputError
-from hmc.files import write_toml
-from hmc.footage import open_images, open_video
+from hmc.io.c3d import PointData, read_c3d
+from hmc.io.calibration import build_camera, natural_key, write_calibration
+from hmc.io.calibration.cal import read_cal
+from hmc.io.files import write_toml
+from hmc.io.footage import open_images, open_video
+from hmc.io.recording import open_recording
+from hmc.io.results import PoseTable, write_joints
 from hmc.landmarks import LANDMARKS
-from hmc.recording import open_recording
-from hmc.results import PoseTable, write_joints
 
 __all__ = ["JOINTS", "Sync", "Take", "convert_take", "find_takes", "landmark_positions", "read_sync", "synchronise"]
 

@@ -14,17 +14,17 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.ticker import LogLocator
 
+from hmc.body.joints import dof_index
+from hmc.body.model import neutral_state
+from hmc.body.proportions import default_body
+from hmc.body.solid_samples import surface_grid
+from hmc.body.solids import SolidBody, solid_body
 from hmc.camera.model import Rig, look_at, project
-from hmc.experiments.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
-from hmc.experiments.inputs import Inputs
-from hmc.experiments.style import COLOURS
-from hmc.pose.body.joints import dof_index
-from hmc.pose.body.model import neutral_state
-from hmc.pose.body.proportions import default_body
-from hmc.pose.smd.body import SolidBody, solid_body
-from hmc.pose.smd.rows import pose_body
-from hmc.pose.smd.samples import surface_grid
-from hmc.pose.smd.surface_cue import place
+from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
+from hmc.experiments.engine.inputs import Inputs
+from hmc.experiments.engine.style import COLOURS
+from hmc.pose.objectives.cue_rows import pose_body
+from hmc.pose.objectives.surface_cue import place
 from hmc.voxels.carving import carve, make_tables
 from hmc.voxels.grid import VoxelGrid
 from hmc.voxels.incremental import colored_surface, hull_init, hull_step, make_pixel_tables

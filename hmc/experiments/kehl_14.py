@@ -10,8 +10,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from hmc.experiments import kehl_runs
-from hmc.experiments.experiment import Cell, Claim, Experiment, Plan, Report, Table
-from hmc.experiments.style import COLOURS
+from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
+from hmc.experiments.engine.style import COLOURS
 from hmc.landmarks import LANDMARKS
 
 __all__ = ["EXPERIMENT"]

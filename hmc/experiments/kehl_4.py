@@ -17,10 +17,10 @@ import numpy as np
 
 from hmc.camera.color_edges import ColorEdgeSettings, color_edges
 from hmc.errors import InputError
-from hmc.experiments.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
-from hmc.experiments.inputs import Inputs, rendered
-from hmc.experiments.style import COLOURS
-from hmc.recording import Recording, background_frames, iterate_frames
+from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
+from hmc.experiments.engine.inputs import Inputs, rendered
+from hmc.experiments.engine.style import COLOURS
+from hmc.io.recording import Recording, background_frames, iterate_frames
 
 __all__ = ["EXPERIMENT"]
 

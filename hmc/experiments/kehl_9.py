@@ -12,18 +12,18 @@ from dataclasses import replace
 import matplotlib.pyplot as plt
 import numpy as np
 
+from hmc.body.inverse import fit_landmarks
+from hmc.body.joints import dof_index
+from hmc.body.kinematics import landmarks
+from hmc.body.proportions import default_body
+from hmc.body.solids import CHAINS, FREE, FREE_NAMES, GROUPS
 from hmc.experiments import kehl_runs
-from hmc.experiments.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
-from hmc.experiments.inputs import Inputs, rendered
+from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
+from hmc.experiments.engine.inputs import Inputs, rendered
+from hmc.experiments.engine.style import COLOURS
 from hmc.experiments.pose_runs import first_truth, standing_state
-from hmc.experiments.style import COLOURS
 from hmc.landmarks import LANDMARKS
-from hmc.pose.body.inverse import fit_landmarks
-from hmc.pose.body.joints import dof_index
-from hmc.pose.body.kinematics import landmarks
-from hmc.pose.body.proportions import default_body
-from hmc.pose.smd.body import CHAINS, FREE, FREE_NAMES, GROUPS
-from hmc.pose.smd.tracker import make_scene, make_tracker, optimise
+from hmc.pose.steps.descent.tracker import make_scene, make_tracker, optimise
 
 __all__ = ["EXPERIMENT"]
 

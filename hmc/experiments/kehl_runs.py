@@ -13,29 +13,28 @@ from itertools import chain
 
 import numpy as np
 
+from hmc.body.kinematics import landmarks
 from hmc.camera.model import project
 from hmc.errors import InputError
-from hmc.experiments.experiment import Cell, Parameters, Results, Source
-from hmc.experiments.inputs import Inputs, rendered
+from hmc.experiments.engine.experiment import Cell, Parameters, Results, Source
+from hmc.experiments.engine.inputs import Inputs, rendered
+from hmc.experiments.engine.style import COLOURS
 from hmc.experiments.pose_runs import first_truth
-from hmc.experiments.style import COLOURS
-from hmc.frontend import FrontendSettings, stream_hulls
+from hmc.io.recording import Recording
 from hmc.landmarks import BONES, LANDMARKS
 from hmc.metrics.landmarks import landmark_errors
-from hmc.pose.annealed.hull_target import HullTarget, make_target
-from hmc.pose.annealed.rays import with_rays
-from hmc.pose.body.kinematics import landmarks
-from hmc.pose.smd.begin import FirstPose, begin
-from hmc.pose.smd.cues import Observed
-from hmc.pose.smd.descent import SmdSettings
-from hmc.pose.smd.levenberg import LmSettings
-from hmc.pose.smd.observe import observe_voxels
-from hmc.pose.smd.presets import smd_preset
-from hmc.pose.smd.sequence import WINDOW_S
-from hmc.pose.smd.start import find_da_vinci
-from hmc.pose.smd.tracker import SmdPreset, track_step
-from hmc.recording import Recording
+from hmc.pose.methods.smd import smd_preset
+from hmc.pose.methods.smd_sequence import WINDOW_S
+from hmc.pose.starts.da_vinci import find_da_vinci
+from hmc.pose.starts.settle import FirstPose, begin
+from hmc.pose.steps.descent.levenberg import LmSettings
+from hmc.pose.steps.descent.tracker import SmdPreset, track_step
+from hmc.pose.views.hull_target import HullTarget, make_target
+from hmc.pose.views.rays import with_rays
+from hmc.pose.views.skin import Observed, observe_voxels
+from hmc.search.meta_descent import SmdSettings
 from hmc.tracking.resumable import person_grid
+from hmc.voxels.hulls import FrontendSettings, stream_hulls
 
 __all__ = ["FAMILY", "VARIANTS", "cell", "cell_grid", "errors_mm", "observations", "preset_of", "shown"]
 

@@ -15,17 +15,16 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from hmc.camera.model import Camera, Rig, project
-from hmc.experiments.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Source, Table
-from hmc.experiments.inputs import Inputs, once, rendered
+from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Source, Table
+from hmc.experiments.engine.inputs import Inputs, once, rendered
+from hmc.experiments.engine.style import COLOURS
 from hmc.experiments.markerless_runs import FRONTEND, MASKS_KEY, tracked
 from hmc.experiments.pose_runs import VOXEL_M, estimate_of, first_truth
-from hmc.experiments.style import COLOURS
-from hmc.frontend import MaskStep
+from hmc.io.masks import MaskStep, keep_masks, kept_masks
+from hmc.io.results import PoseTable
 from hmc.landmarks import landmark_index
-from hmc.mask_store import keep_masks, kept_masks
-from hmc.pose.annealed.presets import pose_preset
 from hmc.pose.sequence import pose_recording
-from hmc.results import PoseTable
+from hmc.pose.steps.preset import pose_preset
 
 __all__ = ["EXPERIMENT", "taken_back", "without_arm"]
 

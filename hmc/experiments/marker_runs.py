@@ -10,23 +10,23 @@ from dataclasses import replace
 
 import numpy as np
 
+from hmc.body.inverse import fit_landmarks
+from hmc.body.kinematics import landmarks
+from hmc.body.proportions import canton_body, default_body
 from hmc.camera.model import Rig
 from hmc.errors import InputError
-from hmc.experiments.experiment import Parameters, Results
+from hmc.experiments.engine.experiment import Parameters, Results
+from hmc.experiments.engine.inputs import Inputs
 from hmc.experiments.filter_runs import HEIGHT_M
-from hmc.experiments.inputs import Inputs
 from hmc.experiments.pose_runs import estimate_of, first_truth, standing_state, synthetic_detections
-from hmc.pose.annealed.apf import pose_init
-from hmc.pose.body.inverse import fit_landmarks
-from hmc.pose.body.kinematics import landmarks
-from hmc.pose.body.proportions import canton_body, default_body
-from hmc.pose.markers.detections import DetectionTable
-from hmc.pose.markers.filter import MarkerPreset, make_marker_filter, marker_preset, marker_step
-from hmc.pose.markers.likelihood import marker_views
-from hmc.pose.markers.sequence import pose_from_markers, seen_in_frame
-from hmc.pose.markers.synthetic import SyntheticDetector
-from hmc.recording import Recording
-from hmc.results import PoseTable
+from hmc.io.detections import DetectionTable
+from hmc.io.recording import Recording
+from hmc.io.results import PoseTable
+from hmc.pose.methods.marker_apf import pose_from_markers, seen_in_frame
+from hmc.pose.objectives.epipolar import marker_views
+from hmc.pose.steps.annealed import pose_init
+from hmc.pose.steps.marker_filter import MarkerPreset, make_marker_filter, marker_preset, marker_step
+from hmc.synthetic.marker_detector import SyntheticDetector
 
 __all__ = ["FAMILY", "QUICK_FRAMES", "cell"]
 

@@ -11,18 +11,18 @@ from pathlib import Path
 
 import numpy as np
 
-from hmc.experiments.experiment import Parameters, Plan, Results, Source
+from hmc.experiments.engine.experiment import Parameters, Plan, Results, Source
+from hmc.experiments.engine.inputs import Inputs, once, rendered
 from hmc.experiments.five_actions import ACTIONS, ACTORS, action_name
-from hmc.experiments.inputs import Inputs, once, rendered
 from hmc.experiments.pose_runs import TRACK_VOXEL_M, VOXEL_M, estimate_of, first_truth
-from hmc.frontend import FrontendSettings, HullStep
-from hmc.pose.annealed.presets import PosePreset, pose_preset
-from hmc.pose.annealed.refine import RefineSettings
+from hmc.io.recording import Recording, open_recording
+from hmc.io.results import TrackTable, read_tracks, write_tracks
 from hmc.pose.person import FollowSettings
 from hmc.pose.sequence import pose_recording
-from hmc.recording import Recording, open_recording
-from hmc.results import TrackTable, read_tracks, write_tracks
+from hmc.pose.steps.preset import PosePreset, pose_preset
+from hmc.pose.steps.refine import RefineSettings
 from hmc.tracking.resumable import track_recording
+from hmc.voxels.hulls import FrontendSettings, HullStep
 
 __all__ = [
     "EVERYTHING", "FAMILY", "FRONTEND", "MASKS_KEY", "SWITCHES", "Way", "action_sources", "cell", "opened", "pose_results",

@@ -13,7 +13,7 @@ import numpy as np
 
 from hmc.experiments import scalable_runs as runs
 from hmc.experiments.by_action import pose_scores
-from hmc.experiments.experiment import Cell, Claim, Experiment, Plan, Report, Table
+from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
 from hmc.experiments.pose_runs import estimates
 
 __all__ = ["EXPERIMENT"]

@@ -14,17 +14,17 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from hmc.experiments.by_action import pose_scores
-from hmc.experiments.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
+from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
+from hmc.experiments.engine.inputs import Inputs, rendered
+from hmc.experiments.engine.style import COLOURS
 from hmc.experiments.five_actions import LONG_SUFFIX, action_name, action_title
-from hmc.experiments.inputs import Inputs, rendered
 from hmc.experiments.markerless_runs import Way, action_sources, pose_results, tracked
 from hmc.experiments.pose_runs import estimates
-from hmc.experiments.style import COLOURS
-from hmc.frontend import HullStep
 from hmc.metrics.landmarks import landmark_errors
-from hmc.pose.annealed.presets import PosePreset, pose_preset
 from hmc.pose.person import FollowSettings
 from hmc.pose.smoothing import smooth_landmarks
+from hmc.pose.steps.preset import PosePreset, pose_preset
+from hmc.voxels.hulls import HullStep
 
 __all__ = ["EXPERIMENT", "hidden", "jitter_mm"]
 

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from hmc.experiments.experiment import Plan, Source
-from hmc.experiments.inputs import Inputs, once, rendered
+from hmc.experiments.engine.experiment import Plan, Source
+from hmc.experiments.engine.inputs import Inputs, once, rendered
 from hmc.experiments.person_data import training_recipes
-from hmc.results import read_centroids
+from hmc.io.results import read_centroids
 from hmc.tracking.feature_table import FeatureTable, table_of_hulls
 from hmc.tracking.resumable import person_grid
 

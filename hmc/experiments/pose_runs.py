@@ -11,22 +11,22 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from hmc.body.model import BodyModel, neutral_state
+from hmc.body.proportions import default_body
 from hmc.errors import InputError
-from hmc.experiments.experiment import Cell, Parameters, Plan, Results, Source
-from hmc.experiments.inputs import Inputs, rendered
+from hmc.experiments.engine.experiment import Cell, Parameters, Plan, Results, Source
+from hmc.experiments.engine.inputs import Inputs, rendered
+from hmc.io.detections import DetectionTable
+from hmc.io.recording import Recording
+from hmc.io.results import PoseTable, read_joints
 from hmc.landmarks import LANDMARKS
 from hmc.metrics.landmarks import landmark_errors
 from hmc.metrics.persons import match_persons
-from hmc.pose.annealed.presets import pose_preset
-from hmc.pose.body.model import BodyModel, neutral_state
-from hmc.pose.body.proportions import default_body
-from hmc.pose.markers.detections import DetectionTable
-from hmc.pose.markers.filter import marker_preset
-from hmc.pose.markers.sequence import pose_from_markers
-from hmc.pose.markers.synthetic import SyntheticDetector, detect_synthetic, seen_by_ideal_detector
+from hmc.pose.methods.marker_apf import pose_from_markers
 from hmc.pose.sequence import pose_recording
-from hmc.recording import Recording
-from hmc.results import PoseTable, read_joints
+from hmc.pose.steps.marker_filter import marker_preset
+from hmc.pose.steps.preset import pose_preset
+from hmc.synthetic.marker_detector import SyntheticDetector, detect_synthetic, seen_by_ideal_detector
 from hmc.tracking.resumable import track_recording
 
 __all__ = [

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 from hmc.camera.model import Rig, project
-from hmc.frontend import MaskStep
+from hmc.io.masks import MaskStep
 from hmc.landmarks import landmark_index
 
 __all__ = ["LIMB_BONES", "remover"]

@@ -15,21 +15,21 @@ from typing import Any
 
 import numpy as np
 
+from hmc.body.joints import N_DOF
 from hmc.experiments import marker_runs
-from hmc.experiments.experiment import Cell, Parameters, Plan, Results
+from hmc.experiments.engine.experiment import Cell, Parameters, Plan, Results
+from hmc.experiments.engine.inputs import Inputs
 from hmc.experiments.filter_grids import QUICK_FRAMES
 from hmc.experiments.filter_runs import ANNEALING, filter_preset, follow_from_truth
-from hmc.experiments.inputs import Inputs
 from hmc.experiments.markerless_runs import FRONTEND, MASKS_KEY, action_sources, tracked
 from hmc.experiments.pose_runs import VOXEL_M, estimate_of, first_truth
 from hmc.experiments.removal import remover
-from hmc.pose.annealed.presets import PosePreset, pose_preset
-from hmc.pose.body.joints import N_DOF
-from hmc.pose.scalable.methods import method_preset
-from hmc.pose.scalable.structure import StructuralSettings
+from hmc.io.recording import Recording
+from hmc.io.results import PoseTable, TrackTable
+from hmc.pose.methods.scalable import method_preset
 from hmc.pose.sequence import pose_recording
-from hmc.recording import Recording
-from hmc.results import PoseTable, TrackTable
+from hmc.pose.steps.preset import PosePreset, pose_preset
+from hmc.search.structural import StructuralSettings
 
 __all__ = [
     "APF",

@@ -11,8 +11,8 @@ from dataclasses import asdict
 
 import numpy as np
 
-from hmc.experiments.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
-from hmc.experiments.inputs import Inputs
+from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
+from hmc.experiments.engine.inputs import Inputs
 from hmc.experiments.person_features import features_of, test_sources, training_sources
 from hmc.tracking.classifiers import CLASSIFIERS, detection_scores, fit_classifier, frame_groups
 from hmc.tracking.feature_table import FeatureTable, join_tables

@@ -12,8 +12,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from hmc.experiments import tracking_runs as runs
-from hmc.experiments.experiment import Cell, Claim, Experiment, Plan, Report, Table
-from hmc.experiments.style import COLOURS
+from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
+from hmc.experiments.engine.style import COLOURS
 
 __all__ = ["EXPERIMENT", "PAPER", "SAMPLES", "configurations", "grid"]
 

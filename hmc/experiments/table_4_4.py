@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from hmc.experiments import table_4_3
 from hmc.experiments import tracking_runs as runs
-from hmc.experiments.experiment import Cell, Claim, Experiment, Plan, Report, Table
+from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
 
 __all__ = ["EXPERIMENT"]
 

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 
 from hmc.experiments import marker_runs as runs
 from hmc.experiments.by_action import AVERAGE, action_rows
-from hmc.experiments.experiment import Cell, Claim, Experiment, Plan, Report, Table
+from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
 from hmc.experiments.markerless_runs import action_sources
 from hmc.experiments.table_6_4 import bars
 

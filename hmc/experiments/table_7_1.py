@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from hmc.body.joints import N_DOF
 from hmc.experiments import scalable_runs as runs
 from hmc.experiments.by_action import AVERAGE, action_rows
-from hmc.experiments.experiment import Cell, Claim, Experiment, Plan, Report, Table
+from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
 from hmc.experiments.five_actions import ACTIONS
 from hmc.experiments.table_6_4 import bars
-from hmc.pose.body.joints import N_DOF
 
 __all__ = ["EVALUATIONS", "EXPERIMENT", "PAPER"]
 

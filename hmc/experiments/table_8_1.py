@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from hmc.experiments import scalable_runs as runs
 from hmc.experiments.by_action import AVERAGE, action_rows
-from hmc.experiments.experiment import Cell, Claim, Experiment, Plan, Report, Table
+from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
 from hmc.experiments.five_actions import ACTIONS
 from hmc.experiments.table_6_3 import PAPER as MARKER_PAPER
 from hmc.experiments.table_6_4 import PAPER as APF_PAPER

@@ -12,17 +12,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hmc.evaluation import evaluate_tracks
-from hmc.experiments.experiment import Cell, Parameters, Plan, Results, Source
-from hmc.experiments.inputs import Inputs, rendered
-from hmc.frontend import HullStep
-from hmc.recording import iterate_frames
-from hmc.results import TrackTable, read_centroids
+from hmc.experiments.engine.experiment import Cell, Parameters, Plan, Results, Source
+from hmc.experiments.engine.inputs import Inputs, rendered
+from hmc.io.recording import iterate_frames
+from hmc.io.results import TrackTable, read_centroids
+from hmc.metrics.scores import evaluate_tracks
 from hmc.tracking.following import finish, init
 from hmc.tracking.lifecycle import Row
 from hmc.tracking.resumable import Timing, observe_step, person_grid
 from hmc.tracking.trackers import make_tracker
 from hmc.tracking.tracks import frame_rng, table_of
+from hmc.voxels.hulls import HullStep
 
 __all__ = [
     "FAMILY", "METHODS", "VERSION", "Method", "Score", "cell", "follow", "method_name", "parameters_of", "scores_of", "sources",

@@ -14,8 +14,8 @@ import numpy as np
 
 from hmc.experiments import markerless_runs as runs
 from hmc.experiments.by_action import pose_scores
-from hmc.experiments.experiment import Cell, Claim, Experiment, Plan, Report, Table
-from hmc.experiments.style import COLOURS
+from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
+from hmc.experiments.engine.style import COLOURS
 
 __all__ = ["EXPERIMENT"]
 

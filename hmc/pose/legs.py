@@ -11,15 +11,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from hmc.body.exchange import swapped_pose
+from hmc.body.kinematics import landmarks
+from hmc.body.model import BodyModel
 from hmc.landmarks import landmark_index
-from hmc.pose.annealed.apf import PoseFilter
-from hmc.pose.annealed.hull_target import HullTarget
-from hmc.pose.annealed.rays import points_to_explain
-from hmc.pose.annealed.refine import refine
-from hmc.pose.annealed.residuals import residual_values
-from hmc.pose.body.kinematics import landmarks
-from hmc.pose.body.model import BodyModel
-from hmc.pose.initialisation import swapped_pose
+from hmc.pose.objectives.residuals import residual_values
+from hmc.pose.steps.annealed import PoseFilter
+from hmc.pose.steps.refine import refine
+from hmc.pose.views.hull_target import HullTarget
+from hmc.pose.views.rays import points_to_explain
 
 __all__ = ["LegChoice", "LegSettings", "choose_legs", "leg_choice", "leg_points"]
 

@@ -12,16 +12,16 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from hmc.pose.annealed.apf import PoseFilter, PoseInfo, PoseState, make_filter
-from hmc.pose.annealed.hull_target import HullTarget
-from hmc.pose.annealed.limb_search import LIMBS
-from hmc.pose.annealed.presets import PosePreset
-from hmc.pose.body.joints import DOF_NAMES
-from hmc.pose.body.model import BodyModel
+from hmc.body.joints import DOF_NAMES
+from hmc.body.model import BodyModel
 from hmc.pose.legs import LegChoice, LegSettings, choose_legs, leg_choice, leg_points
-from hmc.pose.loss import LossSettings, loss_init, loss_step, recalled, remembered
-from hmc.pose.scalable.step import step_of
-from hmc.pose.start import StartSettings, start_person
+from hmc.pose.recovery import LossSettings, loss_init, loss_step, recalled, remembered
+from hmc.pose.starts.window import StartSettings, start_person
+from hmc.pose.steps.annealed import PoseFilter, PoseInfo, PoseState, make_filter
+from hmc.pose.steps.limb_search import LIMBS
+from hmc.pose.steps.preset import PosePreset
+from hmc.pose.steps.scalable import step_of
+from hmc.pose.views.hull_target import HullTarget
 
 __all__ = ["Decided", "FollowSettings", "PersonState", "PersonTask", "PoseTask", "person_step", "taken_up"]
 

@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from hmc.files import atomic_write
-from hmc.journal import append_journal, open_journal
-from hmc.montecarlo.filters import ParticleState
-from hmc.pose.annealed.apf import PoseState, pose_init
-from hmc.pose.annealed.presets import PosePreset
-from hmc.pose.body.joints import DOF_NAMES, canton_limits, default_limits
-from hmc.pose.body.model import BodyModel
-from hmc.pose.body.proportions import make_body
+from hmc.body.joints import DOF_NAMES, canton_limits, default_limits
+from hmc.body.model import BodyModel
+from hmc.body.proportions import make_body
+from hmc.io.files import atomic_write
+from hmc.io.journal import append_journal, open_journal
 from hmc.pose.person import Decided
+from hmc.pose.steps.annealed import PoseState, pose_init
+from hmc.pose.steps.preset import PosePreset
+from hmc.search.filters import ParticleState
 
 __all__ = ["body_of", "from_record", "keep_decided", "keep_particles", "kept_decided", "kept_particles", "to_record"]
 
@@ -55,7 +55,7 @@ def kept_decided(journal: str | Path | None, key: str, preset: PosePreset) -> It
     Parameters
     ----------
     journal, key
-        As for `hmc.journal.open_journal`.
+        As for `hmc.io.journal.open_journal`.
     preset : PosePreset
         As they were kept with.
     """

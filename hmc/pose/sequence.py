@@ -15,22 +15,22 @@ from pathlib import Path
 
 import numpy as np
 
-from hmc.frontend import FrontendSettings, HullStep, MaskStep, stream_hulls
+from hmc.body.joints import DOF_NAMES
+from hmc.body.kinematics import landmark_masks, landmarks
+from hmc.io.masks import MaskStep, kept_masks
+from hmc.io.recording import Recording, iterate_frames
+from hmc.io.results import PoseStates, PoseTable, TrackTable
 from hmc.landmarks import LANDMARKS
-from hmc.mask_store import kept_masks
-from hmc.pose.annealed.hull_target import HullTarget, make_target
-from hmc.pose.annealed.presets import PosePreset
-from hmc.pose.annealed.rays import with_rays
-from hmc.pose.annealed.unexplained import explaining
-from hmc.pose.body.joints import DOF_NAMES
-from hmc.pose.body.kinematics import landmark_masks, landmarks
 from hmc.pose.person import Decided, FollowSettings, PersonState, PersonTask, PoseTask, person_step, taken_up
 from hmc.pose.records import keep_decided, kept_decided
-from hmc.recording import Recording, iterate_frames
-from hmc.results import PoseStates, PoseTable, TrackTable
+from hmc.pose.steps.preset import PosePreset
+from hmc.pose.views.hull_target import HullTarget, make_target
+from hmc.pose.views.rays import with_rays
+from hmc.pose.views.unexplained import explaining
 from hmc.tracking.resumable import WARM_UP_FRAMES, observe_step, person_grid
 from hmc.tracking.tracks import person_voxels, velocities
 from hmc.voxels.grid import VoxelGrid
+from hmc.voxels.hulls import FrontendSettings, HullStep, stream_hulls
 
 __all__ = ["PosedPeople", "frames_left", "persons_of", "pose_recording", "posed_people", "targets_of", "unfitted_notes"]
 

@@ -12,11 +12,11 @@ from dataclasses import replace
 import numpy as np
 from scipy.signal import savgol_filter
 
-from hmc.pose.annealed.presets import PosePreset
-from hmc.pose.body.inverse import fit_landmarks
-from hmc.pose.body.kinematics import landmarks
+from hmc.body.inverse import fit_landmarks
+from hmc.body.kinematics import landmarks
 from hmc.pose.records import body_of
 from hmc.pose.sequence import PosedPeople
+from hmc.pose.steps.preset import PosePreset
 
 __all__ = ["smooth_landmarks", "smooth_people"]
 

@@ -14,11 +14,11 @@ import cv2
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from hmc.camera.calibration import write_calibration
 from hmc.errors import InputError
-from hmc.files import write_toml
+from hmc.io.calibration import write_calibration
+from hmc.io.files import write_toml
+from hmc.io.results import PoseTable, TrackTable, write_joints, write_tracks
 from hmc.landmarks import LANDMARKS
-from hmc.results import PoseTable, TrackTable, write_joints, write_tracks
 from hmc.synthetic.actor import PARTS
 from hmc.synthetic.image import Backdrop, develop, light_crowd, make_backdrop, picture, static_shadows
 from hmc.synthetic.recipe import Recipe, load_recipe

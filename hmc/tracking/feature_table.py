@@ -11,13 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from hmc.errors import InputError
-from hmc.frontend import FrontendSettings, HullStep, stream_hulls
-from hmc.recording import Recording
-from hmc.results import TrackTable, read_centroids
+from hmc.io.recording import Recording
+from hmc.io.results import TrackTable, read_centroids
 from hmc.tracking.blobs import observe
 from hmc.tracking.features import FEATURES, assign_components, feature_matrix
 from hmc.tracking.resumable import person_grid
 from hmc.voxels.grid import VoxelGrid
+from hmc.voxels.hulls import FrontendSettings, HullStep, stream_hulls
 
 __all__ = ["FeatureTable", "feature_table", "join_tables", "table_of_hulls"]
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hmc.errors import InputError
-from hmc.montecarlo import survival_rate, systematic
+from hmc.search import survival_rate, systematic
 from hmc.tracking.association import FollowingSettings
 from hmc.tracking.blobs import Observation
 from hmc.tracking.cloud import Cloud

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from hmc.errors import InputError
-from hmc.files import atomic_write
+from hmc.io.files import atomic_write
 from hmc.tracking.features import FEATURES
 
 __all__ = ["PersonTree", "default_tree", "person_share", "predict_person", "read_tree", "write_tree"]

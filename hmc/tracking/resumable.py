@@ -19,11 +19,10 @@ from typing import Any
 import numpy as np
 
 from hmc.errors import InputError
-from hmc.frontend import FrontendSettings, HullStep, stream_hulls
-from hmc.journal import append_journal, open_journal
-from hmc.mask_store import keep_masks
-from hmc.recording import Recording
-from hmc.results import TrackTable
+from hmc.io.journal import append_journal, open_journal
+from hmc.io.masks import keep_masks
+from hmc.io.recording import Recording
+from hmc.io.results import TrackTable
 from hmc.tracking.blobs import Observation, observe
 from hmc.tracking.cloud import Cloud, Departed
 from hmc.tracking.following import TrackerState, finish, init
@@ -33,6 +32,7 @@ from hmc.tracking.lifecycle import Candidate, Row, Track
 from hmc.tracking.trackers import Tracker, make_tracker
 from hmc.tracking.tracks import frame_rng, table_of
 from hmc.voxels.grid import VoxelGrid
+from hmc.voxels.hulls import FrontendSettings, HullStep, stream_hulls
 
 __all__ = ["WARM_UP_FRAMES", "Timing", "observe_step", "person_grid", "track_recording"]
 
@@ -72,7 +72,7 @@ def track_recording(
     journal : path, optional
         File in which the run is kept, and from which it goes on.
     masks : path, optional
-        File in which all silhouettes are kept for a later pass (`hmc.mask_store`).
+        File in which all silhouettes are kept for a later pass (`hmc.io.masks`).
     key : str
         Says what the run depends on. A journal with another key is begun anew.
     on_problem : callable, optional

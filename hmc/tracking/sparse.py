@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hmc.errors import InputError
-from hmc.montecarlo import systematic
+from hmc.search import systematic
 from hmc.tracking.appearance import similar_colors
 from hmc.tracking.association import FollowingSettings
 from hmc.tracking.blobs import Observation

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from hmc.results import TrackTable
+from hmc.io.results import TrackTable
 from hmc.tracking.association import FollowingSettings, assign_voxels
 from hmc.tracking.blobs import Observation
 from hmc.tracking.following import finish, init, original_number

@@ -14,11 +14,11 @@ from pathlib import Path
 import numpy as np
 
 from hmc.errors import InputError
-from hmc.frontend import FrontendSettings
-from hmc.recording import Recording, open_recording
+from hmc.io.recording import Recording, open_recording
 from hmc.tracking.classifiers import detection_scores, fit_tree, frame_groups
 from hmc.tracking.feature_table import FeatureTable, feature_table, join_tables
 from hmc.tracking.person_tree import PersonTree, predict_person, write_tree
+from hmc.voxels.hulls import FrontendSettings
 
 __all__ = ["main", "person_examples", "train_person_tree"]
 

@@ -11,18 +11,18 @@ import cv2
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from hmc.body.joints import DOF_NAMES
+from hmc.body.model import BodyModel
+from hmc.body.proportions import make_body
 from hmc.camera.model import Camera
 from hmc.errors import InputError
-from hmc.frontend import HullStep, stream_hulls
+from hmc.io.recording import Frame, Recording, iterate_frames
+from hmc.io.results import PoseStates, PoseTable, TrackTable, read_joints, read_pose, read_tracks
 from hmc.landmarks import landmark_index
-from hmc.pose.body.joints import DOF_NAMES
-from hmc.pose.body.model import BodyModel
-from hmc.pose.body.proportions import make_body
-from hmc.recording import Frame, Recording, iterate_frames
-from hmc.results import PoseStates, PoseTable, TrackTable, read_joints, read_pose, read_tracks
 from hmc.view.overlay import LEFT, RIGHT, draw_label, draw_outline, draw_paths, draw_sticks, draw_track, person_colour
 from hmc.view.scene import BACKGROUND, draw_floor, draw_rig, draw_voxels, from_above, viewpoint
 from hmc.voxels.grid import VoxelGrid
+from hmc.voxels.hulls import HullStep, stream_hulls
 
 __all__ = ["Layout", "Person", "Result", "make_layout", "people_in", "read_result", "render", "stream_mosaics"]
 

@@ -10,11 +10,11 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
+from hmc.body.flesh import place_points, surface_samples
+from hmc.body.kinematics import segment_transforms
+from hmc.body.model import BodyModel
 from hmc.camera.model import Camera, project
 from hmc.landmarks import BONES, landmark_index
-from hmc.pose.body.flesh import place_points, surface_samples
-from hmc.pose.body.kinematics import segment_transforms
-from hmc.pose.body.model import BodyModel
 
 __all__ = ["LEFT", "RIGHT", "draw_label", "draw_outline", "draw_paths", "draw_sticks", "draw_track", "person_colour"]
 

@@ -15,7 +15,7 @@ FARTHEST_M = 0.15
 
 @dataclass(frozen=True)
 class BodyVolume:
-    """A person's voxels, for `hmc.pose.swarm.volume.volume_error`.
+    """A person's voxels, for `hmc.pose.objectives.volume.volume_error`.
 
     Parameters
     ----------

@@ -1,0 +1,201 @@
+"""Dimensions of a body from the person's height, and the body made from them.
+
+Joint-centre lengths and flesh lengths are two things: the forearm ends at the wrist's centre while its flesh reaches to the
+finger tips, the shank ends at the ankle while its flesh has a foot. Canton's Table 6.1 has one length a part, and arms longer
+than people's; it is the preset `canton_body`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from hmc.body.joints import SEGMENTS, JointLimits, canton_limits, default_limits
+from hmc.body.model import PARTS, BodyModel, Cones
+from hmc.errors import InputError
+from hmc.landmarks import LANDMARKS
+
+__all__ = ["CANTON_LENGTHS", "DEFAULT_LENGTHS", "GIRTHS", "canton_body", "default_body", "landmark_segments", "make_body", "stature"]
+
+#: Joint-centre lengths over stature. Trunk: hip centres' middle to the base of the neck. Sources: Winter (2009), figure 4.1
+#: (limbs; shoulders: half its width of .259, less some 4 cm from the tip of the shoulder to the joint's centre; ankle: .039 and a
+#: sole of 1 cm), and the ranges that rendered and captured people show (trunk, head). The spine is behind: a standing person's
+#: last neck vertebra is behind the hip centres (Mac-Thiong et al. 2010, Spine 35: E1193), while the chest and the skull are over or
+#: before them. From the line of hips and neck the chest's middle is `chest_forward` to the front, the crown `head_forward`.
+DEFAULT_LENGTHS: dict[str, float] = {
+    "trunk": 0.318, "head": 0.147, "shoulder_half_width": 0.104, "shoulder_drop": 0.060, "hip_half_width": 0.060,
+    "upper_arm": 0.157, "forearm": 0.150, "hand": 0.085, "thigh": 0.245, "shank": 0.250, "ankle_height": 0.046, "foot": 0.105,
+    "chest_forward": 0.010, "head_forward": 0.020,
+}  # fmt: skip
+
+#: Table 6.1 of Canton (2009), which gives no widths (hips: ours; shoulders: so that the arms span about the height), no hand or foot.
+CANTON_LENGTHS: dict[str, float] = DEFAULT_LENGTHS | {
+    "shoulder_half_width": 0.098,
+    "trunk": 0.33, "head": 0.16, "upper_arm": 0.20, "forearm": 0.20, "hand": 0.0, "thigh": 0.26, "shank": 0.25,
+    "ankle_height": 0.0, "foot": 0.0, "chest_forward": 0.0, "head_forward": 0.0,
+}  # fmt: skip
+
+#: Factors on the radii of the flesh, one a group of parts.
+GIRTHS: tuple[str, ...] = ("torso", "depth", "head", "arms", "thighs", "shanks")
+
+_LANDMARK_SEGMENT = {
+    "pelvis": "pelvis", "neck": "head", "head_top": "head",
+    "l_shoulder": "l_upper_arm", "l_elbow": "l_forearm", "l_wrist": "l_forearm",
+    "r_shoulder": "r_upper_arm", "r_elbow": "r_forearm", "r_wrist": "r_forearm",
+    "l_hip": "l_thigh", "l_knee": "l_shank", "l_ankle": "l_shank",
+    "r_hip": "r_thigh", "r_knee": "r_shank", "r_ankle": "r_shank",
+}  # fmt: skip
+_SEGMENT_INDEX = {segment.name: index for index, segment in enumerate(SEGMENTS)}
+
+
+def landmark_segments() -> np.ndarray:
+    """Segment that carries each of the fifteen landmarks, shape (15,)."""
+    return np.array([_SEGMENT_INDEX[_LANDMARK_SEGMENT[name]] for name in LANDMARKS])
+
+
+def make_body(dimensions: dict[str, float], limits: JointLimits | None = None) -> BodyModel:
+    """The body of given dimensions.
+
+    Parameters
+    ----------
+    dimensions : dict
+        ``height`` (metres), the lengths of `DEFAULT_LENGTHS` (metres) and ``girth_<group>`` for each of `GIRTHS` (factors).
+    limits : JointLimits, optional
+        `default_limits` unless given.
+
+    Returns
+    -------
+    BodyModel
+
+    Raises
+    ------
+    InputError
+        When a dimension is missing, not finite or negative.
+    """
+    wanted = ["height", *DEFAULT_LENGTHS, *(f"girth_{group}" for group in GIRTHS)]
+    for name in wanted:
+        value = dimensions.get(name, np.nan)
+        if not np.isfinite(value) or value < 0:
+            raise InputError(f"body dimension '{name}' must be a number of at least 0; got {dimensions.get(name)}")
+    d = dimensions
+    offsets = np.zeros((len(SEGMENTS), 3))
+    tips = np.zeros((len(LANDMARKS), 3))
+
+    def put(name: str, offset) -> None:
+        offsets[_SEGMENT_INDEX[name]] = offset
+
+    put("head", (0, 0, d["trunk"]))
+    for side, sign in (("l", 1.0), ("r", -1.0)):
+        put(f"{side}_upper_arm", (0, sign * d["shoulder_half_width"], d["trunk"] - d["shoulder_drop"]))
+        put(f"{side}_forearm", (0, sign * d["upper_arm"], 0))
+        put(f"{side}_thigh", (0, sign * d["hip_half_width"], 0))
+        put(f"{side}_shank", (0, 0, -d["thigh"]))
+        tips[LANDMARKS.index(f"{side}_wrist")] = (0, sign * d["forearm"], 0)
+        tips[LANDMARKS.index(f"{side}_ankle")] = (0, 0, -d["shank"])
+    tips[LANDMARKS.index("head_top")] = (d["head_forward"], 0, d["head"])
+    return BodyModel(float(d["height"]), offsets, tips, _flesh(d), limits or default_limits(), {name: float(d[name]) for name in wanted})
+
+
+def default_body(height_m: float) -> BodyModel:
+    """A person of average proportions and joint-centre lengths.
+
+    Parameters
+    ----------
+    height_m : float
+        Stature, metres.
+    """
+    return make_body(_scaled(height_m, DEFAULT_LENGTHS), default_limits())
+
+
+def canton_body(height_m: float) -> BodyModel:
+    """The body of Canton (2009), Table 6.1: one length a part, the table's angular ranges.
+
+    Parameters
+    ----------
+    height_m : float
+        Stature, metres.
+    """
+    return make_body(_scaled(height_m, CANTON_LENGTHS), canton_limits())
+
+
+def stature(dimensions: Mapping[str, float]) -> float:
+    """The stature that a body's lengths from head to ankle speak for, metres.
+
+    The entry ``height`` is only the scale of a fitted body's flesh; its lengths have moved away from it.
+
+    Parameters
+    ----------
+    dimensions : mapping
+        As `make_body` takes them.
+    """
+    upright = ("trunk", "head", "thigh", "shank")
+    # Canton's lengths, which have no ankle, are of that table; he let them sum to the height.
+    table = DEFAULT_LENGTHS if dimensions["ankle_height"] > 0 else CANTON_LENGTHS
+    return float(sum(dimensions[name] for name in upright) / sum(table[name] for name in upright))
+
+
+def _scaled(height_m: float, lengths: dict[str, float]) -> dict[str, float]:
+    if not 0.3 < height_m < 3.0:
+        raise InputError(f"a height of {height_m:g} m is no person's; give the stature in metres")
+    return {"height": height_m} | {name: value * height_m for name, value in lengths.items()} | {f"girth_{g}": 1.0 for g in GIRTHS}
+
+
+def _flesh(d: dict[str, float]) -> Cones:
+    """Truncated cones around the segments. Radii are fractions of the stature for an average adult, times the girth factors."""
+    h = d["height"]
+    rows: list[tuple] = []
+
+    def cone(segment: str, part: str, start, end, radius_start, radius_end, across, girth: tuple[float, float]) -> None:
+        if np.linalg.norm(np.subtract(end, start)) < 1e-3:
+            return
+        radii = h * np.array([radius_start, radius_end]) * np.array(girth)
+        rows.append(
+            (_SEGMENT_INDEX[segment], PARTS.index(part), np.asarray(start, float), np.asarray(end, float), radii, np.asarray(across, float))
+        )
+
+    wide, deep, trunk = d["girth_torso"], d["girth_torso"] * d["girth_depth"], d["trunk"]
+    y = (0, 1, 0)
+    chest, ahead = d["chest_forward"], d["head_forward"]
+    waist = nape = 0.4 * chest
+    # [lateral, front to back] at both ends
+    cone("pelvis", "torso", (0, 0, -0.035 * h), (waist, 0, 0.15 * trunk), (0.090, 0.062), (0.086, 0.060), y, (wide, deep))
+    cone("torso", "torso", (waist, 0, 0.12 * trunk), (chest, 0, 0.48 * trunk), (0.084, 0.059), (0.082, 0.057), y, (wide, deep))
+    cone("torso", "torso", (chest, 0, 0.48 * trunk), (chest, 0, 0.82 * trunk), (0.084, 0.058), (0.096, 0.058), y, (wide, deep))
+    cone("torso", "torso", (chest, 0, 0.82 * trunk), (nape, 0, trunk), (0.096, 0.056), (0.042, 0.036), y, (wide, deep))
+    head, g = d["head"], (d["girth_head"], d["girth_head"])
+    skull = 0.01 * h + 0.6 * ahead
+    cone("head", "head", (nape, 0, -0.02 * h), (0.004 * h + 0.4 * ahead, 0, 0.28 * head), (0.034, 0.034), (0.034, 0.040), y, g)
+    cone("head", "head", (0.006 * h + 0.4 * ahead, 0, 0.22 * head), (skull, 0, 0.65 * head), (0.036, 0.046), (0.045, 0.057), y, g)
+    cone("head", "head", (skull, 0, 0.65 * head), (skull - 0.002 * h, 0, head), (0.045, 0.057), (0.026, 0.032), y, g)
+    x, arms = (1, 0, 0), (d["girth_arms"], d["girth_arms"])
+    thighs, shanks = (d["girth_thighs"],) * 2, (d["girth_shanks"],) * 2
+    for side, sign in (("r", -1.0), ("l", 1.0)):
+        upper, fore, hand = (sign * d[name] for name in ("upper_arm", "forearm", "hand"))
+        part = f"{side}_upper_arm"
+        cone(part, part, (0, -sign * 0.01 * h, 0), (0, upper, 0), (0.034, 0.034), (0.025, 0.025), x, arms)
+        part = f"{side}_forearm"
+        cone(part, part, (0, 0, 0), (0, fore, 0), (0.026, 0.026), (0.016, 0.016), x, arms)
+        cone(part, part, (0, fore, 0), (0, fore + hand, 0), (0.021, 0.015), (0.016, 0.010), x, arms)
+        part = f"{side}_thigh"
+        cone(part, part, (0, 0, 0.0), (0, 0, -d["thigh"]), (0.050, 0.050), (0.033, 0.033), x, thighs)
+        part, shank, ankle = f"{side}_shank", d["shank"], d["ankle_height"]
+        cone(part, part, (0, 0, 0), (-0.004 * h, 0, -0.4 * shank), (0.030, 0.032), (0.031, 0.033), y, shanks)
+        cone(part, part, (-0.004 * h, 0, -0.4 * shank), (0, 0, -shank - 0.3 * ankle), (0.031, 0.033), (0.020, 0.021), y, shanks)
+        sole = -shank - ankle + 0.024 * h  # the foot's axis at the heel: flesh reaches to the floor
+        foot = d["foot"]
+        if foot > 0:
+            cone(
+                part,
+                part,
+                (-0.032 * h, 0, sole),
+                (-0.032 * h + 1.35 * foot, 0, sole - 0.012 * h),
+                (0.020, 0.024),
+                (0.028, 0.012),
+                y,
+                (1.0, 1.0),
+            )
+    columns = list(zip(*rows, strict=True))
+    return Cones(
+        np.array(columns[0]), np.array(columns[1]), np.array(columns[2]), np.array(columns[3]), np.array(columns[4]), np.array(columns[5])
+    )

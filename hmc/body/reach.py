@@ -1,0 +1,102 @@
+"""A limb that reaches for a point, in closed form: two links, a ball joint and a hinge.
+
+The hinge's angle follows from the distance (law of cosines); the ball joint turns the limb's end towards the point; the
+swivel, by which elbow or knee turn about the line from joint to point, is free (Tolani, Goswami and Badler 2000).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hmc.body.joints import SEGMENTS, dof_index
+from hmc.body.kinematics import segment_transforms
+from hmc.body.model import BodyModel
+
+__all__ = ["limb_joint", "limb_lengths", "reach"]
+
+_BALLS = {"r_arm": "r_upper_arm", "l_arm": "l_upper_arm", "r_leg": "r_thigh", "l_leg": "l_thigh"}
+_INDEX = {limb: next(k for k, segment in enumerate(SEGMENTS) if segment.name == name) for limb, name in _BALLS.items()}
+
+
+def limb_lengths(body: BodyModel, limb: str) -> tuple[float, float]:
+    """Lengths of a limb's two links, metres: the lower one to the middle of the hand, or of the ankle's height."""
+    d = body.dimensions
+    if limb.endswith("arm"):
+        return d["upper_arm"], d["forearm"] + 0.5 * d["hand"]
+    return d["thigh"], d["shank"] + 0.5 * d["ankle_height"]
+
+
+def limb_joint(body: BodyModel, state: np.ndarray, limb: str) -> tuple[np.ndarray, np.ndarray]:
+    """Centre of the shoulder or hip, world, metres, shape (3,); rotation, world from the segment that carries it, shape (3, 3)."""
+    rotations, positions = segment_transforms(body, state[None])
+    return positions[0, _INDEX[limb]], rotations[0, SEGMENTS[_INDEX[limb]].parent]
+
+
+def reach(body: BodyModel, state: np.ndarray, limb: str, points: np.ndarray, swivels: np.ndarray) -> np.ndarray:
+    """Angles of one limb whose end reaches for points, the rest of the body being where it is.
+
+    Parameters
+    ----------
+    body : BodyModel
+    state : ndarray, shape (27,)
+    limb : {"r_arm", "l_arm", "r_leg", "l_leg"}
+    points : ndarray, shape (n, 3)
+        World, metres. A limb stretches towards a point that is too far.
+    swivels : ndarray, shape (n,)
+        Radians about the line from the joint to the point.
+
+    Returns
+    -------
+    ndarray, shape (n, 4)
+        The ball joint's x, y, z and the hinge's angle, within the body's limits: there the end may miss the point.
+    """
+    side, arm = limb[0], limb.endswith("arm")
+    upper, lower = limb_lengths(body, limb)
+    centre, carrier = limb_joint(body, state, limb)
+    aim = (points - centre) @ carrier
+    distance = np.clip(np.linalg.norm(aim, axis=1), abs(upper - lower) + 1e-6, upper + lower)
+    bend = np.arccos(np.clip((distance**2 - upper**2 - lower**2) / (2 * upper * lower), -1, 1))
+    zero = np.zeros_like(bend)
+    if arm:
+        sign = 1.0 if side == "l" else -1.0
+        hinge = -sign * bend
+        end = sign * np.stack([-lower * np.sin(hinge), upper + lower * np.cos(hinge), zero], axis=1)
+    else:
+        hinge = bend
+        end = -np.stack([lower * np.sin(hinge), zero, upper + lower * np.cos(hinge)], axis=1)
+    aim, end = (v / np.maximum(np.linalg.norm(v, axis=1, keepdims=True), 1e-9) for v in (aim, end))
+    turn = _about(aim, swivels) @ _between(end, aim)
+    ball, elbow = (f"{side}_shoulder", f"{side}_elbow_z") if arm else (f"{side}_hip", f"{side}_knee_y")
+    dofs = dof_index(*(f"{ball}_{axis}" for axis in "xyz"), elbow)
+    low, high = body.limits.low[dofs], body.limits.high[dofs]
+    both = np.concatenate([_angles(turn), np.repeat(hinge[None, :, None], 2, axis=0)], axis=-1)
+    clipped = np.clip(both, low, high)
+    better = np.abs(clipped - both).sum(-1).argmin(0)
+    return clipped[better, np.arange(len(points))]
+
+
+def _about(axes: np.ndarray, angles: np.ndarray) -> np.ndarray:
+    """Rotations about unit axes (n, 3) by angles (n,), shape (n, 3, 3): Rodrigues' formula."""
+    x, y, z = axes.T
+    zero = np.zeros_like(x)
+    cross = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(-1, 3, 3)
+    sin, cos = np.sin(angles)[:, None, None], np.cos(angles)[:, None, None]
+    return np.eye(3) + sin * cross + (1 - cos) * cross @ cross
+
+
+def _between(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Rotations that turn unit vectors (n, 3) into others: half a turn about the middle of the two, after half a turn about the first."""
+    middle = first + second
+    opposite = np.linalg.norm(middle, axis=1) < 1e-9
+    # Any perpendicular will do for opposite vectors.
+    middle[opposite] = np.cross(first[opposite], np.eye(3)[np.abs(first[opposite]).argmin(1)])
+    middle /= np.linalg.norm(middle, axis=1, keepdims=True)
+    half = np.full(len(first), np.pi)
+    return _about(middle, half) @ _about(first, half)
+
+
+def _angles(turn: np.ndarray) -> np.ndarray:
+    """Both triples of angles for which ``R_x R_y R_z`` is a rotation, shape (2, n, 3)."""
+    x, y, z = np.arctan2(-turn[:, 1, 2], turn[:, 2, 2]), np.arcsin(np.clip(turn[:, 0, 2], -1, 1)), np.arctan2(-turn[:, 0, 1], turn[:, 0, 0])
+    both = np.stack([np.stack([x, y, z], axis=-1), np.stack([x + np.pi, np.pi - y, z + np.pi], axis=-1)])
+    return (both + np.pi) % (2 * np.pi) - np.pi

@@ -1,0 +1,159 @@
+"""The body of superellipsoids on the skeleton of `hmc.body`: 24 degrees of freedom, a rigid trunk. Kehl (2006), section 5.1.
+
+States are those of `hmc.body.joints` with the waist held, so that what is found can be stored, drawn and measured as any other pose:
+6 for the trunk, 3 for each shoulder and hip, 1 for each elbow and knee, 2 for the neck.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from hmc.body.joints import DOF_NAMES, SEGMENTS
+from hmc.body.model import BodyModel
+from hmc.body.superellipsoids import Superellipsoids
+
+__all__ = ["CHAINS", "FREE", "FREE_NAMES", "GROUPS", "SolidBody", "solid_body", "to_world"]
+
+#: The 24 degrees of freedom, as places in a state of 27.
+FREE: np.ndarray = np.array([k for k, name in enumerate(DOF_NAMES) if not name.startswith("torso_")])
+FREE_NAMES: tuple[str, ...] = tuple(DOF_NAMES[k] for k in FREE)
+#: What samples are shared out among: the trunk and the five chains that hang on it.
+GROUPS: tuple[str, ...] = ("trunk", "head", "r_arm", "l_arm", "r_leg", "l_leg")
+_JOINTS = {
+    "head": ("neck",), "r_arm": ("r_shoulder", "r_elbow"), "l_arm": ("l_shoulder", "l_elbow"), "r_leg": ("r_hip", "r_knee"),
+    "l_leg": ("l_hip", "l_knee"),
+}  # fmt: skip
+#: Degrees of freedom of each chain, as places among the 24, in the order of `GROUPS` without the trunk.
+CHAINS: tuple[np.ndarray, ...] = tuple(
+    np.array([k for k, name in enumerate(FREE_NAMES) if name.rsplit("_", 1)[0] in _JOINTS[group]]) for group in GROUPS[1:]
+)
+_SEGMENT = {segment.name: k for k, segment in enumerate(SEGMENTS)}
+
+
+@dataclass(frozen=True)
+class SolidBody:
+    """A person's body of superellipsoids.
+
+    Parameters
+    ----------
+    skeleton : BodyModel
+        Joints, limits and landmarks.
+    solids : Superellipsoids
+    names : tuple of str
+        Of the solids.
+    segment : ndarray of int, shape (n,)
+        Segment that carries each solid.
+    group : ndarray of int, shape (n,)
+        Place in `GROUPS`.
+    has_edges : ndarray of bool, shape (n,)
+        Solids whose contours are looked for in images: the limbs' (section 7).
+    origin : ndarray, shape (n, 3)
+        Middle of the equator in the segment's frame, metres.
+    axes : ndarray, shape (n, 3, 3)
+        Columns: the solid's x, y, z in the segment's frame.
+    """
+
+    skeleton: BodyModel
+    solids: Superellipsoids
+    names: tuple[str, ...]
+    segment: np.ndarray
+    group: np.ndarray
+    has_edges: np.ndarray
+    origin: np.ndarray
+    axes: np.ndarray
+
+    @cached_property
+    def diameter(self) -> np.ndarray:
+        """Each solid's thickness, metres, in which distances are measured, shape (n,)."""
+        return 2 * self.solids.across.min(axis=1)
+
+
+def to_world(body: SolidBody, rotations: np.ndarray, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where the solids are.
+
+    Parameters
+    ----------
+    body : SolidBody
+    rotations, positions : ndarray, shapes (11, 3, 3) and (11, 3)
+        Of the segments, from `hmc.body.kinematics.joint_twists`.
+
+    Returns
+    -------
+    turns : ndarray, shape (n, 3, 3)
+        World from solid.
+    centres : ndarray, shape (n, 3)
+        World, metres.
+    """
+    carried = rotations[body.segment]
+    return carried @ body.axes, (carried @ body.origin[..., None])[..., 0] + positions[body.segment]
+
+
+# Of a limb's solid: its half-axis over its length, so that it has the given share of its thickness at the end.
+def _reach(share: float, eps1: float) -> float:
+    return (1 - share ** (2 / eps1)) ** (-eps1 / 2)
+
+
+def solid_body(skeleton: BodyModel) -> SolidBody:
+    """The solids around a skeleton, as thick as its girths say.
+
+    A limb is a truncated superellipsoid that tapers from its joint to the next, with a spherical cap at its joint. Hands are part of the
+    forearms. Trunk and head are two superellipsoids of different length each. The paper leaves feet out; here they are solids that the
+    shanks carry, for the hull has them.
+
+    Parameters
+    ----------
+    skeleton : BodyModel
+        As from `hmc.body.proportions.make_body`.
+    """
+    d, h = skeleton.dimensions, skeleton.dimensions["height"]
+    wide, deep = d["girth_torso"], d["girth_torso"] * d["girth_depth"]
+    trunk, chest, head = d["trunk"], d["chest_forward"], d["head"]
+    skull = 0.01 * h + 0.6 * d["head_forward"]
+    x, y, z = np.eye(3)
+    rows: list[tuple] = []
+
+    def solid(name, segment, group, edges, origin, axes, across, below, above, eps1, eps2=1.0) -> None:
+        rows.append(
+            (name, _SEGMENT[segment], GROUPS.index(group), edges, origin, np.stack(axes, axis=1), across, (below, above), eps1, eps2)
+        )
+
+    upright = (x, y, z)
+    solid(
+        "pelvis", "pelvis", "trunk", False, (0.3 * chest, 0, 0.05 * trunk), upright, (0.063 * h * deep, 0.092 * h * wide),
+        0.062 * h, 0.42 * trunk, (0.7, 0.6), 0.8,
+    )  # fmt: skip
+    solid(
+        "chest", "torso", "trunk", False, (chest, 0, 0.60 * trunk), upright, (0.059 * h * deep, 0.097 * h * wide),
+        0.42 * trunk, 0.40 * trunk, (0.7, 0.7), 0.8,
+    )  # fmt: skip
+    wide_head = 0.046 * h * d["girth_head"]
+    solid(
+        "head", "head", "head", False, (skull, 0, 0.56 * head), upright, (1.25 * wide_head, wide_head), 0.62 * head, 0.45 * head, (1.0, 0.9)
+    )
+    for side, sign in (("r", -1.0), ("l", 1.0)):
+        outwards, down, ahead = (-x, sign * z, sign * y), (x, -y, -z), (-z, y, x)
+        radius = 0.035 * h * d["girth_arms"]
+        name = f"{side}_upper_arm"
+        solid(name, name, f"{side}_arm", True, (0, 0, 0), outwards, (radius,) * 2, radius, d["upper_arm"] * _reach(0.75, 0.5), (1.0, 0.5))
+        radius = 0.027 * h * d["girth_arms"]
+        name = f"{side}_forearm"
+        solid(name, name, f"{side}_arm", True, (0, 0, 0), outwards, (radius,) * 2, radius, d["forearm"] + d["hand"], (1.0, 0.8))
+        radius = 0.050 * h * d["girth_thighs"]
+        name = f"{side}_thigh"
+        solid(name, name, f"{side}_leg", True, (0, 0, 0), down, (radius,) * 2, radius, d["thigh"] * _reach(0.68, 0.6), (1.0, 0.6))
+        radius = 0.033 * h * d["girth_shanks"]
+        shank = d["shank"] + 0.3 * d["ankle_height"]
+        name = f"{side}_shank"
+        solid(name, name, f"{side}_leg", True, (-0.003 * h, 0, 0), down, (radius,) * 2, radius, shank * _reach(0.6, 0.7), (1.0, 0.7))
+        if d["foot"] > 0:
+            sole = (0, 0, -d["shank"] - d["ankle_height"] + 0.022 * h)
+            across = (0.021 * h, 0.027 * h)
+            solid(f"{side}_foot", name, f"{side}_leg", False, sole, ahead, across, 0.032 * h, 1.05 * d["foot"], (0.9, 0.7))
+    names, segment, group, edges, origin, axes, across, along, eps1, eps2 = zip(*rows, strict=True)
+    solids = Superellipsoids(np.array(across, float), np.array(along, float), np.array(eps1, float), np.array(eps2, float))
+    return SolidBody(
+        skeleton, solids, tuple(names), np.array(segment), np.array(group), np.array(edges), np.array(origin, float), np.array(axes, float)
+    )

@@ -1,0 +1,1 @@
+"""What experiments are computed with: cells, stores, sweeps, clusters, reports."""

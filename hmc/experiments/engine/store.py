@@ -1,0 +1,112 @@
+"""Where computed cells are kept: one file a cell, named by a hash of its parameters.
+
+A file appears under its name only when it is whole, so a run that is killed loses the cells in flight and no other. The name depends on
+the parameters alone, so what several machines computed is merged by copying their files into one folder.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hmc.errors import InputError
+from hmc.experiments.engine.experiment import Cell, Experiment
+from hmc.io.files import atomic_write
+
+__all__ = ["cell_key", "cell_path", "cell_rng", "cell_text", "digest", "read_cell", "write_cell", "write_text"]
+
+
+def digest(value: Any, length: int = 24) -> str:
+    """A name for plain values: hexadecimal digits that depend on the values alone, not on the order of keys nor on the machine."""
+    return hashlib.sha256(_canonical(value).encode()).hexdigest()[:length]
+
+
+def cell_key(experiment: Experiment, parameters: Mapping[str, Any]) -> str:
+    """The name of a cell, shape of 24 hexadecimal digits.
+
+    Raises
+    ------
+    InputError
+        When a parameter is no plain value.
+    """
+    return digest([experiment.store_name, experiment.version, dict(parameters)])
+
+
+def cell_rng(key: str) -> np.random.Generator:
+    """The random numbers of a cell: the same on every machine, whoever computes it and when."""
+    return np.random.default_rng(np.random.SeedSequence(int(key, 16)))
+
+
+def cell_path(out: Path, experiment: Experiment, key: str) -> Path:
+    """Where a cell is or will be."""
+    return out / "cells" / experiment.store_name / f"{key}.json"
+
+
+def cell_text(parameters: Mapping[str, Any], results: Mapping[str, Any]) -> str:
+    """What the file of a cell holds; numbers keep their full precision.
+
+    Raises
+    ------
+    InputError
+        When a result is no plain value.
+    """
+    return _canonical({"parameters": dict(parameters), "results": dict(results)}, indent=1) + "\n"
+
+
+def write_cell(path: Path, parameters: Mapping[str, Any], results: Mapping[str, Any]) -> None:
+    """Store a cell.
+
+    Raises
+    ------
+    InputError
+        When a result is no plain value, or the file cannot be written.
+    """
+    write_text(path, cell_text(parameters, results))
+
+
+def write_text(path: Path, text: str) -> None:
+    """Store a cell's text, which appears when it is whole.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be written.
+    """
+    with atomic_write(path) as file:
+        file.write(text)
+
+
+def read_cell(path: Path) -> Cell | None:
+    """A stored cell; None where there is none.
+
+    Raises
+    ------
+    InputError
+        When the file is damaged.
+    """
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        return Cell(content["parameters"], content["results"])
+    except FileNotFoundError:
+        return None
+    except (ValueError, KeyError, TypeError, OSError) as error:
+        raise InputError(f"{path}: not a cell of an experiment ({error}); delete the file to compute it again") from error
+
+
+def _canonical(value: Any, indent: int | None = None) -> str:
+    try:
+        separators = (",", ":") if indent is None else None
+        return json.dumps(value, sort_keys=True, default=_plain, indent=indent, separators=separators)
+    except TypeError as error:
+        raise InputError(f"cells hold plain values only: {error}") from error
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    raise TypeError(f"{type(value).__name__} is none")

@@ -1,0 +1,208 @@
+"""Computing the cells of experiments: what is stored is not computed again, and many processes share the rest.
+
+joblib spreads the work over one machine: it comes with scikit-learn, so it is one dependency less than any other pool that survives a dead
+worker. Its workers store each cell themselves, as soon as it is done; nothing is lost with the parent. Dask spreads it over many machines
+(`hmc.experiments.engine.cluster`). Neither the number of workers nor the order in which cells are computed changes a result, because random
+numbers follow from a cell's own parameters.
+"""
+
+from __future__ import annotations
+
+import functools
+import os
+import threading
+import time
+import traceback
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from hmc.errors import InputError
+from hmc.experiments.engine.cluster import spread
+from hmc.experiments.engine.experiment import Cell, Experiment, Plan, Report
+from hmc.experiments.engine.inputs import Inputs, source_of
+from hmc.experiments.engine.library import find_experiment
+from hmc.experiments.engine.store import cell_key, cell_path, cell_rng, cell_text, read_cell, write_text
+
+__all__ = ["Outcome", "compute_cells", "plan_for", "plan_of", "run_experiment", "stored_cells"]
+
+Progress = Callable[[int, int], None]
+
+#: How often a worker looks whether its parent is still there, seconds.
+LOOK_S = 1.0
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of an experiment.
+
+    Attributes
+    ----------
+    report : Report or None
+        None where cells failed.
+    computed, found : int
+        Cells computed in this run, and cells that were there.
+    failures : tuple of str
+        One text for every cell that raised: its parameters and the error.
+    """
+
+    report: Report | None
+    computed: int
+    found: int
+    failures: tuple[str, ...] = ()
+
+
+def plan_of(quick: bool = False, recordings: list[Path] | None = None) -> Plan:
+    """A plan, with the user's recordings checked.
+
+    Raises
+    ------
+    InputError
+        When a folder is no recording.
+    """
+    return Plan(quick, tuple(source_of(folder) for folder in recordings or []))
+
+
+def plan_for(experiment: Experiment, plan: Plan) -> Plan:
+    """The plan, without the user's recordings where the experiment is computed on none and they would change nothing."""
+    bare = replace(plan, recordings=())
+    return bare if plan.recordings and experiment.grid(bare) == experiment.grid(plan) else plan
+
+
+def run_experiment(
+    name: str,
+    out: Path,
+    plan: Plan | None = None,
+    workers: int = 1,
+    again: bool = False,
+    on_progress: Progress | None = None,
+    scheduler: str | None = None,
+) -> Outcome:
+    """Compute what is missing of an experiment's cells, and report on all.
+
+    Parameters
+    ----------
+    name : str
+        As for `find_experiment`.
+    out : path
+        Folder of cells, inputs and reports.
+    plan : Plan, optional
+    workers : int
+        Processes.
+    again : bool
+        Compute stored cells anew.
+    on_progress : callable, optional
+        ``on_progress(done, total)``, once at the start and once a cell.
+    scheduler : str, optional
+        Address of a Dask scheduler whose workers compute, in place of processes of this machine.
+
+    Returns
+    -------
+    Outcome
+
+    Raises
+    ------
+    InputError
+        When there is no such experiment, a recording is not what the experiment needs, or nothing can be written.
+    """
+    experiment, plan = find_experiment(name), plan or Plan()
+    grid = experiment.grid(plan)
+    missing = grid if again else [p for p, cell in zip(grid, stored_cells(experiment, out, grid), strict=True) if cell is None]
+    failures = []
+    done = len(grid) - len(missing)
+    if on_progress:
+        on_progress(done, len(grid))
+    folders = {source.label: source.folder for source in plan.recordings if source.folder is not None}
+    for failure in compute_cells(name, out, missing, folders, workers, scheduler):
+        done += 1
+        if failure:
+            failures.append(failure)
+        if on_progress:
+            on_progress(done, len(grid))
+    found = len(grid) - len(missing)
+    if failures:
+        return Outcome(None, len(missing) - len(failures), found, tuple(failures))
+    cells = [cell for cell in stored_cells(experiment, out, grid) if cell is not None]
+    if len(cells) < len(grid):
+        raise InputError(f"{out}: cells vanished while the experiment ran; start it again")
+    return Outcome(experiment.report(cells, plan), len(missing), found)
+
+
+def stored_cells(experiment: Experiment, out: Path, grid: list[dict[str, Any]]) -> list[Cell | None]:
+    """The stored cells of a grid, in its order; None for one that is not computed yet."""
+    return [read_cell(cell_path(out, experiment, cell_key(experiment, parameters))) for parameters in grid]
+
+
+def compute_cells(
+    name: str, out: Path, missing: list[dict[str, Any]], folders: Mapping[str, Path], workers: int = 1, scheduler: str | None = None
+) -> Iterator[str]:
+    """Compute and store cells, in any order; yields an empty string for each, or what went wrong. Arguments as `run_experiment`.
+
+    Raises
+    ------
+    InputError
+        What a cell raised that concerns the user: the rest would meet the same.
+    """
+    if scheduler is not None:
+        name = str(Path(name).resolve()) if name.endswith(".py") else name  # workers have folders of their own
+        yield from spread(functools.partial(_compute_cell, name, out.resolve(), dict(folders)), missing, scheduler)
+        return
+    task = functools.partial(_compute_and_store, name, out, dict(folders))
+    if workers <= 1 or len(missing) <= 1:
+        yield from map(task, missing)
+        return
+    task = functools.partial(_work, os.getpid(), task)
+    from joblib import Parallel, delayed
+
+    yield from Parallel(n_jobs=workers, batch_size=1, pre_dispatch="2*n_jobs", return_as="generator_unordered")(
+        delayed(task)(parameters) for parameters in missing
+    )
+
+
+def _work(parent: int, task: Callable[[dict[str, Any]], str], parameters: dict[str, Any]) -> str:
+    """A task in a worker."""
+    _end_with(parent)
+    return task(parameters)
+
+
+@functools.cache
+def _end_with(parent: int) -> None:
+    """Let this process end when its parent does: a parent that is killed cannot end its workers, and they would compute on."""
+    if os.getpid() == parent:
+        return  # joblib found no way to start workers
+
+    def look() -> None:
+        while os.getppid() == parent:
+            time.sleep(LOOK_S)
+        os._exit(1)
+
+    threading.Thread(target=look, daemon=True).start()
+
+
+def _compute_and_store(name: str, out: Path, folders: dict[str, Path], parameters: dict[str, Any]) -> str:
+    path, text, failure = _compute_cell(name, out, folders, parameters)
+    if text:
+        write_text(path, text)
+    return failure
+
+
+def _compute_cell(name: str, out: Path, folders: dict[str, Path], parameters: dict[str, Any]) -> tuple[Path, str, str]:
+    """A cell's file, its text, and what went wrong; the last two exclude each other."""
+    import cv2
+    from threadpoolctl import threadpool_limits
+
+    # One thread each: the processes share the cores, and sums do not depend on how threads divide them.
+    cv2.setNumThreads(1)
+    experiment = find_experiment(name)
+    key = cell_key(experiment, parameters)
+    path = cell_path(out, experiment, key)
+    try:
+        with threadpool_limits(1):
+            results = experiment.cell(parameters, Inputs(out / "inputs", folders), cell_rng(key))
+        return path, cell_text(parameters, results), ""
+    except InputError:
+        raise
+    except Exception:
+        # One cell that fails must not cost a night's sweep: it is told at the end and is missing until the next run.
+        return path, "", f"{experiment.id} {parameters}\n{traceback.format_exc()}"

@@ -1,0 +1,1 @@
+"""Everything that touches a disk: recordings, calibrations, results, journals, tables."""

@@ -1,0 +1,99 @@
+"""The Anipose / Pose2Sim calibration file: TOML, one table a camera, metres, world to camera."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from hmc.camera.model import Camera
+from hmc.errors import InputError
+from hmc.io.calibration.entry import CalibrationEntry, natural_key
+
+__all__ = ["read_toml", "write_calibration"]
+
+KEYS = ("size", "matrix", "distortions", "rotation", "translation")
+
+
+def read_toml(path: Path) -> list[CalibrationEntry]:
+    """Read a calibration TOML.
+
+    Tables without a `matrix` (such as ``[metadata]``) are passed over; so are keys that are not needed. Cameras come in the
+    natural order of their tables' names.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    list of CalibrationEntry
+
+    Raises
+    ------
+    InputError
+        When the file is no TOML, a key is missing or not numbers, or a camera is a fisheye camera.
+    """
+    try:
+        tables = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: not a TOML file ({error}); mend or remove it") from None
+    return [
+        _entry(path, label, table)
+        for label, table in sorted(tables.items(), key=lambda item: natural_key(item[0]))
+        if isinstance(table, dict) and not table.keys().isdisjoint(("matrix", "rotation", "translation"))
+    ]
+
+
+def _entry(path: Path, label: str, table: dict) -> CalibrationEntry:
+    missing = [key for key in KEYS if key not in table]
+    if missing:
+        raise InputError(f"{path}: [{label}] has no `{missing[0]}`; each camera needs {', '.join(KEYS)}")
+    if table.get("fisheye"):
+        raise InputError(
+            f"{path}: [{label}] is a fisheye camera, which is not supported; undistort its videos, or calibrate it with k1, k2, p1, p2"
+        )
+    arrays = {}
+    for key in KEYS:
+        try:
+            arrays[key] = np.array(table[key], float)
+        except (ValueError, TypeError):
+            raise InputError(f"{path}: [{label}] `{key}` must be numbers; got {table[key]!r}") from None
+    size = arrays["size"]
+    if size.shape != (2,) or not np.all(np.isfinite(size)):
+        raise InputError(f"{path}: [{label}] `size` must be [width, height] in pixels; got {table['size']!r}")
+    width, height = (round(float(n)) for n in size)
+    name = str(table.get("name", label))
+    return CalibrationEntry(name, (width, height), arrays["matrix"], arrays["distortions"], arrays["rotation"], arrays["translation"])
+
+
+def write_calibration(path: str | Path, rig: Iterable[Camera]) -> None:
+    """Write a rig as a calibration TOML that `read_calibration` reads back to within rounding.
+
+    Parameters
+    ----------
+    path : str or Path
+    rig : Rig or iterable of Camera
+    """
+    blocks = []
+    for camera in rig:
+        distortions = camera.distortions if camera.distortions[4] else camera.distortions[:4]
+        rows = ", ".join(_numbers(row) for row in camera.matrix)
+        blocks.append(
+            f"[{camera.name}]\n"
+            f'name = "{camera.name}"\n'
+            f"size = [{camera.size[0]}, {camera.size[1]}]\n"
+            f"matrix = [{rows}]\n"
+            f"distortions = {_numbers(distortions)}\n"
+            f"rotation = {_numbers(Rotation.from_matrix(camera.rotation).as_rotvec())}\n"
+            f"translation = {_numbers(camera.translation)}\n"
+            f"fisheye = false\n"
+        )
+    Path(path).write_text("\n".join(blocks), encoding="utf-8")
+
+
+def _numbers(values: np.ndarray) -> str:
+    return "[" + ", ".join(repr(float(value)) for value in values) + "]"

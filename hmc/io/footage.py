@@ -1,0 +1,280 @@
+"""Videos and folders of numbered images behind one interface: how many frames, how large, and the frames in order.
+
+Frames stream: a reader holds one decoder and one image. A frame that cannot be read is None, never an exception.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from hmc.errors import InputError
+from hmc.io.calibration import natural_key
+
+__all__ = ["IMAGE_SUFFIXES", "VIDEO_SUFFIXES", "Footage", "find_footage", "open_images", "open_video", "read_footage", "starting_at"]
+
+VIDEO_SUFFIXES = frozenset({".mp4", ".avi", ".mov", ".mkv", ".m4v", ".mpg", ".mpeg", ".webm", ".wmv", ".mts", ".ts", ".h264"})
+IMAGE_SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp", ".pgm", ".ppm"})
+
+#: A video is over when this many frames in a row cannot be decoded.
+MAX_FAILURES = 25
+
+
+@dataclass(frozen=True)
+class Footage:
+    """The frames of one camera.
+
+    Parameters
+    ----------
+    path : Path
+        The video, or the folder (or single file) of images.
+    n_frames : int
+        One past the last frame.
+    size : tuple of int
+        (width, height) in pixels.
+    images : dict from frame to Path, or None
+        None for a video. Frames may be missing.
+    fps : float or None
+        As the video's header says.
+    notes : tuple of str
+        What was odd when it was opened.
+    skipped : int
+        Frames of the file before frame 0, of a camera that began before the others.
+    """
+
+    path: Path
+    n_frames: int
+    size: tuple[int, int]
+    images: dict[int, Path] | None = None
+    fps: float | None = None
+    notes: tuple[str, ...] = ()
+    skipped: int = 0
+
+
+def find_footage(folder: Path, name: str, first_number: int | None = None, count: bool = True) -> Footage | None:
+    """The footage of camera ``name`` in a folder: ``name.mp4`` (any common suffix), ``name/*.png`` or a single ``name.png``.
+
+    Parameters
+    ----------
+    folder : Path
+    name : str
+    first_number : int, optional
+        See `open_images`.
+    count : bool
+        See `open_video`.
+
+    Returns
+    -------
+    Footage or None
+        None when there is none.
+
+    Raises
+    ------
+    InputError
+        When it is there but cannot be read.
+    """
+    if not folder.is_dir():
+        return None
+    if (folder / name).is_dir():
+        return open_images(folder / name, first_number)
+    for path in sorted(folder.iterdir()):
+        if path.stem == name and path.suffix.lower() in VIDEO_SUFFIXES:
+            return open_video(path, count)
+        if path.stem == name and path.suffix.lower() in IMAGE_SUFFIXES:
+            return _footage_of_images(path, {0: path})
+    return None
+
+
+def open_video(path: Path, count: bool = True) -> Footage:
+    """Look a video over: size, rate and a frame count that can be believed.
+
+    The header's count is taken when the last frame it promises is there and none follows; otherwise the frames are counted one by one.
+
+    Parameters
+    ----------
+    path : Path
+    count : bool
+        If False, believe the header, which is quicker.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be opened or holds no frame.
+    """
+    capture = cv2.VideoCapture(str(path))
+    try:
+        image = capture.read()[1] if capture.isOpened() else None
+        if image is None:
+            raise InputError(f"{path}: this video cannot be read (empty, cut off or of an unknown codec); copy or convert it again")
+        stated = int(capture.get(cv2.CAP_PROP_FRAME_COUNT))
+        fps = capture.get(cv2.CAP_PROP_FPS)
+        if stated == 1 or not count:
+            believed = stated > 0 and (not count or not capture.grab())
+        else:
+            believed = stated > 1 and capture.set(cv2.CAP_PROP_POS_FRAMES, stated - 1) and capture.grab() and not capture.grab()
+    finally:
+        capture.release()
+    n_frames = stated if believed else _count(path)
+    notes = (f"{path.name}: its header promises {stated} frames, {n_frames} can be read (cut off?)",) if stated > n_frames else ()
+    return Footage(path, n_frames, (image.shape[1], image.shape[0]), fps=fps if 0 < fps < 1e4 else None, notes=notes)
+
+
+def _count(path: Path) -> int:
+    capture = cv2.VideoCapture(str(path))
+    try:
+        return max(_grab(capture), default=-1) + 1
+    finally:
+        capture.release()
+
+
+def _grab(capture: cv2.VideoCapture) -> Iterator[int]:
+    """Grab frame after frame and give the index of each.
+
+    Frames are counted, as every container allows, until one cannot be decoded. A decoder loses some frames there without a word, so
+    from then on time stamps tell which frame it is.
+    """
+    fps = capture.get(cv2.CAP_PROP_FPS)
+    index, shift, failures, damaged = -1, 0.0, 0, False
+    while failures < MAX_FAILURES:
+        if not capture.grab():
+            failures, damaged = failures + 1, True
+            continue
+        failures = 0
+        stamp = capture.get(cv2.CAP_PROP_POS_MSEC) * fps / 1000
+        if damaged:
+            index = max(index + 1, round(stamp + shift))
+        else:
+            index += 1
+            shift = index - stamp
+        yield index
+
+
+def open_images(folder: Path, first_number: int | None = None) -> Footage:
+    """Look a folder of images over. The last number in a file's name is its frame; without numbers, the natural order counts.
+
+    Parameters
+    ----------
+    folder : Path
+    first_number : int, optional
+        The number that frame 0 bears; by default 0. The recording's smallest over all cameras is meant.
+
+    Raises
+    ------
+    InputError
+        When the folder has no image or the first one cannot be read.
+    """
+    return _footage_of_images(folder, number_images(folder), first_number or 0)
+
+
+def number_images(folder: Path) -> dict[int, Path]:
+    """The images of a folder by the number in their names (or their place in the natural order), before any shift."""
+    files = sorted((path for path in folder.iterdir() if path.suffix.lower() in IMAGE_SUFFIXES), key=lambda path: natural_key(path.name))
+    numbers = [re.findall(r"\d+", path.stem) for path in files]
+    by_number = {int(found[-1]): path for found, path in zip(numbers, files, strict=True) if found}
+    return by_number if len(by_number) == len(files) else dict(enumerate(files))
+
+
+def _footage_of_images(path: Path, images: dict[int, Path], first_number: int = 0) -> Footage:
+    images = {number - first_number: file for number, file in images.items() if number >= first_number}
+    if not images:
+        raise InputError(f"{path}: no image in this folder ({', '.join(sorted(IMAGE_SUFFIXES))}); fill or remove it")
+    for file in images.values():
+        image = cv2.imread(str(file), cv2.IMREAD_COLOR)
+        if image is not None:
+            return Footage(path, max(images) + 1, (image.shape[1], image.shape[0]), images)
+    raise InputError(f"{path}: none of its {len(images)} images can be read; copy or convert them again")
+
+
+def starting_at(footage: Footage, first: int) -> Footage:
+    """The footage without its first frames: `first` becomes frame 0.
+
+    Raises
+    ------
+    InputError
+        When it has no frame from there on.
+    """
+    if first >= footage.n_frames:
+        raise InputError(
+            f"{footage.path}: has {footage.n_frames} frames, but `first_frame` of recording.toml says that it begins with {first}"
+        )
+    images = None if footage.images is None else {number - first: file for number, file in footage.images.items() if number >= first}
+    return replace(footage, n_frames=footage.n_frames - first, images=images, skipped=footage.skipped + first)
+
+
+def read_footage(footage: Footage, first: int, last: int, on_problem: Callable[[str], None], label: str) -> Iterator[np.ndarray | None]:
+    """Frames ``first`` to ``last`` (not included) of one camera, in order.
+
+    Parameters
+    ----------
+    footage : Footage
+    first, last : int
+    on_problem : callable
+        Called with one line for each thing that went wrong.
+    label : str
+        What the lines call this footage.
+
+    Yields
+    ------
+    ndarray, shape (h, w, 3), uint8 BGR, or None
+        None where the frame is missing, unreadable or of another size.
+    """
+    images = footage.images
+    skipped = footage.skipped
+    frames = _read_video(footage, first + skipped, last + skipped) if images is None else _read_images(images, first, last)
+    lost: list[int] = []
+
+    def say_lost() -> None:
+        if lost:
+            on_problem(f"{label}: {_frames(lost)} cannot be read; left out")
+            lost.clear()
+
+    try:
+        for index, image in enumerate(frames, first):
+            if image is not None and image.shape[1::-1] != footage.size:
+                on_problem(
+                    f"{label}: frame {index} is {image.shape[1]} x {image.shape[0]} and not {footage.size[0]} x {footage.size[1]}; left out"
+                )
+                image = None
+            elif image is None and index < footage.n_frames and (images is None or index in images):
+                lost.append(index)
+            # Who knows how many frames there are asks for no more after the last.
+            if image is not None or index + 1 == last:
+                say_lost()
+            yield image
+    finally:
+        say_lost()
+
+
+def _frames(indices: list[int]) -> str:
+    return f"frame {indices[0]}" if len(indices) == 1 else f"frames {indices[0]} to {indices[-1]}"
+
+
+def _read_video(footage: Footage, first: int, last: int) -> Iterator[np.ndarray | None]:
+    capture = cv2.VideoCapture(str(footage.path))
+    try:
+        # Grabbing up to the first frame is slower than seeking, but exact for every codec and container.
+        due = first
+        for index in _grab(capture) if last > first else ():
+            if index < first:
+                continue
+            for _ in range(due, min(index, last)):
+                yield None
+            if index < last:
+                yield capture.retrieve()[1]
+            due = index + 1
+            if due >= last:
+                return
+        for _ in range(due, last):
+            yield None
+    finally:
+        capture.release()
+
+
+def _read_images(images: dict[int, Path], first: int, last: int) -> Iterator[np.ndarray | None]:
+    for index in range(first, last):
+        yield cv2.imread(str(images[index]), cv2.IMREAD_COLOR) if index in images else None

@@ -1,0 +1,384 @@
+"""A calibrated multi-camera recording on disk, read frame by frame.
+
+The form on disk is that of the Recording page of the documentation: ``calibration.toml`` (or another calibration format, see
+`hmc.io.calibration`), ``videos/`` or ``images/``, and optionally ``silhouettes/``, ``background/``, ``recording.toml`` and ``truth/``.
+Units are metres, Z is up and the floor is at z = 0.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from hmc.camera.coverage import estimate_room
+from hmc.camera.model import Rig
+from hmc.errors import InputError
+from hmc.io.calibration import build_camera, read_entries
+from hmc.io.footage import Footage, find_footage, number_images, read_footage, starting_at
+from hmc.io.settings import read_settings
+
+__all__ = ["Frame", "Recording", "background_frames", "iterate_frames", "open_recording"]
+
+logger = logging.getLogger("hmc")
+
+DEFAULT_FPS = 30.0
+#: Cameras are no further than this (median, metres) from the world's origin: beyond, the calibration is in millimetres.
+MAX_CAMERA_DISTANCE_M = 150.0
+#: Silhouettes from files that lose detail are cut at the middle; from others, anything but black counts.
+LOSSY_SUFFIXES = frozenset({".jpg", ".jpeg", ".webp"})
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """One moment of a recording, one entry a camera; None where that camera has no image.
+
+    ``index`` counts from the start of the recording, whatever part is read. ``images`` are (h, w, 3) uint8 BGR, ``silhouettes``
+    (h, w) bool; ``silhouettes`` as a whole is None where the recording has none.
+    """
+
+    index: int
+    images: tuple[np.ndarray | None, ...]
+    silhouettes: tuple[np.ndarray | None, ...] | None
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """A recording that has been opened and checked; `iterate_frames` reads it.
+
+    Parameters
+    ----------
+    path : Path
+        Its folder.
+    name : str
+    fps : float
+        Frames a second: of recording.toml, else of the first video, else 30.
+    rig : Rig
+        The selected cameras.
+    room : ndarray, shape (2, 3)
+        Lower and upper corner, metres: of recording.toml, else estimated from the rig (`estimate_room`).
+    n_frames : int
+        Frames in the selection.
+    start : int
+        First frame of the selection, counted from the start of the recording.
+    persons : int or None
+    subject_height_m : tuple of float
+        Statures that are known beforehand; may be empty.
+    room_is_estimated : bool
+    problems : tuple of str
+        What was odd but could be lived with, one line each.
+    """
+
+    path: Path
+    name: str
+    fps: float
+    rig: Rig
+    room: np.ndarray
+    n_frames: int
+    start: int
+    persons: int | None
+    subject_height_m: tuple[float, ...]
+    room_is_estimated: bool = False
+    problems: tuple[str, ...] = ()
+    _footage: tuple[Footage | None, ...] = field(default=(), repr=False)
+    _silhouettes: tuple[Footage | None, ...] = field(default=(), repr=False)
+    _background: tuple[Footage | None, ...] = field(default=(), repr=False)
+
+    @property
+    def has_images(self) -> bool:
+        """Whether any camera has images (else there are only silhouettes)."""
+        return any(footage is not None for footage in self._footage)
+
+    @property
+    def has_silhouettes(self) -> bool:
+        """Whether ready-made silhouettes are there for any camera."""
+        return any(footage is not None for footage in self._silhouettes)
+
+    @property
+    def n_background_frames(self) -> tuple[int, ...]:
+        """Frames of the empty scene, per camera."""
+        return tuple(0 if footage is None else footage.n_frames for footage in self._background)
+
+
+def open_recording(path: str | Path, cameras: Sequence[str] | None = None, start: int = 0, frames: int | None = None) -> Recording:
+    """Open a recording or a part of it.
+
+    The recording is as long as at least two of its cameras last (the one, if there is one); a camera that ends sooner is None from there
+    on. Where there are no images, the silhouettes count.
+
+    Parameters
+    ----------
+    path : str or Path
+        Folder of the recording.
+    cameras : sequence of str, optional
+        Names of the cameras to use, in this order; by default all.
+    start : int
+        First frame.
+    frames : int, optional
+        At most this many frames; by default all that follow.
+
+    Returns
+    -------
+    Recording
+
+    Raises
+    ------
+    InputError
+        When something essential is missing or wrong; the message says which file and what to do.
+    """
+    path = Path(path)
+    if not path.is_dir():
+        raise InputError(f"{path}: no such folder; a recording is a folder with calibration.toml and videos/ or images/")
+    settings = read_settings(path)
+    entries = read_entries(path)
+    everyone = [entry.name for entry in entries]
+    if cameras is not None:
+        cameras = [cameras] if isinstance(cameras, str) else cameras
+        by_name = {entry.name: entry for entry in entries}
+        unknown = [name for name in cameras if name not in by_name]
+        if unknown or not cameras:
+            raise InputError(f"{path}: no camera named '{', '.join(unknown)}' in the calibration; it has {', '.join(by_name)}")
+        entries = [by_name[name] for name in cameras]
+    names = [entry.name for entry in entries]
+    starts = settings.get("first_frame", {})
+    strangers = [name for name in starts if name not in everyone]
+    if strangers:
+        raise InputError(
+            f"{path / 'recording.toml'}: `first_frame` names '{strangers[0]}', no camera of the calibration ({', '.join(everyone)})"
+        )
+    footage, silhouettes = find_views(path, names, everyone, starts=starts)
+    both = [image or mask for image, mask in zip(footage, silhouettes, strict=True)]
+    sizes = {name: view.size for name, view in zip(names, both, strict=True) if view is not None}
+    try:
+        rig = Rig(tuple(build_camera(entry, sizes) for entry in entries))
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    for problem in (*missing_views(path, names, both), *wrong_sizes(rig, footage), *wrong_sizes(rig, silhouettes), *wrong_units(rig)):
+        raise InputError(problem)
+
+    lengths = {view.path.name: view.n_frames for view in both if view is not None}
+    total = common_length(list(lengths.values()))
+    problems = [*gaps(footage), *(note for view in (*footage, *silhouettes) if view is not None for note in view.notes)]
+    if len(set(lengths.values())) > 1:
+        problems.append(
+            f"{path}: cameras differ in length ({', '.join(f'{name} {n}' for name, n in lengths.items())}); {total} frames are used"
+        )
+    stated = settings.get("frames")
+    if stated is not None and stated > total:
+        problems.append(f"{path / 'recording.toml'}: says {stated} frames, but there are {total}")
+    total = min(total, stated or total)
+    if start < 0 or start >= total or (frames is not None and frames < 1):
+        raise InputError(
+            f"{path}: nothing to read from frame {start} on ({'all' if frames is None else frames} frames); it has {total} frames, "
+            f"0 to {total - 1}: choose other --start and --frames"
+        )
+
+    background = _find_background(path, rig, problems)
+    fps = settings.get("fps") or next((view.fps for view in footage if view is not None and view.fps), DEFAULT_FPS)
+    room = settings.get("room")
+    return Recording(
+        path=path,
+        name=settings.get("name", path.resolve().name),
+        fps=float(fps),
+        rig=rig,
+        room=estimate_room(rig) if room is None else room,
+        n_frames=min(total - start, frames or total),
+        start=start,
+        persons=settings.get("persons"),
+        subject_height_m=settings.get("subject_height_m", ()),
+        room_is_estimated=room is None,
+        problems=tuple(problems),
+        _footage=tuple(footage),
+        _silhouettes=tuple(silhouettes),
+        _background=tuple(background),
+    )
+
+
+def iterate_frames(
+    recording: Recording, first: int | None = None, last: int | None = None, on_problem: Callable[[str], None] | None = None
+) -> Iterator[Frame]:
+    """Read the selected frames in order; memory does not grow with their number.
+
+    Parameters
+    ----------
+    recording : Recording
+    first, last : int, optional
+        A part of the selection, counted from the start of the recording; ``last`` is not included.
+    on_problem : callable, optional
+        Called with one line for everything that was survived: an unreadable image, a camera that drops out. By default the line is
+        logged as a warning of the logger "hmc".
+
+    Yields
+    ------
+    Frame
+    """
+    end = recording.start + recording.n_frames
+    first = recording.start if first is None else max(first, recording.start)
+    last = end if last is None else min(last, end)
+    report = on_problem or logger.warning
+    readers: list[Iterator[np.ndarray | None]] = []
+    for views, what in ((recording._footage, ""), (recording._silhouettes, " silhouettes")):
+        for camera, view in zip(recording.rig, views, strict=True):
+            readers.append(iter([None] * 0) if view is None else read_footage(view, first, last, report, f"{camera.name}{what}"))
+    n = len(recording.rig)
+    masks_of = recording._silhouettes
+    try:
+        for index in range(first, last):
+            images = [next(reader, None) for reader in readers]
+            masks = tuple(
+                None if image is None or view is None else to_mask(image, view) for image, view in zip(images[n:], masks_of, strict=True)
+            )
+            yield Frame(index, tuple(images[:n]), masks if recording.has_silhouettes else None)
+    finally:
+        for reader in readers:
+            if hasattr(reader, "close"):
+                reader.close()
+
+
+def to_mask(image: np.ndarray, view: Footage) -> np.ndarray:
+    """A silhouette image as a mask, (h, w) bool."""
+    lossless = view.images is not None and next(iter(view.images.values())).suffix.lower() not in LOSSY_SUFFIXES
+    return image.max(axis=2) > (0 if lossless else 127)
+
+
+def background_frames(recording: Recording, camera_index: int, limit: int | None = None) -> Iterator[np.ndarray]:
+    """Frames of the empty scene of one camera; none if there are none.
+
+    Parameters
+    ----------
+    recording : Recording
+    camera_index : int
+        Place of the camera in ``recording.rig``.
+    limit : int, optional
+        At most this many.
+
+    Yields
+    ------
+    ndarray, shape (h, w, 3), uint8 BGR
+    """
+    view = recording._background[camera_index]
+    if view is None:
+        return
+    n = view.n_frames if limit is None else min(limit, view.n_frames)
+    with closing(read_footage(view, 0, n, logger.warning, f"{recording.rig[camera_index].name} background")) as reader:  # type: ignore[type-var]
+        yield from (image for image in reader if image is not None)
+
+
+def find_views(
+    path: Path,
+    names: Sequence[str],
+    everyone: Sequence[str],
+    count: bool = True,
+    on_error: Callable[[str, str], None] | None = None,
+    starts: Mapping[str, int] | None = None,
+) -> tuple[list[Footage | None], list[Footage | None]]:
+    """The images (in ``videos/``, else in ``images/``) and the silhouettes of each camera.
+
+    Parameters
+    ----------
+    path : Path
+        Folder of the recording.
+    names : sequence of str
+        The cameras wanted.
+    everyone : sequence of str
+        All cameras of the calibration: numbered images count from the smallest number of all, whichever are wanted.
+    count : bool
+        As `hmc.io.footage.open_video`.
+    on_error : callable, optional
+        Called with a camera's name and what is wrong with its files, which then count as missing; by default that is raised.
+    starts : mapping of str to int, optional
+        The frame of a camera's files that is frame 0 of the recording, where it is not the first.
+    """
+
+    def find(folder: Path, name: str, first: int) -> Footage | None:
+        try:
+            found = find_footage(folder, name, first, count)
+            return found and starting_at(found, (starts or {}).get(name, 0))
+        except InputError as error:
+            if on_error is None:
+                raise
+            on_error(name, str(error))
+            return None
+
+    images = path / "images"
+    first = _first_number(images, everyone)
+    footage = [find(path / "videos", name, 0) or find(images, name, first) for name in names]
+    if not any(footage):
+        first = _first_number(path / "silhouettes", everyone)
+    return footage, [find(path / "silhouettes", name, first) for name in names]
+
+
+def _first_number(folder: Path, names: Sequence[str]) -> int:
+    numbers = [min(number_images(folder / name), default=0) for name in names if (folder / name).is_dir()]
+    return min(numbers, default=0)
+
+
+def _find_background(path: Path, rig: Rig, problems: list[str]) -> list[Footage | None]:
+    """The empty scene of each camera; what cannot be used is left out and added to the problems."""
+    background: list[Footage | None] = []
+    for camera in rig:
+        found = None
+        try:
+            found = find_footage(path / "background", camera.name, count=False)
+        except InputError as error:
+            problems.append(f"{error}; going on without this background")
+        if found is not None and found.size != camera.size:
+            problems.append(f"{found.path}: background is {_by(found.size)} and the camera {_by(camera.size)}; going on without it")
+            found = None
+        background.append(found)
+    return background
+
+
+def gaps(views: Sequence[Footage | None]) -> list[str]:
+    """A sentence for each camera whose numbered images have holes."""
+    sentences = []
+    for view in views:
+        missing = [] if view is None or view.images is None else sorted(set(range(view.n_frames)) - view.images.keys())
+        if view is not None and missing:
+            sentences.append(f"{view.path}: {len(missing)} of {view.n_frames} images are missing, the first is frame {missing[0]}")
+    return sentences
+
+
+def common_length(lengths: Sequence[int]) -> int:
+    """Frames of which at least two cameras have an image; of the one, if there is one."""
+    ordered = sorted(lengths, reverse=True)
+    return ordered[min(1, len(ordered) - 1)] if ordered else 0
+
+
+def missing_views(path: Path, names: Sequence[str], views: Sequence[Footage | None]) -> list[str]:
+    """One sentence for each camera without images and silhouettes."""
+    if not any(views):
+        return [f"{path}: no videos/, images/ or silhouettes/ with the cameras' names ({', '.join(names)})"]
+    return [
+        f"{path}: camera '{name}' of the calibration has no video, images or silhouettes; name them so, or leave it out: --cameras"
+        for name, view in zip(names, views, strict=True)
+        if view is None
+    ]
+
+
+def wrong_sizes(rig: Rig, views: Sequence[Footage | None]) -> list[str]:
+    """One sentence for each camera whose images have not the size of its calibration."""
+    return [
+        f"{view.path}: images are {_by(view.size)} but the calibration of '{camera.name}' says {_by(camera.size)}; "
+        "calibrate at the images' size, or correct `size` and `matrix`"
+        for camera, view in zip(rig, views, strict=True)
+        if view is not None and view.size != camera.size
+    ]
+
+
+def wrong_units(rig: Rig) -> list[str]:
+    """A sentence when the cameras stand so far away that the calibration must be in millimetres."""
+    distance = float(np.median(np.linalg.norm([camera.translation for camera in rig], axis=1)))
+    if distance <= MAX_CAMERA_DISTANCE_M:
+        return []
+    return [
+        f"calibration: cameras stand {distance:,.0f} m from the origin, which looks like millimetres; divide every `translation` by 1000"
+    ]
+
+
+def _by(size: tuple[int, int]) -> str:
+    return f"{size[0]} x {size[1]}"

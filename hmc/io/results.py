@@ -1,0 +1,361 @@
+"""What a run leaves on disk, and reading it back.
+
+A result is a folder with `joints.csv`, `tracks.csv`, `pose.npz` and `run.toml`. The tables are long, in metres, with one header line.
+Nothing here is pickled, so loading a result never runs code; every file appears whole or not at all.
+"""
+
+from __future__ import annotations
+
+import platform
+import tomllib
+import zipfile
+import zlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hmc.errors import InputError
+from hmc.io.files import atomic_write, write_toml
+from hmc.io.tables import integer_column, read_columns
+from hmc.landmarks import LANDMARKS
+
+__all__ = [
+    "PoseStates", "PoseTable", "TrackTable", "library_versions", "read_centroids", "read_joints", "read_pose", "read_run",
+    "read_tracks", "run_selection", "write_joints", "write_pose", "write_run", "write_tracks",
+]  # fmt: skip
+
+JOINT_COLUMNS = ("frame", "person", "joint", "x", "y", "z")
+TRACK_COLUMNS = ("frame", "person", "x", "y", "z")
+HEAD_COLUMNS = ("head_x", "head_y", "head_z")
+
+
+@dataclass(frozen=True)
+class PoseTable:
+    """Landmark positions, one row a person and frame.
+
+    Parameters
+    ----------
+    frames : ndarray of int, shape (n,)
+        Absolute frame numbers of the recording.
+    persons : ndarray of int, shape (n,)
+        Person numbers.
+    positions : ndarray, shape (n, 15, 3)
+        World, metres, in the order of `hmc.landmarks.LANDMARKS`; NaN where a landmark is missing.
+
+    Raises
+    ------
+    InputError
+        When the shapes disagree.
+    """
+
+    frames: np.ndarray
+    persons: np.ndarray
+    positions: np.ndarray
+
+    def __post_init__(self) -> None:
+        _set_rows(self, positions=(len(LANDMARKS), 3))
+
+    def where(self, chosen: np.ndarray) -> PoseTable:
+        """The chosen rows: a mask, shape (n,), or row numbers."""
+        return PoseTable(self.frames[chosen], self.persons[chosen], self.positions[chosen])
+
+    def of(self, person: int) -> PoseTable:
+        """The rows of one person."""
+        return self.where(self.persons == person)
+
+
+@dataclass(frozen=True)
+class TrackTable:
+    """Positions of whole persons, one row a person and frame.
+
+    Parameters
+    ----------
+    frames : ndarray of int, shape (n,)
+        Absolute frame numbers of the recording.
+    persons : ndarray of int, shape (n,)
+        Person numbers.
+    positions : ndarray, shape (n, 3)
+        Centroids in the world, metres.
+    heads : ndarray, shape (n, 3), optional
+        Centres of the heads in the world, metres.
+
+    Raises
+    ------
+    InputError
+        When the shapes disagree.
+    """
+
+    frames: np.ndarray
+    persons: np.ndarray
+    positions: np.ndarray
+    heads: np.ndarray | None = None
+
+    def __post_init__(self) -> None:
+        _set_rows(self, positions=(3,), **({} if self.heads is None else {"heads": (3,)}))
+
+    def where(self, chosen: np.ndarray) -> TrackTable:
+        """The chosen rows: a mask, shape (n,), or row numbers."""
+        heads = None if self.heads is None else self.heads[chosen]
+        return TrackTable(self.frames[chosen], self.persons[chosen], self.positions[chosen], heads)
+
+    def of(self, person: int) -> TrackTable:
+        """The rows of one person."""
+        return self.where(self.persons == person)
+
+
+@dataclass(frozen=True)
+class PoseStates:
+    """State vectors of an articulated body, one row a person and frame, with what is needed to build the bodies again.
+
+    Parameters
+    ----------
+    frames : ndarray of int, shape (n,)
+        Absolute frame numbers of the recording.
+    persons : ndarray of int, shape (n,)
+        Person numbers.
+    states : ndarray, shape (n, n_dof)
+        Metres and radians, as `dof_names` says.
+    dof_names : tuple of str
+        Name of every state variable.
+    bodies : mapping
+        Person number to that person's dimensions: a mapping from name (`height_m`, ...) to a number or an array of numbers.
+
+    Raises
+    ------
+    InputError
+        When the shapes disagree.
+    """
+
+    frames: np.ndarray
+    persons: np.ndarray
+    states: np.ndarray
+    dof_names: tuple[str, ...]
+    bodies: Mapping[int, Mapping[str, float | np.ndarray]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "dof_names", tuple(str(name) for name in self.dof_names))
+        _set_rows(self, states=(len(self.dof_names),))
+
+
+def _set_rows(table: Any, **tails: tuple[int, ...]) -> None:
+    """Turn a table's fields into arrays and check that they have one row each for the same rows."""
+    kind = type(table).__name__
+    for name in ("frames", "persons"):
+        values = np.asarray(getattr(table, name))
+        if values.ndim != 1 or (values.size and values.dtype.kind not in "iu"):
+            raise InputError(f"{kind}: `{name}` must be a row of whole numbers; got shape {values.shape} of {values.dtype}")
+        object.__setattr__(table, name, values.astype(np.int64))
+    n = len(table.frames)
+    if len(table.persons) != n:
+        raise InputError(f"{kind}: `frames` has {n} rows and `persons` {len(table.persons)}")
+    for name, tail in tails.items():
+        values = np.asarray(getattr(table, name), float)
+        if values.shape != (n, *tail):
+            raise InputError(f"{kind}: `{name}` must be {(n, *tail)}; got {values.shape}")
+        object.__setattr__(table, name, values)
+
+
+def read_joints(path: str | Path) -> PoseTable:
+    """Read a table `frame, person, joint, x, y, z`.
+
+    A landmark without a row, or with an empty or `nan` coordinate, is missing (NaN). Columns beyond these are ignored.
+
+    Returns
+    -------
+    PoseTable
+        Sorted by frame, then person.
+
+    Raises
+    ------
+    InputError
+        When the file is missing, a column is missing, a value is no number, a joint is unknown or given twice.
+    """
+    path = Path(path)
+    columns, lines = read_columns(path, JOINT_COLUMNS)
+    frames, persons = (integer_column(path, name, columns[name], lines) for name in ("frame", "person"))
+    places = {name: place for place, name in enumerate(LANDMARKS)}
+    joints = np.array([places.get(name.strip(), -1) for name in columns["joint"]], int)
+    if (joints < 0).any():
+        row = int(np.argmax(joints < 0))
+        raise InputError(f"{path}, line {lines[row]}: no landmark named {columns['joint'][row]!r}; they are {', '.join(LANDMARKS)}")
+    xyz = _points(path, ("x", "y", "z"), columns, lines)
+    keys, rows = np.unique(np.stack([frames, persons], axis=1), axis=0, return_inverse=True)
+    cells = rows.ravel() * len(LANDMARKS) + joints
+    _refuse_twice(path, cells, lines, "this frame, person and joint")
+    positions = np.full((len(keys) * len(LANDMARKS), 3), np.nan)
+    positions[cells] = xyz
+    return PoseTable(keys[:, 0], keys[:, 1], positions.reshape(len(keys), len(LANDMARKS), 3))
+
+
+def write_joints(path: str | Path, table: PoseTable) -> None:
+    """Write a table `frame, person, joint, x, y, z`: metres to six decimals, sorted by frame, then person; missing landmarks as `nan`."""
+    order = np.lexsort([table.persons, table.frames])
+    with atomic_write(path) as file:
+        file.write(",".join(JOINT_COLUMNS) + "\n")
+        for row in order:
+            start = f"{table.frames[row]},{table.persons[row]},"
+            file.writelines(
+                f"{start}{name},{x:.6f},{y:.6f},{z:.6f}\n" for name, (x, y, z) in zip(LANDMARKS, table.positions[row], strict=True)
+            )
+
+
+def read_tracks(path: str | Path) -> TrackTable:
+    """Read a table `frame, person, x, y, z`; `head_x, head_y, head_z` too where there are such columns.
+
+    Returns
+    -------
+    TrackTable
+        Sorted by frame, then person.
+
+    Raises
+    ------
+    InputError
+        When the file is missing, a column is missing, a value is no number, or a person stands twice in a frame.
+    """
+    return _read_positions(Path(path), heads_needed=False)
+
+
+def read_centroids(path: str | Path) -> TrackTable:
+    """Read the true centroids, `frame, person, x, y, z, head_x, head_y, head_z`: as `read_tracks`, and the heads must be there."""
+    return _read_positions(Path(path), heads_needed=True)
+
+
+def _read_positions(path: Path, heads_needed: bool) -> TrackTable:
+    columns, lines = read_columns(path, TRACK_COLUMNS + (HEAD_COLUMNS if heads_needed else ()))
+    frames, persons = (integer_column(path, name, columns[name], lines) for name in ("frame", "person"))
+    positions = _points(path, ("x", "y", "z"), columns, lines)
+    heads = _points(path, HEAD_COLUMNS, columns, lines) if set(HEAD_COLUMNS) <= set(columns) else None
+    _, cells = np.unique(np.stack([frames, persons], axis=1), axis=0, return_inverse=True)
+    _refuse_twice(path, cells.ravel(), lines, "this frame and person")
+    order = np.lexsort([persons, frames])
+    return TrackTable(frames[order], persons[order], positions[order], None if heads is None else heads[order])
+
+
+def write_tracks(path: str | Path, table: TrackTable) -> None:
+    """Write a table `frame, person, x, y, z`, with `head_x, head_y, head_z` where the table has heads; sorted by frame, then person."""
+    order = np.lexsort([table.persons, table.frames])
+    values = table.positions if table.heads is None else np.hstack([table.positions, table.heads])
+    with atomic_write(path) as file:
+        file.write(",".join(TRACK_COLUMNS + (() if table.heads is None else HEAD_COLUMNS)) + "\n")
+        for row in order:
+            file.write(f"{table.frames[row]},{table.persons[row]}," + ",".join(f"{value:.6f}" for value in values[row]) + "\n")
+
+
+def _points(path: Path, names: Sequence[str], columns: Mapping[str, Sequence[str]], lines: np.ndarray) -> np.ndarray:
+    """Three columns of numbers as (n, 3); an empty cell is NaN."""
+    points = np.empty((len(lines), len(names)))
+    for place, name in enumerate(names):
+        for row, cell in enumerate(columns[name]):
+            try:
+                points[row, place] = float(cell) if cell.strip() else np.nan
+            except ValueError:
+                raise InputError(f"{path}, line {lines[row]}: `{name}` must be a number of metres; got {cell!r}") from None
+    infinite = np.isinf(points).any(axis=1)
+    if infinite.any():
+        raise InputError(f"{path}, line {lines[np.argmax(infinite)]}: an infinite coordinate; write nan where there is none")
+    return points
+
+
+def _refuse_twice(path: Path, cells: np.ndarray, lines: np.ndarray, what: str) -> None:
+    _, first = np.unique(cells, return_index=True)
+    if len(first) < len(cells):
+        row = np.setdiff1d(np.arange(len(cells)), first)[0]
+        raise InputError(f"{path}, line {lines[row]}: {what} stood in an earlier line already")
+
+
+def write_pose(path: str | Path, poses: PoseStates) -> None:
+    """Write state vectors and bodies to an `.npz` file of plain arrays."""
+    arrays = {"frames": poses.frames, "persons": poses.persons, "states": poses.states, "dof_names": np.array(poses.dof_names, dtype=str)}
+    for person, body in poses.bodies.items():
+        for name, value in body.items():
+            arrays[f"body/{int(person)}/{name}"] = np.asarray(value, float)
+    with atomic_write(path, "wb") as file:
+        np.savez_compressed(file, **arrays)  # type: ignore[arg-type]
+
+
+def read_pose(path: str | Path) -> PoseStates:
+    """Read back what `write_pose` wrote; never unpickles.
+
+    Raises
+    ------
+    InputError
+        When the file is missing, damaged, or not such a file.
+    """
+    try:
+        with open(path, "rb") as file, np.load(file, allow_pickle=False) as data:
+            bodies: dict[int, dict[str, np.ndarray]] = {}
+            for key in data.files:
+                if key.startswith("body/"):
+                    _, person, name = key.split("/", 2)
+                    bodies.setdefault(int(person), {})[name] = data[key]
+            names = tuple(str(name) for name in data["dof_names"])
+            return PoseStates(data["frames"], data["persons"], data["states"], names, bodies)
+    except OSError as error:
+        raise InputError(f"{path}: cannot read the poses ({error.strerror or error})") from error
+    except (ValueError, KeyError, EOFError, TypeError, AttributeError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
+        raise InputError(f"{path}: not a pose file of this program ({error})") from error
+
+
+def library_versions() -> dict[str, str]:
+    """Versions of Python, of this package and of the libraries that its numbers depend on."""
+    versions = {"python": platform.python_version()}
+    for name in ("hmc", "numpy", "scipy", "scikit-learn", "opencv-python-headless"):
+        try:
+            versions[name] = version(name)
+        except PackageNotFoundError:  # run from a source tree, or OpenCV built by hand
+            continue
+    return versions
+
+
+def write_run(path: str | Path, method: str, parameters: Mapping[str, Any], seed: int | None, **more: Any) -> None:
+    """Write how a result came about: `method`, `seed`, a table of every parameter, the versions of the libraries.
+
+    Parameters
+    ----------
+    path : path
+        The `run.toml`.
+    method : str
+    parameters : mapping
+        Plain values, nested mappings, sequences, arrays or dataclasses; keys carry their units. What is None is left out.
+    seed : int or None
+    **more
+        Further values or tables, as `recording="..."`, `report={...}`.
+    """
+    run = {"method": method, "seed": seed, **more, "parameters": parameters, "versions": library_versions()}
+    write_toml(path, run)
+
+
+def read_run(path: str | Path) -> dict[str, Any]:
+    """Read a `run.toml`.
+
+    Raises
+    ------
+    InputError
+        When the file is missing or is not TOML.
+    """
+    try:
+        with open(path, "rb") as file:
+            return tomllib.load(file)
+    except OSError as error:
+        raise InputError(f"{path}: cannot read it ({error.strerror})") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: not a TOML file ({error}); mend it, or delete it and run again") from error
+
+
+def run_selection(directory: str | Path) -> tuple[int, int | None]:
+    """Which frames the run of a result was about, by its `run.toml`: the first, and how many (None: all that follow).
+
+    Raises
+    ------
+    InputError
+        When there is a `run.toml` that is not TOML.
+    """
+    path = Path(directory) / "run.toml"
+    parameters = read_run(path).get("parameters") if path.exists() else None
+    values = [parameters.get(name) if isinstance(parameters, dict) else None for name in ("start", "frames")]
+    start, frames = (value if isinstance(value, int) else None for value in values)
+    return start or 0, frames

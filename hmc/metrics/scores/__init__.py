@@ -1,0 +1,23 @@
+"""Scores of results against truth, as `hmc evaluate` prints them: poses, tracks, angles, and landmarks in images."""
+
+from hmc.metrics.scores.angles import angle_rows
+from hmc.metrics.scores.images import evaluate_images, image_landmarks, read_image_landmarks
+from hmc.metrics.scores.poses import (
+    PersonErrors,
+    PoseEvaluation,
+    evaluate_pose,
+    evaluate_tracks,
+    pelvis_tracks,
+)
+
+__all__ = [
+    "PersonErrors",
+    "PoseEvaluation",
+    "angle_rows",
+    "evaluate_images",
+    "evaluate_pose",
+    "evaluate_tracks",
+    "image_landmarks",
+    "pelvis_tracks",
+    "read_image_landmarks",
+]

@@ -1,0 +1,231 @@
+"""How far a skeleton model is from skeleton curves. Hsiao (2008), section 3.2.2.1 and Eq. 3-27."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import permutations
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from hmc.body.spin_skeleton import SkeletonModel, joint_shares, part_chains, part_lengths, segment_ends
+from hmc.pose.spectral.parts import PART_NAMES
+from hmc.pose.spectral.reading import BodyReading, cut_foot
+from hmc.pose.spectral.skeleton import equally_spaced
+from hmc.pose.spectral.volume import BodyVolume
+
+__all__ = [
+    "MODEL_PARTS",
+    "Observed",
+    "best_assignments",
+    "curves_near",
+    "curves_of",
+    "error_of_chains",
+    "observe_curves",
+    "pair_errors",
+    "skeleton_error",
+]
+
+#: Parts of the model.
+MODEL_PARTS: tuple[str, ...] = ("torso", "head", "l_arm", "r_arm", "l_leg", "r_leg")
+#: What each part of a segmentation may be.
+KINDS: dict[str, tuple[int, ...]] = {"trunk": (0,), "head": (1,), "arm_1": (2, 3), "arm_2": (2, 3), "leg_1": (4, 5), "leg_2": (4, 5)}
+KINDS |= {part: (k,) for k, part in enumerate(MODEL_PARTS)}
+#: A curve covers at least this share of its part, however short it is.
+LEAST_SHARE = 0.3
+
+
+@dataclass(frozen=True)
+class Observed:
+    """Curves to which a model is fitted.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Parts that were found.
+    nodes : ndarray, shape (m, n, 3)
+        n equally spaced nodes of each curve, metres.
+    pairs : ndarray of int, shape (q, 2)
+        Curve and part of the model that may belong together.
+    blends : ndarray, shape (q, n, 3)
+        The model's node that corresponds to each of the curve's, as shares of the start, the joint and the end of the part.
+    choices : ndarray of int, shape (k, m)
+        Every one-to-one assignment that is allowed: the pair of each curve.
+    volume : BodyVolume or None
+        The voxels, where they count beside the curves.
+    """
+
+    names: tuple[str, ...]
+    nodes: np.ndarray
+    pairs: np.ndarray
+    blends: np.ndarray
+    choices: np.ndarray
+    volume: BodyVolume | None = None
+
+    def only(self, names: tuple[str, ...]) -> Observed:
+        """Some of the curves, without the voxels: those are of the whole body."""
+        rows = [k for k, name in enumerate(self.names) if name in names]
+        kept = np.flatnonzero(np.isin(self.pairs[:, 0], rows))
+        pairs = np.stack([np.searchsorted(rows, self.pairs[kept, 0]), self.pairs[kept, 1]], axis=1)
+        choices = np.unique(np.searchsorted(kept, self.choices[:, rows]), axis=0)
+        return Observed(tuple(self.names[k] for k in rows), self.nodes[rows], pairs, self.blends[kept], choices)
+
+    def parts_of(self, choice: int) -> dict[str, str]:
+        """The part of the model that each curve is in an assignment."""
+        return {name: MODEL_PARTS[self.pairs[pair, 1]] for name, pair in zip(self.names, self.choices[choice], strict=True)}
+
+
+def observe_curves(
+    model: SkeletonModel,
+    curves: Mapping[str, np.ndarray],
+    n: int = 6,
+    named: bool = True,
+    from_tip: bool = True,
+    volume: BodyVolume | None = None,
+) -> Observed:
+    """Sample the curves, and say which nodes of the model theirs correspond to.
+
+    Parameters
+    ----------
+    model : SkeletonModel
+    curves : mapping of str to ndarray, shape (any, 3)
+        By part, as from `hmc.pose.spectral.skeleton.extract_skeletons`; nodes equally spaced, the end at the trunk first.
+    n : int
+        Nodes of each that count.
+    named : bool
+        Whether a curve's name says what it may be: arms stay arms. Else every one-to-one assignment is allowed.
+    from_tip : bool
+        Whether the curve of a limb is that of its outer end and as much of the rest as it is long: a limb's curve begins where it leaves
+        the trunk. Else curve and part correspond from end to end, as in the thesis.
+    volume : BodyVolume, optional
+        The voxels, to count beside the curves.
+    """
+    names = tuple(curves)
+    allowed = tuple(KINDS[name] for name in names) if named else (tuple(range(6)),) * len(names)
+    pairs = np.array([(k, part) for k, parts in enumerate(allowed) for part in parts], int).reshape(-1, 2)
+    lengths, joints = part_lengths(model), joint_shares(model)
+    nodes, blends = np.zeros((len(names), n, 3)), np.zeros((len(pairs), n, 3))
+    for k, curve in enumerate(curves.values()):
+        length = float(np.linalg.norm(np.diff(curve, axis=0), axis=1).sum())
+        limb = from_tip and allowed[k][0] >= 2
+        # What a curve has beyond the length of the limb is inside the trunk.
+        nodes[k] = equally_spaced(curve, n, max(length - lengths[allowed[k][0]], 0.0) if limb else 0.0)
+        share = np.clip(length / lengths[allowed[k][0]], LEAST_SHARE, 1.0) if limb else 1.0
+        at = np.linspace(1 - share, 1, n)
+        for q in np.flatnonzero(pairs[:, 0] == k):
+            joint = joints[pairs[q, 1]]
+            lower, upper = np.clip((at - joint) / (1 - joint), 0, 1), np.clip(at / joint, 0, 1)
+            blends[q] = np.stack([1 - upper, upper - lower, lower], axis=1)
+    return Observed(names, nodes, pairs, blends, best_assignments(pairs, allowed), volume)
+
+
+def curves_of(reading: BodyReading) -> dict[str, np.ndarray]:
+    """The curves of a reading that have a name, legs up to the ankle."""
+    return {
+        part: cut_foot(curve, reading.foot_m)[0] if part[:3] == "leg" else curve for part, curve in reading.curves.items() if part in KINDS
+    }
+
+
+def curves_near(model: SkeletonModel, state: np.ndarray, reading: BodyReading, farthest_m: float) -> dict[str, np.ndarray]:
+    """The curves of a reading, named anew by the parts of a known pose that they are nearest to.
+
+    Parameters
+    ----------
+    model : SkeletonModel
+    state : ndarray, shape (23,)
+        The pose.
+    reading : BodyReading
+    farthest_m : float
+        A curve that is farther than this from every part keeps the name that its shape has, or is left out, metres.
+
+    Returns
+    -------
+    dict of str to ndarray
+        By the names of `PART_NAMES`, legs up to the ankle. Which arm or leg is the left one is for the fit to say.
+    """
+    free = {part: curve for part, curve in reading.curves.items() if part != "trunk"}
+    costs = np.full((len(free), len(MODEL_PARTS)), farthest_m)
+    chains = part_chains(*segment_ends(model, state[None]))
+    for k, curve in enumerate(free.values()):
+        for kind in ("head", "arm_1", "leg_1"):
+            cut = cut_foot(curve, reading.foot_m)[0] if kind == "leg_1" else curve
+            one = observe_curves(model, {kind: cut})
+            costs[k, one.pairs[:, 1]] = pair_errors(chains, one)[0]
+    taken = {part: k for k, part in np.transpose(linear_sum_assignment(costs)).tolist() if costs[k, part] < farthest_m}
+    # What is far from all of the pose is what its shape says, where that part has no curve: a limb that was lost comes back.
+    for k, name in enumerate(free):
+        if k not in taken.values():
+            free_parts = [part for part in KINDS.get(name, ()) if part > 1 and part not in taken]
+            taken |= dict.fromkeys(free_parts[:1], k)
+    found = {"trunk": reading.curves["trunk"]} if "trunk" in reading.curves else {}
+    for part, k in sorted(taken.items()):
+        curve = list(free.values())[k]
+        found[PART_NAMES[part]] = cut_foot(curve, reading.foot_m)[0] if part >= 4 else curve
+    return found
+
+
+def best_assignments(pairs: np.ndarray, allowed: tuple[tuple[int, ...], ...]) -> np.ndarray:
+    """Every one-to-one assignment of curves to allowed parts, as rows of `pairs`: (k, m)."""
+    row = {(int(k), int(part)): q for q, (k, part) in enumerate(pairs)}
+    if not allowed:
+        return np.zeros((1, 0), int)
+    found = [
+        [row[k, part] for k, part in enumerate(one)]
+        for one in permutations(range(len(MODEL_PARTS)), len(allowed))
+        if all(part in may for part, may in zip(one, allowed, strict=True))
+    ]
+    return np.array(found, int).reshape(-1, len(allowed))
+
+
+def pair_errors(chains: np.ndarray, observed: Observed) -> np.ndarray:
+    """Eq. 3-27 for every pair, divided by the number of nodes: mean distance of corresponding nodes, metres, shape (n, q).
+
+    A curve's nodes correspond in the order in which the sum is smaller; those of limbs are known to begin at the trunk.
+
+    Parameters
+    ----------
+    chains : ndarray, shape (n, 6, 3, 3)
+        As from `hmc.body.spin_skeleton.part_chains`.
+    observed : Observed
+    """
+    points = observed.blends @ chains[:, observed.pairs[:, 1]]
+    nodes = observed.nodes[observed.pairs[:, 0]]
+    same = np.sqrt(((points - nodes) ** 2).sum(-1)).mean(-1)
+    turned = np.sqrt(((points - nodes[:, ::-1]) ** 2).sum(-1)).mean(-1)
+    return np.minimum(same, turned)
+
+
+def skeleton_error(model: SkeletonModel, states: np.ndarray, observed: Observed) -> tuple[np.ndarray, np.ndarray]:
+    """Error of states under the best one-to-one assignment.
+
+    Parameters
+    ----------
+    model : SkeletonModel
+    states : ndarray, shape (n, 23)
+    observed : Observed
+
+    Returns
+    -------
+    errors : ndarray, shape (n,)
+        Mean over the curves, metres; 0 where there are none.
+    choice : ndarray of int, shape (n,)
+        Row of ``observed.choices``.
+    """
+    return error_of_chains(part_chains(*segment_ends(model, states)), observed)
+
+
+def error_of_chains(chains: np.ndarray, observed: Observed, bound_m: float | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """`skeleton_error` of chains (n, 6, 3, 3), and where given no curve's error counts as more than a bound, metres.
+
+    So a curve that is of no part draws nothing far.
+    """
+    n = len(chains)
+    if not observed.names:
+        return np.zeros(n), np.zeros(n, int)
+    errors = pair_errors(chains, observed)
+    if bound_m is not None:
+        errors = bound_m * (1 - np.exp(-errors / bound_m))
+    means = errors[:, observed.choices].mean(-1)
+    best = means.argmin(1)
+    return means[np.arange(n), best], best

@@ -1,0 +1,230 @@
+"""The symmetric cost at one pose as residuals, and how they change with the pose.
+
+Each body-surface sample outside the tolerant hull pulls its segment back along the hull's distance field; each point of the
+strict hull's surface outside the body, and each ray that misses it, pulls the nearest cone towards itself. Both move with
+the twists of the joints (Canton 2009, Eq. A.1), so the Jacobian needs no differences; it takes
+the flesh as round and straight near each point.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hmc.body.cone_maps import ConeMaps, cone_maps
+from hmc.body.floor import above_floor, lowest_support
+from hmc.body.joints import N_DOF
+from hmc.body.kinematics import dof_masks, joint_twists
+from hmc.body.model import BodyModel
+from hmc.body.nearest_cone import Candidates, Nearest, candidates, nearest_cones, towards
+from hmc.body.penetration import penetration_rows
+from hmc.body.prior import POSTURE, posture_spread
+from hmc.pose.objectives.symmetric import BodyPoints, SymmetricSettings
+from hmc.pose.views.hull_target import HullTarget, distance_gradient
+
+__all__ = ["Distances", "distances", "pulls", "residual_rows", "residual_values"]
+
+#: Which degrees of freedom move each segment, and last the world.
+_MASKS = np.concatenate([dof_masks().astype(float), np.zeros((1, N_DOF))])
+#: The same of one segment relative to another, in rows ``len(_MASKS) * other + segment``, and the first row relative to the world.
+_RELATIVE = (_MASKS - _MASKS[:, None]).reshape(-1, N_DOF)
+_TO_WORLD = len(_MASKS) * (len(_MASKS) - 1)
+
+
+@dataclass(frozen=True)
+class Distances:
+    """The distances of one state, group by group, and what it takes to tell how they change with it.
+
+    Parameters
+    ----------
+    residuals : ndarray, shape (n + 27,)
+        Weighted: of the body's surface, of what is to be explained, of the axes' depth, of the floor, and of the posture.
+    weights : ndarray, shape (4,)
+        Of the first four.
+    axes, centres : ndarray, shape (27, 3)
+        The joints' twists.
+    maps : ConeMaps
+    pairs : Candidates
+        For poses near this one.
+    points, slope : ndarray, shape (n_surface, 3)
+        The surface's points in the world, metres, and how far each gets from the hull where it moves.
+    outside, depth : ndarray
+        Distances, metres, not weighted.
+    nearest : Nearest
+    outward, axis_points : ndarray, shape (n_axes, 3)
+    segment, other : ndarray of int, shape (n_axes,)
+        As from `penetration_rows`.
+    floor : tuple of ndarray
+        As from `lowest_support`; empty where there is no floor.
+    spread : ndarray, shape (27,)
+        Of the posture (`posture_spread`), radians.
+    """
+
+    residuals: np.ndarray
+    weights: np.ndarray
+    axes: np.ndarray
+    centres: np.ndarray
+    maps: ConeMaps
+    pairs: Candidates
+    points: np.ndarray
+    slope: np.ndarray
+    outside: np.ndarray
+    nearest: Nearest
+    depth: np.ndarray
+    outward: np.ndarray
+    axis_points: np.ndarray
+    segment: np.ndarray
+    other: np.ndarray
+    floor: tuple[np.ndarray, np.ndarray, np.ndarray]
+    spread: np.ndarray
+
+
+def distances(
+    body: BodyModel,
+    samples: BodyPoints,
+    state: np.ndarray,
+    target: HullTarget,
+    hull_points: np.ndarray,
+    settings: SymmetricSettings,
+    before: Candidates | None = None,
+) -> Distances:
+    """The distances of one state.
+
+    Parameters
+    ----------
+    body, samples, target, hull_points, settings
+        As for `hmc.pose.objectives.symmetric.symmetric_cost`.
+    state : ndarray, shape (27,)
+    before : Candidates, optional
+        Of a pose near this one.
+    """
+    axes, centres, rotations, positions = joint_twists(body, state)
+    maps = cone_maps(body.cones, np.concatenate([rotations, positions[..., None]], axis=-1)[..., None])
+    carrier = samples.surface.segment
+    points = np.einsum("nij,nj->ni", rotations.take(carrier, axis=0), samples.surface.points)
+    points += positions.take(carrier, axis=0)
+    outside, slope = distance_gradient(target, points)
+    pairs = candidates(body.cones, maps, hull_points, settings.cap_m, before)
+    nearest = nearest_cones(body.cones, maps, pairs)
+    depth, outward, axis_points, segment, other = penetration_rows(body, samples.axes, rotations, positions, maps)
+    gap, floor = np.zeros(0), (np.zeros(0), np.zeros((0, 3)), np.zeros(0, int))
+    if target.floor_z is not None:
+        floor = lowest_support(body, rotations[None], positions[None])
+        gap = above_floor(floor[0], target.floor_z)
+    sizes = np.array([len(outside), len(nearest.distance), len(depth), 1])
+    weights = np.sqrt(np.array([1, settings.explain_weight, settings.overlap_weight, settings.floor_weight]) / sizes)
+    spread = posture_spread(state)
+    residuals = [
+        weights[0] * np.minimum(outside, settings.cap_m),
+        weights[1] * np.minimum(nearest.distance, settings.cap_m),
+        weights[2] * depth,
+        weights[3] * gap,
+        np.sqrt(settings.posture_weight) * (state - POSTURE[0]) / spread,
+    ]
+    return Distances(
+        np.concatenate(residuals), weights, axes, centres, maps, pairs, points, slope, outside, nearest, depth, outward, axis_points,
+        segment, other, floor, spread,
+    )  # fmt: skip
+
+
+def pulls(body: BodyModel, samples: BodyPoints, found: Distances, settings: SymmetricSettings) -> tuple[np.ndarray, np.ndarray]:
+    """Which residuals change with the state, and how.
+
+    Parameters
+    ----------
+    body, samples, settings
+        Those of the distances.
+    found : Distances
+
+    Returns
+    -------
+    rows : ndarray of int, shape (m,)
+    jacobian : ndarray, shape (m, 27)
+    """
+    n_outside, n_explain = len(found.outside), len(found.nearest.distance)
+    out = np.flatnonzero((found.outside > 0) & (found.outside < settings.cap_m))
+    pulled = found.nearest.distance[found.nearest.pulls]
+    explain = np.flatnonzero((pulled > 0) & (pulled < settings.cap_m))
+    deep = np.flatnonzero(found.depth)
+    gap = np.flatnonzero(found.residuals[n_outside + n_explain + len(found.depth) : -N_DOF])
+    # The way in which a point has to move to add to the distance, where the point is, and what moves it: a row of `_RELATIVE`.
+    directions = [
+        found.weights[0] * found.slope[out],
+        found.weights[1] * towards(found.maps, found.nearest, explain),
+        -found.weights[2] * found.outward[deep],
+    ]
+    places = [found.points[out], found.nearest.places[explain], found.axis_points[deep]]
+    # What carries both parts leaves them where they are to one another.
+    movers = [
+        _TO_WORLD + samples.surface.segment[out],
+        _TO_WORLD + body.cones.segment[found.nearest.cone[explain]],
+        len(_MASKS) * found.other[deep] + found.segment[deep],
+    ]
+    if len(gap):
+        _, lowest, shank = found.floor
+        directions.append(np.array([[0.0, 0.0, found.weights[3]]]))
+        places.append(lowest)
+        movers.append(_TO_WORLD + shank)
+    rows = [out, n_outside + found.nearest.pulls[explain], n_outside + n_explain + deep, n_outside + n_explain + len(found.depth) + gap]
+    n = sum(map(len, rows))
+    wrenches = np.empty((n, 6))
+    direction = np.concatenate(directions, out=wrenches[:, 3:])
+    # g . (axis x (p - centre)) = (p x g) . axis - g . (axis x centre)
+    wrenches[:, :3] = _cross(np.concatenate(places), direction)
+    twists = np.concatenate([found.axes, -_cross(found.axes, found.centres)], axis=1)
+    twists[:3] = np.eye(6)[3:]  # translations
+    jacobian = np.empty((n + N_DOF, N_DOF))
+    np.matmul(wrenches, twists.T, out=jacobian[:-N_DOF])
+    jacobian[:-N_DOF] *= _RELATIVE.take(np.concatenate(movers), axis=0)
+    jacobian[-N_DOF:] = np.diag(np.sqrt(settings.posture_weight) / found.spread)
+    return np.concatenate([*rows, len(found.residuals) - N_DOF + np.arange(N_DOF)]), jacobian
+
+
+def residual_rows(
+    body: BodyModel,
+    samples: BodyPoints,
+    state: np.ndarray,
+    target: HullTarget,
+    hull_points: np.ndarray,
+    settings: SymmetricSettings,
+) -> tuple[np.ndarray, np.ndarray]:
+    """The symmetric cost at one state as weighted residuals, and how they change with the state.
+
+    Parameters
+    ----------
+    body, samples, target, hull_points, settings
+        As for `hmc.pose.objectives.symmetric.symmetric_cost`.
+    state : ndarray, shape (27,)
+
+    Returns
+    -------
+    residuals : ndarray, shape (n_residuals,)
+        Metres; their squares sum to the cost.
+    jacobian : ndarray, shape (n_residuals, 27)
+        Zero where a distance is zero or beyond the cap.
+    """
+    found = distances(body, samples, state, target, hull_points, settings)
+    pulled, rows = pulls(body, samples, found, settings)
+    jacobian = np.zeros((len(found.residuals), N_DOF))
+    jacobian[pulled] = rows
+    return found.residuals, jacobian
+
+
+def residual_values(
+    body: BodyModel,
+    samples: BodyPoints,
+    state: np.ndarray,
+    target: HullTarget,
+    hull_points: np.ndarray,
+    settings: SymmetricSettings,
+) -> np.ndarray:
+    """The residuals of `residual_rows` alone, at less of the work."""
+    return distances(body, samples, state, target, hull_points, settings).residuals
+
+
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Cross product of rows; `numpy.cross` spends more time on its arguments than on the product."""
+    x, y, z = a.T
+    u, v, w = b.T
+    return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=1)

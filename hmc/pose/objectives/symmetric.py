@@ -1,0 +1,300 @@
+"""The symmetric cost: body outside the tolerant hull, and silhouettes that no part of the body explains.
+
+Canton's four scores (section 6.5) ask only that what the body fills be occupied, so a limb folded into the trunk costs
+nothing. Here the silhouettes have to be explained too, ray by ray (`hmc.pose.views.rays`), and to a small part the surface of the
+strict hull (every camera agrees). The tolerant hull (one camera may miss) is what the body must not leave.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hmc.body.cone_maps import ConeMaps, cone_maps, cones_near
+from hmc.body.cones import cone_shapes, places_and_directions, slide_to_axis, squared_distance
+from hmc.body.flesh import SurfaceSamples, surface_samples
+from hmc.body.floor import floor_gap
+from hmc.body.model import PART_OF_DOF, PART_OF_SEGMENT, PARTS, BodyModel, Cones
+from hmc.body.penetration import AxisPoints, axis_points, depths_placed
+from hmc.body.placing import place_segments
+from hmc.body.prior import POSTURE, posture_spread
+from hmc.errors import InputError
+from hmc.pose.views.hull_target import HullTarget, distance_at
+
+__all__ = [
+    "BodyPoints",
+    "SymmetricSettings",
+    "body_distance",
+    "body_points",
+    "outside_distance",
+    "symmetric_cost",
+    "symmetric_cost_by_part",
+    "thinned",
+]
+
+#: The largest cap: the distance fields must go beyond it by a voxel and more (`hmc.pose.views.hull_target.FAR_M`).
+MOST_CAP_M = 0.2
+#: Elements (pairs of a cone and a point x states) worked on at a time: what stays in the second-level cache.
+CHUNK = 16384
+
+
+@dataclass(frozen=True)
+class SymmetricSettings:
+    """Weights of the symmetric cost.
+
+    Parameters
+    ----------
+    cap_m : float
+        Distances beyond this count as this (metres), so that furniture in the hull or a cut-off limb cannot pull without end.
+    explain_weight : float
+        Weight of what the body does not explain against body outside the hull.
+    ray_share : float
+        Share of rays in what has to be explained; the rest is points of the strict hull's surface. A hull is fatter than its person, the
+        more so the fewer cameras there are, and its surface makes the body swell and lean into ghosts; rays alone sometimes leave an arm
+        before the trunk, which hides it. docs/accuracy.md has what both are worth.
+    overlap_weight : float
+        Weight of parts that reach into one another.
+    posture_weight : float
+        Square metres that an angle one spread (`posture_spread`) away from rest costs: it decides between poses that the hulls do not
+        tell apart, such as the ways to fold an arm before the chest.
+    floor_weight : float
+        Weight of hanging in the air or being sunk in the floor (`hmc.body.floor`).
+    """
+
+    cap_m: float = 0.06
+    explain_weight: float = 0.4
+    ray_share: float = 0.9
+    overlap_weight: float = 2.0
+    posture_weight: float = 3e-6
+    floor_weight: float = 0.015
+
+    def __post_init__(self) -> None:
+        if not 0 < self.cap_m <= MOST_CAP_M:
+            raise InputError(f"`cap_m` must be above 0 and at most {MOST_CAP_M} m, where the hulls' distance fields end; got {self.cap_m}")
+
+
+@dataclass(frozen=True)
+class BodyPoints:
+    """Points of one body at which the cost is taken: its surface, and the axes of its limbs."""
+
+    surface: SurfaceSamples
+    axes: AxisPoints
+
+
+def body_points(body: BodyModel, coordinates: tuple[np.ndarray, np.ndarray, np.ndarray]) -> BodyPoints:
+    """The points of a body, its surface sampled at given coordinates (`hmc.body.flesh.surface_coordinates`)."""
+    return BodyPoints(surface_samples(body, coordinates), axis_points(body))
+
+
+def thinned(points: BodyPoints, n: int) -> BodyPoints:
+    """About `n` of the surface's points, evenly spread, and all of the axes'."""
+    step = max(1, round(len(points.surface.points) / n))
+    surface = points.surface
+    few = SurfaceSamples(*(values[::step] for values in (surface.points, surface.normals, surface.segment, surface.part)))
+    return BodyPoints(few, points.axes)
+
+
+def outside_distance(body: BodyModel, samples: SurfaceSamples, states: np.ndarray, target: HullTarget) -> np.ndarray:
+    """Distance of each body-surface sample to the tolerant hull.
+
+    Parameters
+    ----------
+    body : BodyModel
+    samples : SurfaceSamples
+    states : ndarray, shape (n, 27)
+    target : HullTarget
+
+    Returns
+    -------
+    ndarray of float32, shape (n, n_samples)
+        Metres; 0 inside.
+    """
+    return _outside(samples, place_segments(body, states, target.origin), target, target.origin).T
+
+
+def _outside(samples: SurfaceSamples, placed: np.ndarray, target: HullTarget, origin: np.ndarray) -> np.ndarray:
+    """The same for segments placed around an origin, shape (n_samples, n)."""
+    n, shape = placed.shape[-1], target.distance.shape
+    out = np.empty((len(samples.points), n), np.float32)
+    local = np.c_[samples.points, np.ones(len(samples.points))].astype(np.float32)
+    # In voxels, counted from the corner of the crop's first one.
+    columns = placed * np.float32(1 / target.voxel_size_m)
+    columns[:, :, 3] += ((origin - target.origin) / target.voxel_size_m + 0.5).astype(np.float32)[:, None]
+    edges = np.r_[0, np.flatnonzero(np.diff(samples.segment)) + 1, len(local)].tolist()
+    segments = samples.segment[edges[:-1]]
+    distance = target.distance.ravel()
+    for start, stop, segment, inside in zip(edges, edges[1:], segments, _stay_in(local, edges, columns[segments], shape), strict=False):
+        at = local[start:stop] @ columns[segment]  # (axis, point, particle)
+        if inside:
+            voxel = at.astype(np.int32)
+            flat = voxel[0]
+            for axis in (1, 2):
+                flat *= shape[axis]
+                flat += voxel[axis]
+            distance.take(flat.astype(np.intp), out=out[start:stop], mode="wrap")
+        else:
+            world = (np.moveaxis(at, 0, -1) - np.float32(0.5)) * np.float32(target.voxel_size_m)
+            out[start:stop] = distance_at(replace(target, origin=np.zeros(3)), world)
+    return out
+
+
+def _stay_in(local: np.ndarray, edges: list[int], columns: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    """Which runs of points, between edges, stay inside the crop in every particle, as seen from the sphere around each."""
+    low, high = np.minimum.reduceat(local, edges[:-1]), np.maximum.reduceat(local, edges[:-1])
+    middle = (low + high) / 2
+    radius = np.linalg.norm(high - low, axis=1) / 2 * np.linalg.norm(columns[0, :, 0, 0]) + 0.01  # the columns count voxels
+    centre = (middle[:, None, None] @ columns)[:, :, 0]
+    return np.all((centre.min(axis=2) >= radius[:, None]) & (centre.max(axis=2) < np.array(shape) - radius[:, None]), axis=1)
+
+
+def body_distance(body: BodyModel, states: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Distance of hull points, or of rays, to the nearest truncated cone of the body.
+
+    Parameters
+    ----------
+    body : BodyModel
+    states : ndarray, shape (n, 27)
+    points : ndarray, shape (k, 3) or (k, 6)
+        World, metres (`hmc.pose.views.rays`).
+
+    Returns
+    -------
+    ndarray of float32, shape (n, k)
+        Metres; 0 inside the body.
+    """
+    # Relative to the points' middle: float32 then has digits to spare.
+    places, directions = places_and_directions(points)
+    origin = places.mean(axis=0)
+    maps = cone_maps(body.cones, place_segments(body, states, origin))
+    return _to_body(body.cones, maps, places - origin, directions).T
+
+
+def _to_body(
+    cones: Cones, maps: ConeMaps, points: np.ndarray, directions: np.ndarray | None = None, near: np.ndarray | None = None
+) -> np.ndarray:
+    """Distance of points, or of rays through them, to the nearest of the cones that are near them, shape (k, n); infinite where none is.
+
+    `near`, shape (n_cones, k), says which are; all by default.
+    """
+    n_cones, n = len(maps.start), maps.start.shape[-1]
+    cone, point = np.nonzero(np.ones((n_cones, len(points)), bool) if near is None else near)
+    edges = np.searchsorted(cone, np.arange(n_cones + 1)).tolist()
+    homogeneous = np.c_[points, np.ones(len(points))].astype(np.float32)[point]
+    along = None if directions is None else directions.astype(np.float32)[point]
+    length, first, slope = (values[cone] for values in cone_shapes(cones))
+    step = max(1, CHUNK // n)
+    local_buffer, along_buffer = np.empty((2, 3, step, n), np.float32)
+    squared_buffer = np.empty((step, n), np.float32)
+    out = np.full((len(points), n), np.inf, np.float32)
+    for begin in range(0, len(cone), step):
+        end = min(begin + step, len(cone))
+        local, turned, squared = local_buffer[:, : end - begin], along_buffer[:, : end - begin], squared_buffer[: end - begin]
+        pieces = [(c, max(edges[c], begin), min(edges[c + 1], end)) for c in range(cone[begin], cone[end - 1] + 1)]
+        for c, start, stop in pieces:
+            np.matmul(homogeneous[start:stop], maps.to_cone[c], out=local[:, start - begin : stop - begin])
+            if along is not None:
+                np.matmul(along[start:stop], maps.to_cone[c, :, :3], out=turned[:, start - begin : stop - begin])
+        if along is not None:
+            slide_to_axis(local, turned, length[begin:end])
+        squared_distance(local, length[begin:end], first[begin:end], slope[begin:end], squared)
+        for _, start, stop in pieces:
+            members = point[start:stop]
+            out[members] = np.minimum(out[members], squared[start - begin : stop - begin])
+    return np.sqrt(out, out=out)
+
+
+def symmetric_cost(
+    body: BodyModel,
+    points: BodyPoints,
+    states: np.ndarray,
+    target: HullTarget,
+    hull_points: np.ndarray,
+    settings: SymmetricSettings,
+) -> np.ndarray:
+    """Mean squared distance of body from hulls, of silhouettes and hull from the body, depth of its parts in one another, and posture.
+
+    Parameters
+    ----------
+    body : BodyModel
+    points : BodyPoints
+    states : ndarray, shape (n, 27)
+    target : HullTarget
+    hull_points : ndarray, shape (k, 3) or (k, 6)
+        What has to be explained (`hmc.pose.views.rays.points_to_explain`).
+    settings : SymmetricSettings
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Square metres.
+    """
+    outside, unexplained, _, depth, gap, posture = _terms(body, points, states, target, hull_points, settings)
+    return (
+        gap
+        + np.einsum("ij,ij->j", outside, outside) / len(outside)
+        + settings.explain_weight / len(hull_points) * np.einsum("ij,ij->j", unexplained, unexplained)
+        + settings.overlap_weight / len(depth) * np.einsum("ij,ij->j", depth, depth)
+        + posture.sum(axis=1)
+    )
+
+
+def symmetric_cost_by_part(
+    body: BodyModel,
+    points: BodyPoints,
+    states: np.ndarray,
+    target: HullTarget,
+    hull_points: np.ndarray,
+    hull_part: np.ndarray,
+    settings: SymmetricSettings,
+) -> np.ndarray:
+    """`symmetric_cost`, each part's own share of it.
+
+    Parameters
+    ----------
+    body, points, states, target, hull_points, settings
+        As of `symmetric_cost`.
+    hull_part : ndarray of int, shape (k,)
+        The part that is asked to explain each of `hull_points`.
+
+    Returns
+    -------
+    ndarray, shape (n, n_parts)
+        Square metres; standing on the floor is the torso's share.
+    """
+    outside, unexplained, asking, depth, gap, posture = _terms(body, points, states, target, hull_points, settings)
+    columns = np.eye(len(PARTS), dtype=outside.dtype)
+    cost = posture @ columns[PART_OF_DOF]
+    for values, part, weight in (
+        (outside, points.surface.part, 1 / len(outside)),
+        (unexplained, hull_part[asking], settings.explain_weight / len(hull_points)),
+        (depth, PART_OF_SEGMENT[points.axes.segment], settings.overlap_weight / len(depth)),
+    ):
+        cost += weight * (values**2).T @ columns[part]
+    cost[:, 0] += gap
+    return cost
+
+
+def _terms(body, points, states, target, hull_points, settings) -> tuple[np.ndarray, ...]:
+    """What the cost is made of.
+
+    Metres, each of shape (., n): distances of body from hulls; of silhouettes from the body, of places that are not in it in every
+    state, and which these are; depths. Square metres: the cost of hanging in the air, shape (n,), and of each angle, shape (n, 27).
+    """
+    cap = np.float32(settings.cap_m)
+    places, directions = places_and_directions(hull_points)
+    origin = places.mean(axis=0)
+    placed = place_segments(body, states, origin)
+    maps = cone_maps(body.cones, placed)
+    outside = np.minimum(_outside(points.surface, placed, target, origin), cap)
+    near, held = cones_near(body.cones, maps, places - origin, settings.cap_m, directions)
+    asking = np.flatnonzero(~held)
+    unexplained = _to_body(body.cones, maps, (places - origin)[asking], None if directions is None else directions[asking], near[:, asking])
+    unexplained = np.minimum(unexplained, cap)
+    depth = depths_placed(body, points.axes, placed, maps)
+    gap = np.zeros(len(states))
+    if target.floor_z is not None:
+        rotations, positions = np.moveaxis(placed[:, :, :3], -1, 0), np.moveaxis(placed[:, :, 3], -1, 0)
+        gap = floor_gap(body, rotations, positions, target.floor_z - origin[2])
+    posture = settings.posture_weight * ((states - POSTURE[0]) / posture_spread(states)) ** 2
+    return outside, unexplained, asking, depth, settings.floor_weight * gap**2, posture

@@ -1,1 +1,0 @@
-"""Multi-cue descent: a superellipsoid body fitted to surface voxels, image edges and colours by Stochastic Meta Descent. Kehl (2006)."""

@@ -1,0 +1,1 @@
+"""First poses, and the person's own dimensions."""

@@ -1,0 +1,127 @@
+"""From a first pose to a person who is followed: the pose settles, and the body takes the person's own dimensions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hmc.body.flesh import surface_coordinates
+from hmc.body.model import BodyModel
+from hmc.pose.starts.fit_body import FitBodySettings, fit_body
+from hmc.pose.steps.descent.tracker import SmdPreset, SmdTracker, TrackState, make_tracker, track_init, track_step
+from hmc.pose.steps.preset import pose_preset
+from hmc.pose.views.hull_target import HullTarget
+from hmc.pose.views.rays import points_to_explain
+from hmc.pose.views.skin import Observed
+
+__all__ = ["FirstPose", "begin", "fitted_body"]
+
+#: The first pose is settled by so many passes over its frame.
+SETTLE = 4
+#: The body is fitted to at most so many frames, and needs at least so many.
+FIT_FRAMES, LEAST_FRAMES = 6, 3
+#: Deviation of the stature's logarithm where the stature was given.
+KNOWN_STATURE = 0.015
+#: A fitted body is taken where it lowers the cost by this factor at least.
+WORTH_IT = 0.97
+
+
+@dataclass(frozen=True)
+class FirstPose:
+    """Body and pose (27,) of one of the frames that were watched, by its place among them.
+
+    Parameters
+    ----------
+    place : int
+    body : BodyModel
+    state : ndarray, shape (27,)
+    is_fitted : bool
+        The body has the person's own dimensions already.
+    """
+
+    place: int
+    body: BodyModel
+    state: np.ndarray
+    is_fitted: bool = False
+
+
+def begin(
+    rng: np.random.Generator,
+    preset: SmdPreset,
+    first: FirstPose,
+    observed: Sequence[Observed | None],
+    targets: Sequence[HullTarget | None],
+    height_known: bool = False,
+) -> tuple[SmdTracker, TrackState]:
+    """Settle in the first pose; follow from there, fit the body to some of the frames, and settle once more.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    preset : SmdPreset
+    first : FirstPose
+    observed, targets : sequence
+        What was seen in the frames that were watched.
+    height_known : bool
+        The stature was given, so the fit is to change it little.
+
+    Returns
+    -------
+    tracker : SmdTracker
+    state : TrackState
+        In the first pose's frame, at rest.
+    """
+    tracker = make_tracker(first.body, preset)
+    state = _settled(rng, tracker, first.state, observed[first.place])
+    if first.is_fitted:
+        return tracker, state
+    states, hulls, now = [], [], state
+    for one, target in zip(observed[first.place :], targets[first.place :], strict=True):
+        now, info = track_step(rng, tracker, now, one)
+        if info.status == "fitted" and target is not None:
+            states.append(now.state)
+            hulls.append(target)
+    body = fitted_body(rng, first.body, states, hulls, height_known)
+    if body is None:
+        return tracker, state
+    tracker = make_tracker(body, preset)
+    return tracker, _settled(rng, tracker, state.state, observed[first.place])
+
+
+def fitted_body(
+    rng: np.random.Generator, body: BodyModel, states: Sequence[np.ndarray], targets: Sequence[HullTarget], height_known: bool
+) -> BodyModel | None:
+    """A body with the person's own lengths and girths (`hmc.pose.starts.fit_body`), or None where that explains the hulls no better.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    body : BodyModel
+    states : sequence of ndarray, shape (27,)
+    targets : sequence of HullTarget
+        Of the same frames.
+    height_known : bool
+    """
+    if len(states) < LEAST_FRAMES:
+        return None
+    preset = pose_preset("default")
+    if preset.refine is None or preset.fit_body is None:
+        return None
+    picks = np.unique(np.linspace(0, len(states) - 1, FIT_FRAMES).round().astype(int))
+    points = [points_to_explain(rng, targets[k], preset.fine_hull_points, preset.symmetric.ray_share) for k in picks]
+    settings: FitBodySettings = replace(preset.fit_body, scale_deviation=KNOWN_STATURE) if height_known else preset.fit_body
+    coordinates = surface_coordinates(body, preset.surface_samples)
+    found, _, info = fit_body(
+        body, coordinates, np.array([states[k] for k in picks]), [targets[k] for k in picks], points, preset.symmetric, settings
+    )
+    return found if info.cost_after < WORTH_IT * info.cost_before else None
+
+
+def _settled(rng: np.random.Generator, tracker: SmdTracker, state: np.ndarray, observed: Observed | None) -> TrackState:
+    now = track_init(state)
+    for _ in range(SETTLE):
+        now, _ = track_step(rng, tracker, now, observed)
+        now = replace(now, velocity=0 * now.velocity)
+    return now

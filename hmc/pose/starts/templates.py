@@ -1,0 +1,131 @@
+"""The first pose of a person, from one frame's hulls and no knowledge but a rough heading, if that.
+
+Canton (2009, section 6.3.3) sets the root by the tracker, the heading by the walk, and every other angle to neutral. That
+loses people who do not stand with their arms down, or stand still. Here every heading is tried with a few typical poses,
+the best of each heading is refined, and the caller follows the most promising ones for some frames before choosing
+(`hmc.pose.starts.window`).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hmc.body.joints import dof_index
+from hmc.body.kinematics import landmarks
+from hmc.body.model import BodyModel, neutral_state
+from hmc.pose.objectives.symmetric import BodyPoints, SymmetricSettings, symmetric_cost
+from hmc.pose.steps.refine import RefineSettings, refine
+from hmc.pose.views.hull_target import HullTarget
+from hmc.pose.views.rays import points_to_explain
+
+__all__ = ["TEMPLATES", "first_poses", "template_states"]
+
+#: Typical poses, degrees on top of hanging arms: (angles, height of the pelvis over the stature, lean included).
+TEMPLATES: dict[str, tuple[dict[str, float], float]] = {
+    "standing": ({}, 0.54),
+    "arms sideways": ({"r_shoulder_x": 0, "l_shoulder_x": 0, "r_elbow_z": 0, "l_elbow_z": 0}, 0.54),
+    "arms half raised": ({"r_shoulder_x": 45, "l_shoulder_x": -45}, 0.54),
+    "arms up": ({"r_shoulder_x": -70, "l_shoulder_x": 70}, 0.54),
+    "forearms forward": ({"r_elbow_z": 90, "l_elbow_z": -90}, 0.54),
+    "guard": ({"r_shoulder_z": 30, "l_shoulder_z": -30, "r_elbow_z": 120, "l_elbow_z": -120}, 0.53),
+    "arms forward": ({"r_shoulder_x": 70, "l_shoulder_x": -70, "r_shoulder_z": 80, "l_shoulder_z": -80}, 0.54),
+    "left step": ({"l_hip_y": -25, "r_hip_y": 20, "r_knee_y": 20, "r_shoulder_z": 25, "l_shoulder_z": 20}, 0.53),
+    "right step": ({"r_hip_y": -25, "l_hip_y": 20, "l_knee_y": 20, "l_shoulder_z": -25, "r_shoulder_z": -20}, 0.53),
+    "legs apart": ({"r_hip_x": -20, "l_hip_x": 20}, 0.52),
+    "on left leg": ({"r_hip_y": -40, "r_knee_y": 70}, 0.54),
+    "on right leg": ({"l_hip_y": -40, "l_knee_y": 70}, 0.54),
+    "half squat": ({"r_hip_y": -50, "l_hip_y": -50, "r_knee_y": 70, "l_knee_y": 70, "torso_y": 25}, 0.45),
+    "sitting": ({"r_hip_y": -90, "l_hip_y": -90, "r_knee_y": 90, "l_knee_y": 90, "r_elbow_z": 60, "l_elbow_z": -60}, 0.31),
+    "bent down": ({"torso_y": 70, "r_hip_y": -15, "l_hip_y": -15, "r_shoulder_z": 70, "l_shoulder_z": -70}, 0.50),
+    "kneeling": ({"r_hip_y": -20, "l_hip_y": -20, "r_knee_y": 100, "l_knee_y": 100}, 0.31),
+}
+
+
+def template_states(body: BodyModel, xy: np.ndarray, floor_z: float, headings: np.ndarray) -> np.ndarray:
+    """Every template pose at every heading.
+
+    Parameters
+    ----------
+    body : BodyModel
+    xy : ndarray, shape (2,)
+        Where the pelvis stands, world, metres.
+    floor_z : float
+        Height of the floor, metres.
+    headings : ndarray, shape (n,)
+        Radians about Z; 0 faces X.
+
+    Returns
+    -------
+    ndarray, shape (n, n_templates, 27)
+    """
+    states = []
+    for angles, pelvis in TEMPLATES.values():
+        state = neutral_state("down", body.limits)
+        for name, degrees in angles.items():
+            state[dof_index(name)] = np.radians(degrees)
+        state[:3] = (*xy, floor_z + pelvis * body.height_m)
+        states.append(np.clip(state, body.limits.low, body.limits.high))
+    out = np.repeat(np.array(states)[None], len(headings), axis=0)
+    out[:, :, 3] = np.asarray(headings)[:, None]
+    return out
+
+
+def first_poses(
+    rng: np.random.Generator,
+    body: BodyModel,
+    samples: BodyPoints,
+    target: HullTarget,
+    cost_settings: SymmetricSettings,
+    floor_z: float = 0.0,
+    n_headings: int = 12,
+    variants: int = 4,
+    keep: int = 6,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Candidate poses of a person in one frame, best first.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    body, samples, target, cost_settings
+        As for `hmc.pose.objectives.symmetric.symmetric_cost`.
+    floor_z : float
+        Height of the floor, metres.
+    n_headings : int
+        Headings tried, evenly spread.
+    variants : int
+        Random variants of each template at each heading.
+    keep : int
+        Candidates returned, from different headings.
+
+    Returns
+    -------
+    states : ndarray, shape (keep, 27)
+    costs : ndarray, shape (keep,)
+        Square metres.
+    """
+    middle = target.surface.mean(0)
+    headings = np.linspace(-np.pi, np.pi, n_headings, endpoint=False)
+    states = template_states(body, middle[:2], floor_z, headings)
+    n_templates = states.shape[1]
+    states = np.repeat(states[:, :, None], variants, axis=2)
+    spread = np.r_[0.06, 0.06, 0.05, 0.12, 0.08, 0.08, np.full(21, 0.2)]
+    noise = rng.standard_normal(states.shape) * spread
+    noise[:, :, 0] = 0.0  # the template itself takes part
+    states = np.clip(states + noise, body.limits.low, body.limits.high).reshape(n_headings, n_templates * variants, -1)
+    coarse = points_to_explain(rng, target, 150, cost_settings.ray_share)
+    costs = symmetric_cost(body, samples, states.reshape(-1, states.shape[-1]), target, coarse, cost_settings).reshape(n_headings, -1)
+    points = points_to_explain(rng, target, 400, cost_settings.ray_share)
+    candidates = []
+    settings = RefineSettings(iterations=10)
+    for states_there, costs_there in zip(states, costs, strict=True):
+        for pick in np.argsort(costs_there)[:2]:
+            state, info = refine(body, samples, states_there[pick], target, points, cost_settings, settings)
+            candidates.append((info.cost_after, state))
+    candidates.sort(key=lambda pair: pair[0])
+    chosen: list[tuple[float, np.ndarray]] = []
+    for cost, state in candidates:
+        if all(np.abs(landmarks(body, state) - landmarks(body, other)).max() > 0.05 for _, other in chosen):
+            chosen.append((cost, state))
+        if len(chosen) == keep:
+            break
+    return np.array([state for _, state in chosen]), np.array([cost for cost, _ in chosen])

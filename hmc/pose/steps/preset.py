@@ -1,0 +1,158 @@
+"""Named settings of the annealed pose filter, each with its source."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from hmc.body.joints import DOF_NAMES
+from hmc.body.scalable_models import Inclusive
+from hmc.errors import InputError
+from hmc.pose.objectives.symmetric import SymmetricSettings
+from hmc.pose.starts.fit_body import FitBodySettings
+from hmc.pose.steps.hidden.limbs import LimbSettings
+from hmc.pose.steps.limb_search import SearchSettings
+from hmc.pose.steps.refine import RefineSettings
+from hmc.search.filters import AnnealedSettings
+from hmc.search.structural import StructuralSettings
+
+__all__ = ["PRESETS", "PosePreset", "drift", "pose_preset"]
+
+# Half of the largest variation expected in a thirtieth of a second: metres for the translations, radians for the angles.
+_DRIFT = {
+    "root_tx": 0.05, "root_ty": 0.05, "root_tz": 0.04, "root_rz": 0.14, "root_ry": 0.10, "root_rx": 0.08,
+    "torso": 0.08, "neck": 0.10, "shoulder": 0.30, "elbow": 0.35, "hip": 0.20, "knee": 0.28,
+}  # fmt: skip
+
+
+def drift(fps: float) -> np.ndarray:
+    """P0, the first layer's deviations: half of the largest variation expected in one frame (Canton 2009, section 3.2.2).
+
+    Parameters
+    ----------
+    fps : float
+        Frames a second; below 30 the variation grows in proportion, up to threefold.
+
+    Returns
+    -------
+    ndarray, shape (27,)
+        Metres and radians.
+    """
+    scale = float(np.clip(30.0 / fps, 0.5, 3.0))
+    values = []
+    for name in DOF_NAMES:
+        key = next(key for key in _DRIFT if key in name) if name not in _DRIFT else name
+        values.append(_DRIFT[key])
+    return scale * np.array(values)
+
+
+@dataclass(frozen=True)
+class PosePreset:
+    """Everything that decides how poses are estimated.
+
+    Parameters
+    ----------
+    name : str
+    source : str
+        Where the numbers come from.
+    body : {"default", "canton"}
+        Proportions and joint limits (`hmc.body.proportions`).
+    likelihood : {"symmetric", "factorised", "global"}
+        The symmetric cost, or the four scores of Canton (2009), section 6.5.
+    annealed : AnnealedSettings
+    drift_scale : float
+        Factor on `drift`.
+    motion : {"none", "smooth", "both"}
+        Where a frame's particles start: where the last frame's were; moved on as in the frame before; or half and half (Canton, section
+        3.1.2.2).
+    coarse_samples, hull_points : int
+        Points of the body's surface, and rays and points of the hull's, in the symmetric cost, for the particles.
+    surface_samples, fine_hull_points : int
+        The same in the refinement.
+    density : float
+        Spacing of the flesh table over the voxel size (Canton, Eq. 6.26), for the four scores.
+    symmetric : SymmetricSettings
+    refine : RefineSettings or None
+        Local refinement of each frame's estimate.
+    search : SearchSettings or None
+        Search for a limb that got lost.
+    fit_body : FitBodySettings or None
+        Fit the person's dimensions over the first frames.
+    start : {"hypotheses", "spectral", "neutral"}
+        Several starts with a left-right test, from typical poses or from the voxels' skeleton (`hmc.pose.starts.spectral`), or the thesis's
+        neutral pose with the heading of the walk.
+    models : tuple of Inclusive
+        Hierarchies for structural annealing in place of `annealed`; of two, each frame has the one that suits the last pose. None by
+        default.
+    structural : StructuralSettings
+        Where there are `models`.
+    limbs : LimbSettings or None
+        Limbs that the data does not show are left out and looked for.
+    """
+
+    name: str
+    source: str
+    body: Literal["default", "canton"] = "default"
+    likelihood: Literal["symmetric", "factorised", "global"] = "symmetric"
+    annealed: AnnealedSettings = field(default_factory=AnnealedSettings)
+    drift_scale: float = 1.0
+    motion: Literal["none", "smooth", "both"] = "none"
+    coarse_samples: int = 350
+    hull_points: int = 250
+    surface_samples: int = 350
+    fine_hull_points: int = 600
+    density: float = 1.0
+    symmetric: SymmetricSettings = field(default_factory=SymmetricSettings)
+    refine: RefineSettings | None = None
+    search: SearchSettings | None = None
+    fit_body: FitBodySettings | None = None
+    start: Literal["hypotheses", "spectral", "neutral"] = "neutral"
+    models: tuple[Inclusive, ...] = ()
+    structural: StructuralSettings = field(default_factory=StructuralSettings)
+    limbs: LimbSettings | None = None
+
+    def __post_init__(self) -> None:
+        if self.refine is None and (self.search is not None or self.fit_body is not None or self.start != "neutral"):
+            raise InputError(f"preset '{self.name}': search, fit_body and several starts need `refine`")
+        if self.search is not None and self.search.far_m > self.symmetric.cap_m:
+            raise InputError(f"preset '{self.name}': `search.far_m` must not exceed `symmetric.cap_m`, beyond which no distance is known")
+        if self.refine is not None and self.likelihood != "symmetric":
+            raise InputError(f"preset '{self.name}': `refine` needs the symmetric likelihood")
+
+
+PRESETS: dict[str, PosePreset] = {
+    "canton2009": PosePreset(
+        name="canton2009",
+        source="Canton (2009), 3.2.2 and 6.3 to 6.7: Tables 6.1 and 6.2, 6 layers of 600 particles, survival rate .5, neutral start",
+        body="canton",
+        likelihood="factorised",
+        annealed=AnnealedSettings(layers=6, particles=600, survival_rate=0.5, spread="survival"),
+    ),
+    "default": PosePreset(
+        name="default",
+        source="found on rendered recordings (docs/accuracy.md): symmetric cost, strong selection, refinement, limb search, fitted body",
+        annealed=AnnealedSettings(layers=4, particles=120, survival_rate=0.04, spread=0.6),
+        drift_scale=0.7,
+        motion="both",
+        refine=RefineSettings(),
+        search=SearchSettings(),
+        fit_body=FitBodySettings(),
+        start="hypotheses",
+        structural=StructuralSettings(gamma=11.0, layers=2, inner=0.6, survival_rate=0.3, by_limb=True),
+    ),
+}
+
+
+def pose_preset(name: str) -> PosePreset:
+    """A preset by its name.
+
+    Raises
+    ------
+    InputError
+        When there is none of that name.
+    """
+    if name not in PRESETS:
+        raise InputError(f"no preset named {name!r}; there are {', '.join(sorted(PRESETS))}")
+    return PRESETS[name]

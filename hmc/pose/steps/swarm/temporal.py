@@ -1,0 +1,348 @@
+"""Following a skeleton from frame to frame: a swarm near the last pose, and a new start where that is not good enough.
+
+Source: Hsiao (2008), section 3.2.2.5 and Figure 3-22.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from hmc.body.spin_skeleton import SkeletonModel
+from hmc.pose.objectives.curves import curves_near, curves_of, observe_curves
+from hmc.pose.spectral.reading import BodyReading
+from hmc.pose.steps.swarm.first import is_upright, pose_near, rest_poses
+from hmc.pose.steps.swarm.fit import (
+    FitSettings,
+    Fitted,
+    Prior,
+    bounds_around,
+    fine_tune,
+    fit_around,
+    fit_cost,
+    fit_hierarchical,
+    rest_state,
+)
+from hmc.pose.steps.swarm.heading import facing_evidence, heading_of, spin_towards
+from hmc.pose.steps.swarm.lost_limbs import free_limbs
+
+__all__ = ["SwarmInfo", "SwarmSettings", "SwarmState", "missed", "start_fits", "swarm_step"]
+
+FAR = "the nearest pose is too far from the curves"
+
+
+@dataclass(frozen=True)
+class SwarmSettings:
+    """How a person is followed.
+
+    Parameters
+    ----------
+    fit : FitSettings
+        Of a start.
+    nodes : int
+        Nodes of a curve that count.
+    reach_m_s, reach_rad_s : float
+        Temporal constraint: fastest change of positions and angles.
+    least_reach_m, least_reach_rad : float
+        The constraint is not tighter than this in any frame.
+    particles, iterations : int
+        Of the temporal swarm.
+    doubt_m, doubt_ratio : float
+        A start is tried beside the temporal fit when its cost is larger than the first, metres, and than the second times the cost that
+        was usual.
+    retry_frames : int
+        A pose whose cost is larger than `doubt_m` is compared with a fresh one as often, whatever is usual.
+    margin_m : float
+        The start is taken when its cost is smaller by this, metres.
+    margin_share : float
+        And a fresh pose only when its cost is smaller by this share too: of a fat hull every pose costs much, and says little.
+    facing_m : float
+        By how much facing straight backwards raises an error, metres.
+    backwards : float
+        A skeleton is turned about when the evidence for its heading falls below this; two feet that point backwards are -2 a frame.
+    farthest_m : float
+        A curve that is farther than this from every part of the last pose is not taken for one, metres.
+    lost_m : float
+        A frame whose cost is larger has no fit, metres.
+    rest_weight : float
+        How much a body at rest counts in the first pose (`Prior`).
+    first_facing_m : float
+        By how much facing as the heading says lowers the cost of a first pose, metres.
+    last_weight : float
+        How much the last pose counts in a new start (`Prior`).
+    spin_weight : float
+        How much a change of the spin from one frame to the next counts, metres a radian.
+    always_check : bool
+        Try a start in every frame, as the thesis does.
+    voxels : bool
+        Whether the voxels count beside their curves; the thesis fits curves alone, and has no fit where they are not those of a body.
+    """
+
+    fit: FitSettings = field(default_factory=FitSettings)
+    nodes: int = 8
+    reach_m_s: float = 2.5
+    reach_rad_s: float = 14.0
+    least_reach_m: float = 0.05
+    least_reach_rad: float = 0.35
+    particles: int = 36
+    iterations: int = 15
+    doubt_m: float = 0.055
+    doubt_ratio: float = 1.4
+    retry_frames: int = 5
+    margin_m: float = 0.012
+    margin_share: float = 0.15
+    facing_m: float = 0.02
+    backwards: float = -2.5
+    farthest_m: float = 0.25
+    lost_m: float = 0.15
+    rest_weight: float = 0.02
+    first_facing_m: float = 0.02
+    last_weight: float = 0.02
+    spin_weight: float = 0.01
+    always_check: bool = False
+    voxels: bool = True
+
+
+@dataclass(frozen=True)
+class SwarmState:
+    """A followed skeleton.
+
+    Parameters
+    ----------
+    state, velocity : ndarray, shape (23,)
+        The last fit, and its change a frame.
+    usual_m : float
+        Running mean of the cost, metres.
+    facing : float
+        Sum of the evidence for the heading since the last start; negative: probably back to front.
+    missed : int
+        Frames without a fit since the last one.
+    untried : int
+        Frames since a fresh pose was tried.
+    """
+
+    state: np.ndarray
+    velocity: np.ndarray
+    usual_m: float
+    facing: float = 0.0
+    missed: int = 0
+    untried: int = 0
+
+
+@dataclass(frozen=True)
+class SwarmInfo:
+    """What happened in one frame.
+
+    Parameters
+    ----------
+    status : str
+        ``"fitted"``, or ``"no fit: "`` and why.
+    error_m : float
+        Mean distance of corresponding nodes, metres; NaN without a fit.
+    started : bool
+        Whether the pose is a new start, or one found anew in the last one's place, and not the followed one.
+    turned : bool
+        Whether the skeleton was turned about, because it had faced backwards.
+    evaluations : int
+    doubts : tuple of str
+        What the segmentation says is missing, touches or is left out.
+    cost_m : float
+        What the swarms minimised, metres; NaN where they did not run.
+    """
+
+    status: str
+    error_m: float
+    started: bool
+    turned: bool
+    evaluations: int
+    doubts: tuple[str, ...]
+    cost_m: float = np.nan
+
+
+def start_fits(
+    rng: np.random.Generator,
+    model: SkeletonModel,
+    reading: BodyReading,
+    heading: np.ndarray | None,
+    settings: SwarmSettings,
+    last: np.ndarray | None = None,
+) -> list[Fitted]:
+    """Poses from one frame alone, the likeliest first: either way round, weighed by the heading and the last pose where there are any.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    model : SkeletonModel
+    reading : BodyReading
+    heading : ndarray, shape (2,), or None
+        As from `hmc.pose.steps.swarm.heading.heading_of`.
+    settings : SwarmSettings
+    last : ndarray, shape (23,), optional
+        The last pose: it is what is likely where curves are missing.
+    """
+    observed = observe_curves(model, curves_of(reading), settings.nodes, volume=reading.volume if settings.voxels else None)
+    trunk = reading.curves["trunk"]
+    rest = rest_state(model, trunk.mean(0), trunk[-1] - trunk[0])
+    weight = 0.004
+    if last is not None:
+        rest[6:], weight = last[6:], settings.last_weight
+        spins = [last[6], last[6] + np.pi]
+    elif heading is not None:
+        towards = spin_towards(rest, heading)
+        spins = [towards, towards + np.pi]
+    else:
+        spins = [0.0, np.pi / 2, np.pi, 3 * np.pi / 2]
+    fits = []
+    for spin in spins:
+        start = rest.copy()
+        start[6] = spin
+        found = fit_hierarchical(rng, model, observed, start, settings.fit, 1.0, weight)
+        wrong = 0.0
+        if heading is not None:
+            wrong += 0.5 * (1 - facing_evidence(found.state, heading / np.linalg.norm(heading)))
+        if last is not None:
+            wrong += 0.5 * (1 - np.cos(found.state[6] - last[6]))
+        fits.append((found.cost_m + settings.facing_m * wrong, found))
+    fits.sort(key=lambda pair: pair[0])
+    return [found for _, found in fits]
+
+
+def swarm_step(
+    rng: np.random.Generator,
+    model: SkeletonModel,
+    state: SwarmState | None,
+    reading: BodyReading,
+    fps: float,
+    velocity: np.ndarray | None = None,
+    settings: SwarmSettings | None = None,
+) -> tuple[SwarmState | None, SwarmInfo]:
+    """One frame of a person.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    model : SkeletonModel
+    state : SwarmState or None
+        None: nothing is known yet.
+    reading : BodyReading
+    fps : float
+    velocity : ndarray, shape (3,), optional
+        Of the person's track, metres a second.
+    settings : SwarmSettings, optional
+
+    Returns
+    -------
+    state : SwarmState or None
+    info : SwarmInfo
+    """
+    settings = settings or SwarmSettings()
+    segmentation = reading.segmentation
+    doubts = (*segmentation.doubts, *(f"{one} touch" for one in segmentation.touching), *reading.left_out)
+    volume = reading.volume if settings.voxels else None
+    if reading.status != "read" and (state is None or volume is None):
+        return missed(state), SwarmInfo(f"no fit: {reading.status}", np.nan, False, False, 0, doubts)
+    heading = heading_of(reading.feet, velocity)
+    if state is None:
+        first = _first_pose(rng, model, reading, heading, settings)
+        if first is None or (settings.voxels and first.cost_m > settings.lost_m):
+            why = "nobody is upright in the curves or the voxels" if first is None else FAR
+            return None, SwarmInfo(f"no fit: {why}", np.nan, False, False, 0, doubts)
+        found = first
+        facing = facing_evidence(found.state, heading)
+        return SwarmState(found.state, np.zeros_like(found.state), found.cost_m, facing), _info(found, True, False, 0, doubts)
+    frames = 1 + state.missed
+    metres = max(settings.reach_m_s * frames / fps, settings.least_reach_m)
+    radians = max(settings.reach_rad_s * frames / fps, settings.least_reach_rad)
+    prior = Prior(state.state, spin_weight=settings.spin_weight / frames)
+    low, high = bounds_around(model, state.state, metres, min(radians, np.pi))
+    starts = np.stack([state.state, state.state + state.velocity])
+    near = curves_near(model, state.state, reading, settings.farthest_m)
+    observed = observe_curves(model, near, settings.nodes, volume=volume)
+    found = fit_around(rng, model, observed, starts, low, high, settings.fit, settings.particles, settings.iterations, prior)
+    freed, more = free_limbs(rng, model, observed, found.state, prior) if settings.voxels else (found.state, 0)
+    tuned = fine_tune(rng, model, observed, freed, settings.fit, prior)
+    found = replace(tuned, evaluations=found.evaluations + more + tuned.evaluations)
+    facing = state.facing + facing_evidence(found.state, heading)
+    started = turned = False
+    spent = 0
+    backwards = facing < settings.backwards and facing_evidence(found.state, heading) < 0
+    whole = segmentation.whole and reading.status == "read"
+    # Parts that were left out because they are far away count here, where the frame shows everything.
+    cost_m = found.cost_m
+    if whole:
+        cost_m = float(fit_cost(model, found.state[None], observe_curves(model, curves_of(reading), settings.nodes, volume=volume))[0])
+    doubtful = cost_m > max(settings.doubt_m, settings.doubt_ratio * state.usual_m)
+    if reading.status == "read" and (((doubtful or backwards) and whole) or settings.always_check):
+        trial = start_fits(rng, model, reading, heading, settings, None if backwards else state.state)[0]
+        spent = trial.evaluations
+        margin = -settings.facing_m if backwards and facing_evidence(trial.state, heading) > 0 else settings.margin_m
+        if trial.cost_m < cost_m - margin:
+            found, started, turned = trial, True, backwards
+            facing = facing_evidence(trial.state, heading)
+        elif backwards:
+            facing = 0.0
+    untried = state.untried + 1
+    if settings.voxels and not started and cost_m > settings.doubt_m and untried >= settings.retry_frames:
+        # What is wrong costs much in frame after frame, and is what is usual then.
+        trial = _fresh_pose(rng, model, reading, found, replace(prior, weight=settings.last_weight), settings)
+        spent, untried = spent + trial.evaluations, 0
+        if trial.cost_m < found.cost_m - max(settings.margin_m, settings.margin_share * found.cost_m):
+            found, started = trial, True
+    if found.cost_m > settings.lost_m:
+        read = reading.status == "read"
+        why = FAR if read else reading.status
+        error_m = found.error_m if read else np.nan
+        return missed(replace(state, untried=untried)), SwarmInfo(
+            f"no fit: {why}", error_m, False, False, found.evaluations + spent, doubts, found.cost_m
+        )
+    change = np.zeros_like(found.state) if started else (found.state - state.state) / frames
+    # Sums of evidence fade, so that a wrong start can be seen after a while.
+    now = SwarmState(found.state, change, 0.9 * state.usual_m + 0.1 * found.cost_m, 0.97 * facing, 0, untried)
+    return now, _info(found, started, turned, spent, doubts)
+
+
+def _first_pose(
+    rng: np.random.Generator, model: SkeletonModel, reading: BodyReading, heading: np.ndarray | None, settings: SwarmSettings
+) -> Fitted | None:
+    """The upright pose that explains a frame best; None where there is none."""
+    trials = start_fits(rng, model, reading, heading, settings)
+    if settings.voxels:
+        rest = rest_poses(rng, model, reading, heading, settings.particles, settings.iterations, settings.fit)
+        likely = Prior(rest_state(model, np.zeros(3), np.array([0.0, 0.0, 1.0])), settings.rest_weight)
+        trials = _led_near(rng, model, reading, [*trials[:2], *rest], likely, settings)
+        if heading is not None:
+            way = heading / np.linalg.norm(heading)
+            trials.sort(key=lambda one: _unlikely(one, likely) - settings.first_facing_m * facing_evidence(one.state, way))
+    return next((one for one in trials if is_upright(one.state)), None)
+
+
+def _fresh_pose(
+    rng: np.random.Generator, model: SkeletonModel, reading: BodyReading, found: Fitted, likely: Prior, settings: SwarmSettings
+) -> Fitted:
+    """The better of a pose with its limbs tried anew, and of a body at rest in its place that is led into the voxels."""
+    rest = rest_poses(rng, model, reading, None, settings.particles, settings.iterations, settings.fit, found.state)
+    trials = _led_near(rng, model, reading, [found, *rest], likely, settings)
+    return replace(trials[0], evaluations=sum(one.evaluations for one in (*trials, *rest)))
+
+
+def _led_near(
+    rng: np.random.Generator, model: SkeletonModel, reading: BodyReading, rough: list[Fitted], likely: Prior, settings: SwarmSettings
+) -> list[Fitted]:
+    """Rough poses made better, the likeliest first."""
+    near = (settings.nodes, settings.farthest_m, settings.fit, likely)
+    return sorted((pose_near(rng, model, reading, one.state, *near) for one in rough), key=lambda one: _unlikely(one, likely))
+
+
+def _unlikely(found: Fitted, likely: Prior) -> float:
+    """What a pose costs, and what it has of angles that are not likely, metres."""
+    return found.cost_m + likely.weight * float(np.abs(found.state[7:] - likely.state[7:]).mean())
+
+
+def missed(state: SwarmState | None) -> SwarmState | None:
+    """The state after a frame without a fit: it stays where it was."""
+    return None if state is None else replace(state, velocity=np.zeros_like(state.velocity), missed=state.missed + 1)
+
+
+def _info(found: Fitted, started: bool, turned: bool, spent: int, doubts: tuple[str, ...]) -> SwarmInfo:
+    return SwarmInfo("fitted", found.error_m, started, turned, found.evaluations + spent, doubts, found.cost_m)

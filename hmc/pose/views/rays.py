@@ -1,0 +1,122 @@
+"""Rays of silhouettes: every pixel that shows the person asks for some part of the body somewhere along its line of sight.
+
+A hull of few cameras is much fatter than its person, and some of it is nobody at all: its surface asks for a body that is not there. The
+silhouettes from which it was carved do not: what they show is the person's, only the distance is not known.
+
+What a body has to explain is an array of places (m, 3), or of places and directions (m, 6): a ray goes through its place in a unit
+direction and is explained where any point of it is; a point of the hull's surface has direction zero, and is explained there only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from hmc.camera.model import Camera, Rig, project
+from hmc.pose.views.hull_target import HullTarget, sample_points
+from hmc.voxels.surface import surface
+
+__all__ = ["points_to_explain", "silhouette_rays", "with_rays"]
+
+
+def with_rays(target: HullTarget, rig: Rig, masks: Sequence[np.ndarray | None], others: np.ndarray | None = None) -> HullTarget:
+    """The same hulls, with the rays of the silhouettes that show them.
+
+    Parameters
+    ----------
+    target : HullTarget
+    rig : Rig
+    masks : sequence of ndarray of bool, shape (height, width), or None
+        Silhouettes, one a camera; None where a camera has none.
+    others : ndarray, shape (m, 3), optional
+        Voxel centres of other people, metres: a pixel that may be theirs asks nothing of this person.
+
+    Returns
+    -------
+    HullTarget
+    """
+    # The loose hull too: a leg that furniture hides from all cameras but one or two is in no other, and plain to see in these.
+    possible = target.tolerant | target.loose
+    points = np.concatenate([target.surface, target.origin + target.voxel_size_m * surface(possible)])
+    return replace(target, rays=silhouette_rays(rig, masks, points, target.voxel_size_m, others))
+
+
+def silhouette_rays(
+    rig: Rig, masks: Sequence[np.ndarray | None], points: np.ndarray, spacing_m: float, others: np.ndarray | None = None
+) -> np.ndarray:
+    """One ray for every patch of a silhouette that some of the points fall on.
+
+    Parameters
+    ----------
+    rig, masks, others
+        As for `with_rays`.
+    points : ndarray, shape (n, 3)
+        World, metres: a hull's surface.
+    spacing_m : float
+        Size of the patches at the points' median distance, metres.
+
+    Returns
+    -------
+    ndarray, shape (m, 6)
+        A place on each ray, one of the points, and the unit direction from the camera; camera by camera.
+    """
+    rays = [np.zeros((0, 6))]
+    # Which of a patch's points stands for its ray must not depend on the scan: places where a lost limb may be are drawn from them.
+    order = np.random.default_rng(0).permutation(len(points))
+    points = points[order]
+    for camera, mask in zip(rig, masks, strict=True):
+        if mask is None:
+            continue
+        uv, valid = project(camera, points)
+        column, row = np.rint(np.where(valid[:, None], uv, -1)).astype(int).T
+        inside = (column >= 0) & (row >= 0) & (column < camera.size[0]) & (row < camera.size[1])
+        seen = np.flatnonzero(inside)
+        seen = seen[mask[row[seen], column[seen]]]
+        if not len(seen):
+            continue
+        here = points[seen]
+        per_patch = np.median(_in_camera(camera, here)[:, 2]) / spacing_m
+        patches, pick = np.unique(_patches(camera, here, per_patch), return_index=True)
+        if others is not None and len(others):
+            before = others[_in_camera(camera, others)[:, 2] > spacing_m]
+            pick = pick[~np.isin(patches, _patches(camera, before, per_patch))]
+        directions = here[pick] - camera.centre
+        directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+        rays.append(np.concatenate([here[pick], directions], axis=1))
+    return np.concatenate(rays)
+
+
+def _in_camera(camera: Camera, points: np.ndarray) -> np.ndarray:
+    return points @ camera.rotation.T + camera.translation
+
+
+def _patches(camera: Camera, points: np.ndarray, per_unit: float) -> np.ndarray:
+    """A number for the patch of the image, without distortion, on which each point falls."""
+    x, y, depth = _in_camera(camera, points).T
+    column, row = np.floor(np.stack([x, y]) / depth * per_unit).astype(np.int64)
+    return column * 1_000_003 + row
+
+
+def points_to_explain(rng: np.random.Generator, target: HullTarget, n: int, ray_share: float) -> np.ndarray:
+    """About ``n`` places of a person that a body has to explain, evenly spread: rays of the silhouettes, and points of the strict hull.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    target : HullTarget
+    n : int
+    ray_share : float
+        Share of rays, where the target has any.
+
+    Returns
+    -------
+    ndarray, shape (m, 3) or (m, 6)
+    """
+    if target.rays is None or not len(target.rays):
+        return sample_points(rng, target.surface, n)
+    n_rays = round(ray_share * n)
+    chosen = sample_points(rng, target.surface, n - n_rays)
+    fixed = np.concatenate([chosen, np.zeros_like(chosen)], axis=1)
+    return np.concatenate([sample_points(rng, target.rays, n_rays), fixed])

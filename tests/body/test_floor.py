@@ -1,0 +1,93 @@
+"""The floor under the feet, and the loose hull that reaches down to it."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from hmc.body.flesh import surface_coordinates
+from hmc.body.floor import HANG_M, SINK_M, floor_gap, lowest_support
+from hmc.body.joints import dof_index
+from hmc.body.kinematics import segment_transforms
+from hmc.body.model import neutral_state
+from hmc.body.proportions import canton_body, default_body, stature
+from hmc.pose.objectives.residuals import residual_rows
+from hmc.pose.objectives.symmetric import SymmetricSettings, body_points, symmetric_cost
+from hmc.pose.views.hull_target import LOOSE_M, distance_at, make_target
+from hmc.voxels.grid import VoxelGrid
+
+BODY = default_body(1.8)
+GRID = VoxelGrid(np.zeros(3), 0.05, (40, 40, 40))
+
+
+def standing(pelvis_z):
+    state = neutral_state()
+    state[:3] = (1.0, 1.0, pelvis_z)
+    return state
+
+
+def leg_length():
+    return sum(BODY.dimensions[name] for name in ("thigh", "shank", "ankle_height"))
+
+
+@pytest.mark.parametrize("lift, gap", [(0.0, 0.0), (HANG_M, 0.0), (0.4, 0.4 - HANG_M), (-SINK_M, 0.0), (-0.3, -0.3 + SINK_M)])
+def test_gap_is_how_far_the_soles_are_off_the_floor(lift, gap):
+    rotations, positions = segment_transforms(BODY, standing(0.2 + leg_length() + lift)[None])
+    assert_allclose(floor_gap(BODY, rotations, positions, 0.2), [gap], atol=1e-12)
+
+
+def test_lowest_of_soles_and_knees_carries():
+    states = np.repeat(standing(1.0)[None], 3, axis=0)
+    states[1, dof_index("l_hip_y", "l_knee_y")] = np.radians([-90, 90])  # the left foot is lifted
+    states[2, dof_index("r_knee_y", "l_knee_y")] = np.radians(120)  # kneeling
+    rotations, positions = segment_transforms(BODY, states)
+    height, point, segment = lowest_support(BODY, rotations, positions)
+    knee = 1.0 - BODY.dimensions["thigh"]
+    assert_allclose(height, [1.0 - leg_length(), 1.0 - leg_length(), knee], atol=1e-12)
+    assert_allclose(point[:, 2], height)
+    assert segment[1] == 8  # the right shank
+
+
+def test_floor_row_against_finite_differences():
+    box = np.argwhere(np.ones((4, 4, 8), bool)) + [18, 18, 12]
+    target = make_target(GRID, box, box, None, 0.0)
+    points = body_points(BODY, surface_coordinates(BODY, 60))
+    settings = SymmetricSettings(floor_weight=1.0)
+    state = standing(1.5)
+    state[dof_index("r_hip_y", "l_hip_y", "root_ry")] = (-0.3, 0.2, 0.1)
+    row = -1 - 27  # before the rows of the posture
+    values, jacobian = residual_rows(BODY, points, state, target, target.surface, settings)
+    assert values[row] > 0.2
+    for dof in range(27):
+        step = np.zeros(27)
+        step[dof] = 1e-6
+        up, down = (residual_rows(BODY, points, state + s, target, target.surface, settings)[0][row] for s in (step, -step))
+        assert_allclose(jacobian[row, dof], (up - down) / 2e-6, atol=1e-6)
+
+
+def test_hanging_costs_and_standing_does_not():
+    box = np.argwhere(np.ones((4, 4, 8), bool)) + [18, 18, 12]
+    with_floor, without = (make_target(GRID, box, box, None, floor) for floor in (0.0, None))
+    points = body_points(BODY, surface_coordinates(BODY, 60))
+    states = np.stack([standing(leg_length()), standing(leg_length() + 0.5)])
+    extra = [symmetric_cost(BODY, points, states, target, box * 0.05, SymmetricSettings()) for target in (with_floor, without)]
+    assert_allclose(extra[0] - extra[1], [0, SymmetricSettings().floor_weight * (0.5 - HANG_M) ** 2], atol=1e-9)
+
+
+def test_loose_hull_is_cheap_and_reaches_the_floor():
+    trunk = np.argwhere(np.ones((4, 4, 8), bool)) + [18, 18, 20]
+    loose = np.zeros(GRID.shape, bool)
+    loose[18:22, 18:22, :20] = True
+    target = make_target(GRID, trunk, trunk, loose, 0.0)
+    inside = np.array([[1.0, 1.0, 0.3], [1.0, 1.0, 0.1]])
+    assert_allclose(distance_at(target, inside), LOOSE_M, atol=1e-6)
+    beside = np.array([[1.5, 1.0, 0.3]])
+    assert distance_at(target, beside)[0] > 0.1
+    hard = make_target(GRID, trunk, trunk, None, 0.0)
+    assert (distance_at(hard, inside) > 0.1).all()
+
+
+def test_stature_follows_the_lengths():
+    assert stature(BODY.dimensions) == pytest.approx(1.8)
+    assert stature(canton_body(1.7).dimensions) == pytest.approx(1.7)
+    longer = BODY.dimensions | {name: 1.1 * BODY.dimensions[name] for name in ("trunk", "head", "thigh", "shank")}
+    assert stature(longer) == pytest.approx(1.98)

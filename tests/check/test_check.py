@@ -1,0 +1,255 @@
+"""`hmc check`: each fault is told, several are told together, and a good recording has nothing to tell."""
+
+import re
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+from conftest import write_images, write_video
+from drawn import draw_recording, walk
+from numpy.testing import assert_allclose
+from scipy.spatial.transform import Rotation
+
+from hmc.camera.model import Camera, Rig, look_at, project
+from hmc.camera.rig_picture import draw_rig, draw_view, save_rig_picture, view_cone
+from hmc.check import check_recording, inspect_recording
+from hmc.io.calibration import write_calibration
+
+
+def sentences(findings, severity):
+    return [finding.sentence for finding in findings if finding.severity == severity]
+
+
+@pytest.fixture
+def body_folder(tmp_path, ring):
+    """A recording of silhouettes: an upright ellipsoid the size of a person, 0.4 m off the middle."""
+    rng = np.random.default_rng(0)
+    directions = rng.normal(size=(20000, 3))
+    points = directions / np.linalg.norm(directions, axis=1, keepdims=True) * [0.25, 0.25, 0.85] + [0.4, 0.2, 0.9]
+    write_calibration(tmp_path / "calibration.toml", ring)
+    for camera in ring:
+        uv, _ = project(camera, points)
+        hull = cv2.convexHull(np.round(uv).astype(np.int32))
+        mask = cv2.fillConvexPoly(np.zeros((120, 160), np.uint8), hull, 255)
+        folder = tmp_path / "silhouettes" / camera.name
+        folder.mkdir(parents=True)
+        cv2.imwrite(str(folder / "000000.png"), mask)
+    return tmp_path
+
+
+def test_a_good_recording_has_only_notes(recording_folder, body_folder):
+    assert {finding.severity for finding in check_recording(recording_folder)} <= {"note"}
+    assert sentences(check_recording(body_folder), "warning") == []
+
+
+def turned(camera: Camera, degrees: float) -> Camera:
+    turn = Rotation.from_euler("y", degrees, degrees=True).as_matrix()
+    return replace(camera, rotation=turn @ camera.rotation, translation=turn @ camera.translation)
+
+
+def test_a_camera_that_has_moved_is_named(body_folder, ring):
+    moved = Rig(tuple(turned(camera, 7) if camera.name == "cam_03" else camera for camera in ring))
+    write_calibration(body_folder / "calibration.toml", moved)
+    (warning,) = sentences(check_recording(body_folder), "warning")
+    assert warning.startswith("camera 'cam_03': its silhouettes do not fit the calibration")
+
+
+@pytest.mark.parametrize(("camera", "degrees"), [("cam_01", 2.0), ("cam_04", -2.5)])
+def test_a_camera_that_is_a_few_pixels_off_is_named(tmp_path, ring, camera, degrees):
+    """About its vertical axis: 2 degrees are 4 pixels of a focal length of 114."""
+    folder = draw_recording(tmp_path / "walk", ring, walk(6), silhouettes=True)
+    write_calibration(folder / "calibration.toml", Rig(tuple(turned(c, degrees) if c.name == camera else c for c in ring)))
+    (warning,) = sentences(check_recording(folder), "warning")
+    assert warning.startswith(f"camera '{camera}': ") and "of its silhouettes lie outside what the other cameras see" in warning
+    pixels, way = re.search(r"moved (\d+) px (left|right)", warning).groups()
+    assert 2 <= int(pixels) <= 6 and way == ("right" if degrees > 0 else "left")
+
+
+def test_a_video_that_is_late_is_named(tmp_path, ring):
+    folder = draw_recording(tmp_path / "walk", ring, walk(12), silhouettes=True)
+    assert sentences(check_recording(folder), "warning") == []
+    late = folder / "silhouettes" / "cam_02"
+    for index in range(11, 0, -1):
+        (late / f"{index:06d}.png").write_bytes((late / f"{max(0, index - 2):06d}.png").read_bytes())
+    (warning,) = sentences(check_recording(folder), "warning")
+    assert warning.startswith("camera 'cam_02': ") and "early or late" in warning
+
+
+def test_legs_behind_a_table_are_nobody_s_fault(tmp_path, ring):
+    folder = draw_recording(tmp_path / "walk", ring, walk(6), silhouettes=True)
+    for camera in ("cam_01", "cam_03"):
+        for file in (folder / "silhouettes" / camera).iterdir():
+            mask = cv2.imread(str(file), cv2.IMREAD_GRAYSCALE)
+            rows = np.flatnonzero(mask.any(axis=1))
+            mask[int(rows[0] + 0.6 * len(rows)) :] = 0
+            cv2.imwrite(str(file), mask)
+    assert sentences(check_recording(folder), "warning") == []
+
+
+@pytest.mark.parametrize("depth", [0.1, 0.18])
+def test_feet_below_the_floor_are_told(body_folder, ring, depth):
+    """Posts, as an ellipsoid has no feet."""
+    circle = np.linspace(0, 2 * np.pi, 90)
+    post = np.concatenate([np.stack([0.12 * np.cos(circle), 0.12 * np.sin(circle), np.full(90, z)], axis=-1) for z in (0.0, 1.7)])
+    for camera in ring:
+        hull = cv2.convexHull(np.round(project(camera, post)[0]).astype(np.int32))
+        mask = cv2.fillConvexPoly(np.zeros((120, 160), np.uint8), hull, 255)
+        cv2.imwrite(str(body_folder / "silhouettes" / camera.name / "000000.png"), mask)
+    assert sentences(check_recording(body_folder), "warning") == []
+    lower = [replace(camera, translation=camera.translation + camera.rotation[:, 2] * depth) for camera in ring]
+    write_calibration(body_folder / "calibration.toml", lower)
+    (warning,) = sentences(check_recording(body_folder), "warning")
+    told = int(re.match(r"people's feet are (\d+) cm below the floor", warning).group(1))
+    assert 100 * depth - 5 <= told <= 100 * depth + 3
+
+
+def test_people_beyond_a_wall_are_told(tmp_path, ring):
+    folder = draw_recording(tmp_path / "walk", ring, walk(3), silhouettes=True)
+    (folder / "recording.toml").write_text("room = [[-2.0, -2.0, 0.0], [0.8, 2.0, 1.5]]\n")
+    warnings = sentences(check_recording(folder), "warning")
+    assert len(warnings) == 2 and "beyond the room's limit x = 0.8 m" in warnings[0] and "z = 1.5 m" in warnings[1]
+    assert all("widen `room`" in warning for warning in warnings)
+
+
+def test_swapped_cameras_are_noticed(body_folder):
+    (body_folder / "silhouettes" / "cam_00").rename(body_folder / "x")
+    (body_folder / "silhouettes" / "cam_01").rename(body_folder / "silhouettes" / "cam_00")
+    (body_folder / "x").rename(body_folder / "silhouettes" / "cam_01")
+    (warning,) = sentences(check_recording(body_folder), "warning")
+    assert warning.startswith("silhouettes and calibration disagree")
+
+
+def test_many_faults_at_once(recording_folder):
+    """The first fault does not hide the others."""
+    (recording_folder / "recording.toml").write_text("fsp = 25\n")
+    (recording_folder / "videos" / "cam_01.avi").unlink()
+    (recording_folder / "videos" / "cam_02.avi").write_bytes(b"")
+    write_video(recording_folder / "videos" / "cam_04.avi", 3, (80, 60))
+    write_video(recording_folder / "videos" / "cam_77.avi", 3, (80, 60))
+    text = (recording_folder / "calibration.toml").read_text()
+    (recording_folder / "calibration.toml").write_text(text.replace("translation = [", "translation = [nan, 0, 0]\n#", 1))
+    findings = check_recording(recording_folder)
+    errors = sentences(findings, "error")
+    for words in (
+        "unknown key `fsp`; did you mean `fps`?",
+        "camera 'cam_00': `translation` holds a number that is not finite",
+        "camera 'cam_01' has no video",
+        "cam_02.avi: this video cannot be read",
+        "cam_04.avi: images are 80 x 60 but the calibration of 'cam_04' says 160 x 120",
+    ):
+        assert sum(words in error for error in errors) == 1, words
+    assert len(errors) == 5
+    assert any("cam_77.avi: no camera of this name" in note for note in sentences(findings, "note"))
+    severities = [finding.severity for finding in findings]
+    assert severities == sorted(severities, key=["error", "warning", "note"].index)
+
+
+def test_millimetres(recording_folder, ring):
+    write_calibration(recording_folder / "calibration.toml", [replace(camera, translation=1000 * camera.translation) for camera in ring])
+    inspection = inspect_recording(recording_folder)
+    assert any("looks like millimetres" in error for error in sentences(inspection.findings, "error"))
+    assert not inspection.usable and inspection.rig is not None
+
+
+def test_a_room_elsewhere(recording_folder):
+    (recording_folder / "recording.toml").write_text("room = [[-1, -1, 30], [1, 1, 33]]\n")
+    assert any("no camera sees anything of the room" in error for error in sentences(check_recording(recording_folder), "error"))
+
+
+def rig_findings(folder, cameras, severity="warning"):
+    """What is said of these cameras."""
+    write_calibration(folder / "calibration.toml", cameras)
+    return sentences(check_recording(folder), severity)
+
+
+def test_odd_cameras(recording_folder, ring):
+    def change(index, **values):
+        return [replace(camera, **values) if i == index else camera for i, camera in enumerate(ring)]
+
+    away = look_at("cam_00", (160, 120), ring[0].centre, 2 * ring[0].centre, 60)
+    assert any("'cam_00' sees nothing of the room" in s for s in rig_findings(recording_folder, [away, *ring[1:]]))
+    twin = replace(ring[1], name="cam_00")
+    assert any("'cam_00' and 'cam_01' stand in one place" in s for s in rig_findings(recording_folder, [twin, *ring[1:]]))
+    matrix = ring[2].matrix
+    assert any("focal lengths" in s for s in rig_findings(recording_folder, change(2, matrix=matrix * [[2], [1], [1]])))
+    off_centre = matrix + np.array([[0, 0, 70], [0, 0, 0], [0, 0, 0]])
+    assert any("far from the middle" in s for s in rig_findings(recording_folder, change(2, matrix=off_centre)))
+    assert any("does not fit 160 x 120" in s for s in rig_findings(recording_folder, change(2, matrix=matrix * [[30], [30], [1]])))
+    folded = change(2, distortions=np.array([-1.5, 0, 0, 0, 0]))
+    assert any("folds over inside the image" in s for s in rig_findings(recording_folder, folded))
+    sunk = look_at("cam_00", (160, 120), [3, 0, -1], [0, 0, 1], 60)
+    assert any("stands 1.0 m under the floor" in s for s in rig_findings(recording_folder, [sunk, *ring[1:]]))
+    for degrees, words in ((180, "is mounted upside down"), (90, "lies on its side")):
+        turn = Rotation.from_euler("z", degrees, degrees=True).as_matrix()
+        rolled = change(2, rotation=turn @ ring[2].rotation, translation=turn @ ring[2].translation)
+        assert any(f"'cam_02' {words}" in s for s in rig_findings(recording_folder, rolled, "note"))
+    overhead = look_at("cam_00", (160, 120), [0, 0, 4], [0, 0, 0], 80)
+    assert not any("'cam_00'" in s for s in rig_findings(recording_folder, [overhead, *ring[1:]], "note"))
+
+
+def test_few_cameras_and_a_large_room(recording_folder):
+    (recording_folder / "recording.toml").write_text("room = [[-20, -20, 0], [20, 20, 2.4]]\n")
+    warnings = sentences(check_recording(recording_folder, cameras=["cam_00", "cam_01"]), "warning")
+    assert any("2 cameras cannot tell a body's shape" in warning for warning in warnings)
+    assert any("of the room is seen by two cameras or more" in warning for warning in warnings)
+
+
+def test_lengths_rates_gaps_and_dark_images(recording_folder, ring):
+    write_video(recording_folder / "videos" / "cam_02.avi", 5, (160, 120), fps=50)
+    write_video(recording_folder / "videos" / "cam_03.avi", 12, (160, 120), lambda index: 0)
+    warnings = sentences(check_recording(recording_folder), "warning")
+    for words in ("cameras differ in length", "differ in frame rate (25 to 50", "'cam_03': its first image is black"):
+        assert any(words in warning for warning in warnings), words
+    (recording_folder / "videos").rename(recording_folder / "x")
+    for camera in ring:
+        write_images(recording_folder / "images" / camera.name, [0, 1, 3, 4], (160, 120))
+    (recording_folder / "images" / "cam_01" / "000001.png").write_bytes(b"")
+    warnings = sentences(check_recording(recording_folder), "warning")
+    assert any("1 of 5 images are missing, the first is frame 2" in warning for warning in warnings)
+    assert "cam_01: frame 1 cannot be read; left out" in warnings
+
+
+@pytest.mark.parametrize("name", ["r1", "r2", "r3", "r4"])
+def test_good_recordings_of_another_program_are_quiet(shared_data, name):
+    assert sentences(check_recording(shared_data / "rendered" / name), "warning") == []
+
+
+def test_a_calibration_that_is_known_to_be_off_is_told(shared_data):
+    (warning,) = sentences(check_recording(shared_data / "bodytrack"), "warning")
+    assert warning.startswith("camera 'cam_03': ")
+
+
+def test_background_is_told(recording_folder, ring):
+    notes = sentences(check_recording(recording_folder), "note")
+    assert any("fewer than 10 frames of the empty scene" in note for note in notes)
+    (recording_folder / "background" / "cam_01.avi").unlink()
+    assert any("cam_01 have no frames of the empty scene" in note for note in sentences(check_recording(recording_folder), "note"))
+    for camera in ring:
+        (recording_folder / "background" / f"{camera.name}.avi").unlink(missing_ok=True)
+    assert any("temporal median" in note for note in sentences(check_recording(recording_folder), "note"))
+
+
+def test_nothing_to_look_at(tmp_path):
+    assert "no such folder" in check_recording(tmp_path / "x")[0].sentence
+    assert "no calibration found" in check_recording(tmp_path)[0].sentence
+
+
+def test_view_cone_of_a_camera_that_looks_down():
+    """80 degrees from 3 m: the image's floor is 2 * 3 * tan 40 wide; the cone is its outline."""
+    camera = look_at("top", (200, 100), [1, 2, 3], [1, 2, 0], 80)
+    cone = view_cone(camera, 10)
+    assert_allclose(np.ptp(cone[:, 0]), 2 * 3 * np.tan(np.radians(40)) * 199 / 200, rtol=1e-6)
+    assert_allclose((cone.min(axis=0) + cone.max(axis=0)) / 2, [1, 2], atol=1e-6)
+    level = view_cone(look_at("a", (200, 100), [0, 0, 1], [5, 0, 1], 90), 4)
+    assert level[:, 0].min() > -0.01 and 3.9 < np.linalg.norm(level, axis=1).max() < 4.01
+
+
+def test_picture(tmp_path, ring):
+    room = np.array([[-1.5, -1.5, 0], [1.5, 1.5, 2.4]])
+    image = np.full((120, 160, 3), 90, np.uint8)
+    save_rig_picture(tmp_path / "rig.png", ring, room, [image, None, image, image, image], "ring")
+    picture = cv2.imread(str(tmp_path / "rig.png"))
+    assert picture is not None and picture.shape[1] > 900
+    assert len(draw_rig(ring, room).texts) == len(ring) + 1
+    assert any(text.get_text() == "no image" for text in draw_view(ring[1], room, None).texts)

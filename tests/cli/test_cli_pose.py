@@ -1,0 +1,188 @@
+"""The pose command on the small rendered clip: results, resuming, repeated runs and wrong input."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from drawn import draw_recording
+from numpy.testing import assert_array_equal
+
+from hmc.cli import main
+from hmc.io.results import read_joints, read_pose, read_run, read_tracks
+from hmc.pose import person, sequence
+from hmc.pose.legs import LegSettings
+from hmc.pose.person import FollowSettings
+from hmc.pose.starts.window import StartSettings
+from hmc.pose.steps import preset as presets
+from hmc.search.filters import AnnealedSettings
+from hmc.voxels import hulls as frontend
+
+TINY = Path(__file__).resolve().parents[2] / "data" / "synthetic" / "tiny"
+
+
+@pytest.fixture(scope="module", autouse=True)
+def little_work():
+    """The presets as they are, with fewer particles and starts."""
+    with pytest.MonkeyPatch.context() as patch:
+        for name, layers in (("default", {"survival_rate": 0.1, "spread": 0.5}), ("canton2009", {})):
+            lean = replace(presets.PRESETS[name], annealed=AnnealedSettings(layers=2, particles=40, **layers))
+            patch.setitem(presets.PRESETS, name, lean)
+        lean_start = FollowSettings(window_s=0.2, start=StartSettings(anchors=1, candidates=1), legs=LegSettings(lag_s=0.1))
+        patch.setattr(person, "FollowSettings", lambda: lean_start)
+        yield
+
+
+def pose(out, *more, recording=TINY):
+    return main(["pose", str(recording), "--out", str(out), "--quiet", *more])
+
+
+def quick(out, *more, frames="4"):
+    return pose(out, "--frames", frames, "--voxel", "0.05", "--preset", "canton2009", *more)
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """Five frames with the default preset."""
+    out = tmp_path_factory.mktemp("finished") / "out"
+    assert pose(out, "--frames", "5", "--voxel", "0.05") == 0
+    return out
+
+
+def test_a_run_leaves_its_four_files_and_nothing_else(finished):
+    assert sorted(path.name for path in finished.iterdir()) == ["joints.csv", "pose.npz", "run.toml", "tracks.csv"]
+    joints, tracks, states, run = (
+        read_joints(finished / "joints.csv"),
+        read_tracks(finished / "tracks.csv"),
+        read_pose(finished / "pose.npz"),
+        read_run(finished / "run.toml"),
+    )
+    assert joints.frames.tolist() == list(range(5)) and np.isfinite(joints.positions).all()
+    for table in (tracks, states):
+        assert_array_equal(table.frames, joints.frames)
+        assert_array_equal(table.persons, joints.persons)
+    assert run["method"] == "apf" and run["seed"] == 0 and run["problems"] == []
+    assert run["parameters"]["voxel_size_m"] == 0.05 and run["parameters"]["preset"]["name"] == "default"
+    truth = read_joints(TINY / "truth" / "joints.csv")
+    error = np.linalg.norm(joints.positions - truth.where(truth.frames < 5).positions, axis=-1)
+    assert np.median(error) < 0.12
+
+
+def test_a_finished_run_is_not_repeated(finished, capsys, monkeypatch):
+    before = {path.name: path.stat().st_mtime_ns for path in finished.iterdir()}
+    monkeypatch.setattr(sequence, "stream_hulls", None)
+    assert pose(finished, "--frames", "5", "--voxel", "0.05") == 0
+    assert "finished before" in capsys.readouterr().out
+    assert {path.name: path.stat().st_mtime_ns for path in finished.iterdir()} == before
+
+
+def test_a_changed_parameter_starts_anew(tmp_path, capsys):
+    assert quick(tmp_path) == 0
+    first = read_joints(tmp_path / "joints.csv")
+    assert quick(tmp_path, "--seed", "5") == 0
+    assert "starting anew" in capsys.readouterr().out
+    second = read_joints(tmp_path / "joints.csv")
+    assert np.abs(first.positions - second.positions).max() > 1e-4
+    assert read_run(tmp_path / "run.toml")["seed"] == 5
+    assert quick(tmp_path, frames="3") == 0
+    assert "starting anew" in capsys.readouterr().out
+    assert read_joints(tmp_path / "joints.csv").frames.max() == 2
+
+
+@pytest.mark.parametrize("stop", [1, 4])
+def test_a_stopped_run_goes_on_and_ends_as_if_it_had_not_been(tmp_path, monkeypatch, stop):
+    assert quick(tmp_path / "whole", frames="6") == 0
+    stream = sequence.stream_hulls
+
+    def dying(*args, **options):
+        for hull in stream(*args, **options):
+            if hull.index == stop:
+                raise KeyboardInterrupt
+            yield hull
+
+    with monkeypatch.context() as patch:
+        patch.setattr(sequence, "stream_hulls", dying)
+        assert quick(tmp_path / "cut", frames="6") == 130
+    assert not (tmp_path / "cut" / "joints.csv").exists()
+    assert quick(tmp_path / "cut", frames="6") == 0
+    for name in ("joints.csv", "tracks.csv"):
+        assert (tmp_path / "cut" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
+    one, other = (read_pose(tmp_path / folder / "pose.npz") for folder in ("cut", "whole"))
+    assert_array_equal(one.states, other.states)
+    assert sorted(path.name for path in (tmp_path / "cut").iterdir()) == ["joints.csv", "pose.npz", "run.toml", "tracks.csv"]
+
+
+def test_the_recording_is_segmented_once(tmp_path, monkeypatch):
+    calls = []
+    stream = frontend.stream_masks
+    monkeypatch.setattr(frontend, "stream_masks", lambda *args, **options: calls.append(args) or stream(*args, **options))
+    assert quick(tmp_path / "kept") == 0 and len(calls) == 1
+    monkeypatch.setattr(sequence, "kept_masks", lambda *args: None)
+    assert quick(tmp_path / "again") == 0 and len(calls) == 3
+    assert (tmp_path / "kept" / "joints.csv").read_bytes() == (tmp_path / "again" / "joints.csv").read_bytes()
+
+
+def test_a_given_height_is_the_body_s(tmp_path, capsys):
+    assert quick(tmp_path, "--height", "1.62", frames="3") == 0
+    assert "stature about 1.62 m" in capsys.readouterr().out
+    assert float(read_pose(tmp_path / "pose.npz").bodies[0]["height"]) == pytest.approx(1.62)
+
+
+def test_the_height_of_the_recording_is_used_unless_auto(tmp_path):
+    assert quick(tmp_path / "told", frames="3") == 0
+    assert float(read_pose(tmp_path / "told" / "pose.npz").bodies[0]["height"]) == pytest.approx(1.76)  # recording.toml
+    assert quick(tmp_path / "auto", "--height", "auto", frames="3") == 0
+    height = float(read_pose(tmp_path / "auto" / "pose.npz").bodies[0]["height"])
+    assert height == pytest.approx(1.76, rel=0.08) and height != pytest.approx(1.76, abs=1e-6)
+
+
+def test_an_empty_room(tmp_path, ring, capsys):
+    folder = draw_recording(tmp_path / "empty", ring, [[]] * 4)
+    assert pose(tmp_path / "out", "--voxel", "0.08", recording=folder) == 0
+    assert "nobody in 4 frames" in capsys.readouterr().out
+    assert len(read_joints(tmp_path / "out" / "joints.csv").frames) == 0
+    assert len(read_pose(tmp_path / "out" / "pose.npz").frames) == 0
+
+
+def test_part_of_a_recording_with_some_of_its_cameras(tmp_path):
+    assert quick(tmp_path, "--start", "2", "--cameras", "cam_00,cam_02,cam_03,cam_05", frames="3") == 0
+    assert read_joints(tmp_path / "joints.csv").frames.tolist() == [2, 3, 4]
+    assert read_run(tmp_path / "run.toml")["parameters"]["cameras"] == ["cam_00", "cam_02", "cam_03", "cam_05"]
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        (["--height", "175"], "stature in metres"),
+        (["--height", "tall"], "stature in metres"),
+        (["--height", "nan"], "stature in metres"),
+        (["--preset", "defualt"], "no preset named 'defualt'; there are canton2009, default"),
+        (["--frames", "2", "--voxel", "0.0005"], "would fit"),
+        (["--frames", "2", "--track-voxel", "0.0005"], "would fit"),
+        (["--track-voxel", "0.5"], "do not show people"),
+        (["--start", "99"], "nothing to read"),
+        (["--cameras", "cam_77"], "no camera named"),
+    ],
+)
+def test_wrong_input_is_one_line(tmp_path, capsys, more, message):
+    assert pose(tmp_path / "out", *more) == 2
+    error = capsys.readouterr().err
+    assert message in error and error.count("\n") == 1
+
+
+WRONG = (("--voxel", "0"), ("--voxel", "much"), ("--method", "guess"), ("--frames", "-1"), ("--seed", "x"), ("--seed", "-1"))
+
+
+@pytest.mark.parametrize("more", WRONG)
+def test_arguments_that_are_none(tmp_path, capsys, more):
+    with pytest.raises(SystemExit) as stop:
+        pose(tmp_path / "out", *more)
+    assert stop.value.code == 2 and more[0] in capsys.readouterr().err
+
+
+def test_a_file_is_no_folder(tmp_path, capsys):
+    (tmp_path / "file").write_text("")
+    assert quick(tmp_path / "file") == 2
+    assert "is a file" in capsys.readouterr().err
+    assert pose(tmp_path / "out", recording=tmp_path / "nowhere") == 2
+    assert capsys.readouterr().err.count("\n") == 1

@@ -1,0 +1,229 @@
+"""Experiments of chapter 6: reports on poses that are known, the filter on a hull that is known, and the grids."""
+
+from dataclasses import replace
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+from hmc.body.inverse import fit_landmarks
+from hmc.body.joints import dof_index
+from hmc.body.kinematics import landmarks
+from hmc.body.model import neutral_state
+from hmc.body.proportions import canton_body, default_body
+from hmc.experiments import Inputs, Plan, fig_6_11, filter_runs, find_experiment, marker_runs, markerless_runs
+from hmc.experiments.by_action import AVERAGE, COLUMNS, action_rows, pose_scores
+from hmc.experiments.engine.experiment import Cell
+from hmc.experiments.engine.inputs import rendered
+from hmc.experiments.engine.style import house_style
+from hmc.experiments.five_actions import ACTIONS, ACTORS, action_name, action_recipes, action_title
+from hmc.experiments.pose_runs import estimate_of, first_truth, standing_state
+from hmc.io.results import PoseTable
+from hmc.pose.steps.preset import pose_preset
+
+N = 12
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(0)
+
+
+def walking(height_m=1.75):
+    """A body that moves all its joints, (n, 15, 3)."""
+    states = np.tile(neutral_state("down"), (N, 1))
+    states[:, 2] = 0.95
+    states[:, 3:] += 0.3 * np.sin(np.arange(N)[:, None] / 6 + np.arange(24))
+    return landmarks(default_body(height_m), states)
+
+
+def made(parameters, off_m, rng):
+    """A cell whose estimate is off by so much in a random direction, everywhere."""
+    truth = walking()
+    away = rng.standard_normal(truth.shape)
+    away *= off_m / np.linalg.norm(away, axis=-1, keepdims=True)
+    results = {"frames": np.arange(N), "fps": 30.0, "estimate_m": truth + away, "truth_m": truth}
+    return Cell(parameters, results | {"filter_s_per_frame": 0.1 / parameters.get("density", 1.0), "problem": ""})
+
+
+def report_of(name, cells):
+    with house_style():
+        report = find_experiment(name).report(cells, Plan(quick=True))
+        plt.close("all")
+    return report
+
+
+def test_every_action_is_there_by_two_actors_of_different_build():
+    recipes = {recipe.name: recipe for recipe in action_recipes()}
+    assert len(recipes) == 3 * len(ACTIONS) * len(ACTORS) and len(ACTORS) == 2
+    for action in ACTIONS:
+        man, woman = (recipes[action_name(action, actor, False)] for actor in ACTORS)
+        assert man.actors[0].height_m > woman.actors[0].height_m + 0.2 and man.actors[0].build != woman.actors[0].build
+        assert man.actors[0].motion == woman.actors[0].motion == recipes[action_name(action, "man", True)].actors[0].motion
+        assert man.seed != woman.seed
+    label = rendered("throw_catch_woman_quick").label
+    assert action_title(label) == action_title("throw_catch_woman_quick_long@0") == "Throw/Catch"
+    assert action_title("my_dance@12345678") == "my_dance"
+
+
+def test_rows_by_action_have_known_scores_and_the_papers_beside(rng):
+    labels = [f"{action}_{actor}@0" for action in ("walk", "box") for actor in ACTORS]
+    off = {labels[0]: 0.02, labels[1]: 0.04, labels[2]: 0.12, labels[3]: 0.12}
+    cells = [made({"recording": label}, off[label], rng) for label in labels]
+    rows = action_rows(cells, "ours", {"Walking": range(6)})
+    assert [(row["action"], row["recording"]) for row in rows] == [
+        ("Walking", "all"), ("Walking", "walk_man"), ("Walking", "walk_woman"),
+        ("Box", "all"), ("Box", "box_man"), ("Box", "box_woman"), (AVERAGE, "all"),
+    ]  # fmt: skip
+    walk, box, average = rows[0], rows[3], rows[-1]
+    assert walk["mean_mm"] == pytest.approx(30) and walk["MMTA_percent"] == 100 and walk["MMTA_50_percent"] == 100
+    assert box["mean_mm"] == pytest.approx(120) and box["MMTA_percent"] == 0 and np.isnan(box["MMTP_mm"])
+    assert average["mean_mm"] == pytest.approx(75) and average["MMTA_percent"] == 50
+    assert [walk[f"{name}_paper"] for name in COLUMNS] == list(range(6)) and box["mean_mm_paper"] is None
+
+
+@pytest.mark.parametrize("name", ["table-6.4", "table-6.3", "fig-6.13", "fig-6.16", "fig-6.17", "fig-6.18", "fig-6.19", "what-each-adds"])
+def test_reports_tell_better_from_worse(name, rng):
+    """Where the papers' better choice has the smaller errors, every claim about an order holds; the other way round, none does."""
+    for right in (True, False):
+        cells = []
+        for parameters in find_experiment(name).grid(Plan(quick=True)):
+            good = _is_better(name, parameters)
+            off = 0.01 + 0.04 * rng.random() + (0.0 if good == right else 0.2)
+            cells.append(made(parameters, off, rng))
+        report = report_of(name, cells)
+        assert report.figures and all(row for table in report.tables for row in table.rows)
+        orders = [claim for claim in report.claims if "quicker" not in claim.text]
+        assert orders and all(claim.holds == right for claim in orders), orders
+
+
+def _is_better(name, parameters):
+    if name in ("table-6.4", "table-6.3", "fig-6.19"):
+        return True
+    if name == "fig-6.13":
+        return parameters["variance_px2"] < 100 and parameters["layers"] == 3
+    if name == "fig-6.17":
+        return parameters["likelihood"] == "factorised"
+    if name == "fig-6.18":
+        return parameters["density"] == 2
+    if name == "what-each-adds":
+        return parameters["without"] == markerless_runs.EVERYTHING
+    return parameters["cameras"] == 0 and (parameters["voxel_mm"] == 20 or parameters["particles"] == 600)
+
+
+def test_the_papers_grid_has_7200_runs():
+    grid = find_experiment("fig-6.13").grid(Plan())
+    assert len(grid) == 7200 and len({tuple(sorted(parameters.items())) for parameters in grid}) == 7200
+
+
+def test_every_switch_changes_one_thing_only():
+    preset = pose_preset("default")
+    whole = markerless_runs.SWITCHES[markerless_runs.EVERYTHING](preset)
+    assert whole[0] == preset
+    for name, switch in markerless_runs.SWITCHES.items():
+        changed = switch(preset)
+        assert (sum(a != b for a, b in zip(whole, changed, strict=True)) == 1) == (name != markerless_runs.EVERYTHING), name
+
+
+def test_filter_presets_are_the_theses_but_for_what_a_cell_says():
+    grid = find_experiment("fig-6.17").grid(Plan(quick=True))
+    for parameters in grid:
+        preset = filter_runs.filter_preset(parameters)
+        assert preset.body == "canton" and preset.refine is None and preset.likelihood == parameters["likelihood"]
+        assert (preset.annealed.layers, preset.annealed.particles) == (parameters["layers"], parameters["particles"])
+        assert preset.annealed.survival_rate == (
+            0.5 if parameters["annealing"] == "printed" else pose_preset("default").annealed.survival_rate
+        )
+
+
+def test_modes_of_a_map_are_counted():
+    x, y = np.meshgrid(np.linspace(-3, 3, 41), np.linspace(-3, 3, 41), indexing="ij")
+
+    def peak(a, b, height):
+        return height * np.exp(-((x - a) ** 2 + (y - b) ** 2) / 0.1)
+
+    assert fig_6_11.count_modes(np.log(peak(1, 1, 1) + 1e-9)) == 1
+    assert fig_6_11.count_modes(np.log(peak(1, 1, 1) + peak(-1, 0, 0.5) + peak(0, -2, 0.01) + 1e-9)) == 2
+    assert fig_6_11.count_modes(np.zeros((41, 41))) == 1
+
+
+def test_poses_of_another_person_are_not_taken():
+    truth = PoseTable(np.arange(N), np.zeros(N, int), walking())
+    both = PoseTable(
+        np.r_[np.arange(N), np.arange(3, N)],
+        np.r_[np.full(N, 4), np.full(N - 3, 7)],
+        np.concatenate([walking() + [2.0, 0, 0], walking()[3:] + 0.01]),
+    )
+    estimate = estimate_of(truth, both)
+    assert np.isnan(estimate[:3]).all() and np.allclose(estimate[3:], walking()[3:] + 0.01)
+
+
+def test_a_standing_state_leads_inverse_kinematics_home(rng):
+    body = canton_body(1.8)
+    state = standing_state(body, np.zeros((15, 3))) + 0
+    state[:6] = 0.4, -0.3, 0.9, 2.5, 0.05, -0.05
+    points = landmarks(body, state)
+    assert fit_landmarks(body, points, standing_state(body, points))[1] < 0.01
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory):
+    """The small clip of the repository as a user's recording."""
+    from pathlib import Path
+
+    from hmc.experiments.engine.inputs import source_of
+
+    source = source_of(Path(__file__).resolve().parents[2] / "data" / "synthetic" / "tiny")
+    return source, Inputs(tmp_path_factory.mktemp("inputs"), {source.label: source.folder})
+
+
+def test_a_marker_cell_follows_the_truth(small):
+    source, inputs = small
+    parameters = find_experiment("table-6.3").grid(Plan(recordings=(source,)))[0]
+    clean = {**parameters, "detection_rate": 1.0, "false_positives": 0.0, "variance_px2": 0.0}
+    for start, frames in (("found", 6), ("true", 5)):
+        one = marker_runs.cell({**clean, "frames": 6, "start": start}, inputs, np.random.default_rng(0))
+        assert len(one["frames"]) == frames and one["problem"] == ""
+        assert pose_scores([Cell(clean, one)])["MMTA_percent"] > 90
+    blind = marker_runs.cell({**clean, "frames": 4, "detection_rate": 0.0}, inputs, np.random.default_rng(0))
+    assert blind["problem"] and np.isnan(blind["estimate_m"]).all()
+
+
+def test_a_filter_cell_starts_from_the_truth(small, monkeypatch):
+    source, inputs = small
+    parameters = find_experiment("fig-6.17").grid(Plan(quick=True, recordings=(source,)))[-1]
+    few = {**parameters, "frames": 2, "voxel_mm": 50, "layers": 2, "particles": 20}
+    # Particles that hardly move stay where the filter starts.
+    preset = replace(filter_runs.filter_preset(few), drift_scale=0.02)
+    monkeypatch.setattr(filter_runs, "filter_preset", lambda parameters: preset)
+    one = filter_runs.cell(few, inputs, np.random.default_rng(0))
+    assert len(one["frames"]) == 1 and one["filter_s_per_frame"] > 0
+    first = first_truth(inputs.recording(source.label)).positions[0]
+    assert np.linalg.norm(one["estimate_m"][0] - first, axis=1).mean() < 0.08  # the thesis's body has other lengths
+    assert np.array_equal(one["estimate_m"], filter_runs.cell(few, inputs, np.random.default_rng(0))["estimate_m"])
+
+
+def test_what_an_action_varies_by_is_told_by_its_poses():
+    """Half of what each variable changes by in a frame; at least half of 2 cm and 2 degrees; and no jump where a heading passes 180."""
+    body = canton_body(1.8)
+    states = np.repeat(neutral_state("down", body.limits)[None], 12, axis=0)
+    states[:, 0] = 0.1 * np.arange(12)
+    states[:, dof_index("root_rz")] = np.pi - 0.3 + 0.06 * np.arange(12)[:, None]
+    states[:, dof_index("r_elbow_z")] = 0.4 + 0.1 * np.arange(12)[:, None]
+    drift = filter_runs.action_drift(body, landmarks(body, states))
+    assert drift[0] == pytest.approx(0.05, abs=2e-3) and drift[3] == pytest.approx(0.03, abs=0.01)
+    assert drift[dof_index("r_elbow_z")[0]] == pytest.approx(0.05, abs=0.01)
+    still = [k for k in range(27) if k not in (0, 3, 6, 7, 8, *dof_index("r_elbow_z", "r_shoulder_y"))]
+    np.testing.assert_allclose(drift[still], 0.5 * filter_runs.LEAST_VARIATION[still], atol=0.02)
+    np.testing.assert_allclose(filter_runs.action_drift(body, landmarks(body, states[:1])), 0.5 * filter_runs.LEAST_VARIATION)
+
+
+def test_the_likelihood_map_is_best_near_the_truth_with_all_scores(small, monkeypatch):
+    source, inputs = small
+    monkeypatch.setattr(fig_6_11, "SIDE", 21)
+    monkeypatch.setattr(fig_6_11, "VOXEL_M", 0.04)
+    one = Cell({}, fig_6_11.cell({"recording": source.label, "at": 0.5}, inputs, np.random.default_rng(0)))
+    report = report_of("fig-6.11", [one])
+    rows = {row["scores"]: row for row in report.tables[0].rows}
+    assert list(rows) == list(fig_6_11.PANELS) and rows["all"]["best_off_truth_deg"] < 30
+    assert rows["all"]["width_percent"] < rows["out and occupancy"]["width_percent"]

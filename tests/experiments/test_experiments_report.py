@@ -1,0 +1,147 @@
+"""The report: a row for every table and figure of the papers, pictures and tables in one page and one PDF."""
+
+import base64
+import re
+import shutil
+import subprocess
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import cv2
+import numpy as np
+import pytest
+
+from hmc.experiments import EXPERIMENTS
+from hmc.experiments.__main__ import main
+from hmc.experiments.engine.catalogue import CATALOGUE, UNKNOWN
+from hmc.experiments.engine.page import to_html
+from hmc.experiments.engine.summary import DIFFERS, MISSING, NOT_RUN, REPRODUCED, summarise
+from hmc.io.files import write_toml
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+
+
+@pytest.fixture(scope="module")
+def out(tmp_path_factory):
+    """A reproduced experiment, made by running it, and one that differs, as its files."""
+    folder = tmp_path_factory.mktemp("experiments")
+    assert main(["run", "fig-B.1", "--quick", "--quiet", "--workers", "1", "--out", str(folder)]) == 0
+    write_differing(folder / "fig-4.9-quick")
+    return folder
+
+
+def write_differing(folder):
+    claims = [{"claim": "faster over <the> surface", "holds": False, "detail": "0.61 & 0.68"}, {"claim": "it runs", "holds": True}]
+    captions = {"second": "Second & last.", "first": "First."}
+    parameters = {"quick": True, "recordings": ["tiny@12345678"], "cells": {"a": {"x": 1}}}
+    write_toml(folder / "run.toml", {"claims": claims, "figures": ["b", "a"], "captions": captions, "parameters": parameters})
+    (folder / "first.csv").write_text("name,ours_mm,paper_mm\n$x$ <y>,1.5,\n")
+    (folder / "second.csv").write_text("n\n" + "1\n" * 40)
+    (folder / "left_over.csv").write_text("old\n1\n")
+    for name, level in {"a": 40, "b": 90}.items():
+        cv2.imwrite(str(folder / f"{name}.png"), np.full((60, 80, 3), level, np.uint8))
+
+
+class Reader(HTMLParser):
+    """What a page links to and holds."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.ids, self.links, self.sources, self.words, self.open = [], [], [], [], []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attributes):
+        values = dict(attributes)
+        self.ids += [values["id"]] if "id" in values else []
+        self.links += [values[name] for name in ("href",) if name in values]
+        self.sources += [values["src"]] if "src" in values else []
+        if tag not in ("meta", "img", "br"):
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.words.append(data)
+
+
+def test_every_table_and_figure_has_its_row(out):
+    rows = {row.entry.id: row for row in summarise(out)}
+    assert list(rows) == [entry.id for entry in CATALOGUE] + [name for name in EXPERIMENTS if name not in {e.id for e in CATALOGUE}]
+    assert rows["fig-B.1"].verdict == REPRODUCED and rows["fig-4.9"].verdict == DIFFERS and rows["fig-4.7"].verdict == NOT_RUN
+    assert rows["fig-4.9"].why == UNKNOWN and rows["fig-B.1"].why == rows["fig-4.7"].why == ""
+    assert replace(rows["fig-4.9"], entry=rows["table-4.3"].entry).why == rows["table-4.3"].entry.why != ""
+    assert [claim.text for claim in rows["fig-4.9"].differing] == ["faster over <the> surface"]
+    without = {name for name, row in rows.items() if row.verdict == MISSING}
+    assert without == {entry.id for entry in CATALOGUE} - set(EXPERIMENTS)
+
+
+def test_a_figure_without_an_experiment_says_so(tmp_path, monkeypatch):
+    monkeypatch.setattr("hmc.experiments.engine.summary.EXPERIMENTS", {name: EXPERIMENTS[name] for name in ("fig-3.3", "what-each-adds")})
+    rows = {row.entry.id: row.verdict for row in summarise(tmp_path)}
+    assert rows["fig-3.3"] == rows["what-each-adds"] == NOT_RUN and rows["table-4.3"] == rows["kehl-4"] == MISSING
+    assert "no experiment yet" in to_html(summarise(tmp_path))
+
+
+def test_a_full_run_counts_before_a_quick_one_and_own_recordings_come_beside(out, tmp_path):
+    for name in ("fig-4.9-quick", "fig-4.9-quick-own"):
+        shutil.copytree(out / "fig-4.9-quick", tmp_path / name)
+    write_toml(tmp_path / "fig-4.9" / "run.toml", {"claims": [{"claim": "yes", "holds": True}], "parameters": {"quick": False}})
+    row = next(row for row in summarise(tmp_path) if row.entry.id == "fig-4.9")
+    assert row.verdict == REPRODUCED
+    assert [result.folder.name for result in row.results] == ["fig-4.9", "fig-4.9-quick-own"]
+
+
+def test_page_is_whole_and_needs_nothing_beside_it(out):
+    rows = summarise(out)
+    page = Reader(to_html(rows))
+    assert not page.open and len(page.ids) == len(set(page.ids))
+    assert {link.removeprefix("#") for link in page.links} == set(page.ids)
+    pictures = [base64.b64decode(source.removeprefix("data:image/png;base64,")) for source in page.sources]
+    own = [path for name in ("fig-4.9-quick", "fig-B.1-quick") for path in sorted((out / name).glob("*.png"))]
+    assert sorted(pictures) == sorted(path.read_bytes() for path in own)
+    levels = [cv2.imdecode(np.frombuffer(picture, np.uint8), 0)[0, 0] for picture in pictures]
+    assert levels.index(90) < levels.index(40)  # in the order of the report that drew them
+    text = " ".join(page.words)
+    for words in ("faster over <the> surface: 0.61 & 0.68", "$x$ <y>", "Second & last.", "HumanEva-I", "hsiao-3.15"):
+        assert words in text
+    assert "left_over" not in text and "2 reproduced" not in text and "1 reproduced, 1 differ" in text
+
+
+def test_report_is_written(out, capsys):
+    assert main(["report", "--out", str(out)]) == 0
+    told = capsys.readouterr().out
+    assert "1 reproduced, 1 differ" in told and "report.html" in told
+    assert (out / "report.html").read_text(encoding="utf-8") == to_html(summarise(out))
+    content = (out / "report.pdf").read_bytes()
+    assert content.startswith(b"%PDF-") and content.rstrip().endswith(b"%%EOF")
+    assert len(re.findall(rb"/Type /Page\b", content)) >= 4
+    assert len(re.findall(rb"/Subtype /Image", content)) >= 3
+
+
+def test_report_of_nothing(tmp_path, capsys):
+    assert main(["report", "--out", str(tmp_path / "none")]) == 0
+    assert "reproduced" not in capsys.readouterr().out
+    assert (tmp_path / "none" / "report.html").is_file() and (tmp_path / "none" / "report.pdf").is_file()
+
+
+def test_damaged_run_is_told_in_a_line(tmp_path, capsys):
+    (tmp_path / "fig-B.1").mkdir()
+    (tmp_path / "fig-B.1" / "run.toml").write_text("claims = [")
+    assert main(["report", "--out", str(tmp_path)]) == 2
+    told = capsys.readouterr().err
+    assert "run.toml" in told and told.count("\n") == 1
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine")
+def test_page_in_a_browser(out, tmp_path):
+    page = tmp_path / "report.html"
+    page.write_text(to_html(summarise(out)), encoding="utf-8")
+    options = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
+               "--disable-component-update", "--disable-sync", "--window-size=1200,1600",
+               f"--user-data-dir={tmp_path / 'profile'}"]  # fmt: skip
+    shot = tmp_path / "shot.png"
+    subprocess.run([CHROMIUM, *options, f"--screenshot={shot}", page.as_uri()], capture_output=True, timeout=120, check=True)
+    image = cv2.imread(str(shot))
+    assert image.shape == (1600, 1200, 3)
+    assert (image[:400] < 100).any() and (image.reshape(-1, 3).mean(axis=1) > 250).mean() > 0.5  # dark letters on a light page

@@ -1,0 +1,212 @@
+"""The plan of the house: who may import whom, what a core module may need, and what no file of the package does."""
+
+import ast
+import functools
+import subprocess
+import sys
+from graphlib import TopologicalSorter
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).resolve().parents[2] / "hmc"
+MODULES = sorted(PACKAGE.rglob("*.py"))
+
+MAX_LINES = 500
+
+# What each part of the package may import of the others. A part is a package or a module directly under hmc/; the rooms of `pose` are parts
+# of their own, and so are its modules.
+BASE = {"errors", "landmarks"}
+CAMERA = BASE | {"camera"}
+IO = CAMERA | {"io"}
+VOXELS = IO | {"voxels"}
+TRACKING = VOXELS | {"search", "tracking"}
+BODY = CAMERA | {"search", "body"}
+VIEWS = TRACKING | BODY | {"pose.views"}
+OBJECTIVES = VIEWS | {"pose.spectral", "pose.objectives"}
+STEPS = OBJECTIVES | {"pose.legs", "pose.steps"}
+STARTS = STEPS | {"pose.starts"}
+FOLLOWING = STARTS | {"pose.recovery", "pose.person", "pose.records", "pose.sequence"}
+METHODS = FOLLOWING | {"pose.methods"}
+POSE = METHODS | {"pose.smoothing"}
+METRICS = IO | {"metrics"}
+VIEW = VOXELS | {"body", "view"}
+EVERYTHING = POSE | METRICS | VIEW | {"check", "synthetic"}
+MAY_IMPORT = {
+    "errors": set(),
+    "landmarks": {"errors"},
+    "camera": BASE,
+    "io": IO,
+    "search": BASE,
+    "voxels": VOXELS,
+    "tracking": TRACKING,
+    "body": BODY,
+    "pose.views": VIEWS,
+    "pose.spectral": VIEWS,
+    "pose.objectives": OBJECTIVES,
+    "pose.steps": STEPS,
+    "pose.legs": OBJECTIVES | {"pose.steps"},
+    "pose.starts": STARTS,
+    "pose.recovery": STARTS,
+    "pose.person": FOLLOWING,
+    "pose.records": FOLLOWING,
+    "pose.sequence": FOLLOWING,
+    "pose.methods": METHODS,
+    "pose.smoothing": POSE,
+    "metrics": METRICS,
+    "check": VOXELS | {"check"},
+    "view": VIEW,
+    "synthetic": IO | BODY | {"synthetic"},
+    "experiments": EVERYTHING,
+    "cli": EVERYTHING | {"experiments"},
+    "__main__": {"cli"},
+    "__init__": set(),
+}
+
+#: What draws; only this may need what a server lacks.
+DRAWING = ("hmc.view.plots", "hmc.experiments")
+UNWANTED = ("matplotlib", "mpl_toolkits", "pandas", "tqdm")
+
+#: Loading what these wrote can run code.
+UNSAFE_MODULES = {"pickle", "cPickle", "dill", "cloudpickle", "shelve", "marshal"}
+
+
+@functools.cache
+def parse(path):
+    return ast.parse(path.read_text(encoding="utf-8"), str(path))
+
+
+def trees(but=()):
+    """Path and syntax tree of every file of the package, without some parts."""
+    return [(path, parse(path)) for path in MODULES if part_of(path) not in but]
+
+
+def part_of(path):
+    """The part of the package that a file belongs to."""
+    return part_named(path.relative_to(PACKAGE).with_suffix("").parts)
+
+
+def part_named(names):
+    """The part that a module belongs to, by its names below hmc."""
+    return ".".join(names[:2]) if names[0] == "pose" else names[0]
+
+
+def imported(tree):
+    """Full names of the modules that a file imports, wherever in the file; of `from a import b` both a and a.b."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield node.module or ""
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def where(path, node):
+    return f"{path.relative_to(PACKAGE.parent)}:{node.lineno}"
+
+
+def calls(tree, *names):
+    """Calls of functions by their last name: print(...), np.load(...)."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call):
+            name = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+            if name in names:
+                yield node
+
+
+def test_plan_has_one_direction():
+    TopologicalSorter({part: allowed - {part} for part, allowed in MAY_IMPORT.items()}).prepare()  # raises CycleError
+
+
+def test_every_part_is_in_the_plan():
+    unknown = {part_of(path) for path in MODULES} - {"pose.__init__"} - set(MAY_IMPORT)
+    assert not unknown, f"say in MAY_IMPORT what these may import: {sorted(unknown)}"
+
+
+def test_imports_follow_the_plan():
+    wrong = []
+    for path, tree in trees():
+        allowed = MAY_IMPORT[part_of(path)] | {part_of(path)}
+        for name in imported(tree):
+            names = name.split(".")
+            # `from hmc import __version__` imports no part
+            if names[0] == "hmc" and len(names) > 1 and names[1] != "__version__" and part_named(names[1:]) not in allowed | {"pose"}:
+                wrong.append(f"{path.relative_to(PACKAGE.parent)} imports {name}")
+    assert not wrong, "\n".join(wrong)
+
+
+def test_imports_are_absolute():
+    relative = [
+        where(path, node) for path, tree in trees() for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.level > 0
+    ]
+    assert not relative
+
+
+def test_core_needs_nothing_that_draws():
+    names = [
+        ".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts)
+        for path in MODULES
+        if part_of(path) != "__main__" and path.name != "__init__.py"
+    ]
+    names = [name for name in names if not name.startswith(DRAWING)]
+    program = f"""
+import importlib, importlib.abc, sys
+
+class Refuse(importlib.abc.MetaPathFinder):
+    def find_spec(self, name, path=None, target=None):
+        if name.split(".")[0] in {UNWANTED!r}:
+            raise ImportError(f"{{name}} is not here")
+
+sys.meta_path.insert(0, Refuse())
+for name in {names!r}:
+    importlib.import_module(name)
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=PACKAGE.parent)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_files_are_short(path):
+    assert len(path.read_text(encoding="utf-8").splitlines()) <= MAX_LINES
+
+
+def test_nothing_that_is_loaded_can_run_code():
+    wrong = []
+    for path, tree in trees():
+        wrong += [f"{path.name} imports {name}" for name in imported(tree) if name.split(".")[0] in UNSAFE_MODULES]
+        wrong += [f"{where(path, node)} {ast.unparse(node.func)}" for node in calls(tree, "eval", "exec", "read_pickle")]
+        for node in calls(tree, "load"):
+            refused = any(
+                keyword.arg == "allow_pickle" and isinstance(keyword.value, ast.Constant) and keyword.value.value is False
+                for keyword in node.keywords
+            )
+            if ast.unparse(node.func) in ("np.load", "numpy.load", "joblib.load") and not refused:
+                wrong.append(f"{where(path, node)}: {ast.unparse(node.func)} without allow_pickle=False")
+    assert not wrong, "\n".join(wrong)
+
+
+def test_library_neither_prints_nor_asserts():
+    printing = [where(path, node) for path, tree in trees(but=("cli",)) for node in calls(tree, "print")]
+    asserting = [where(path, node) for path, tree in trees() for node in ast.walk(tree) if isinstance(node, ast.Assert)]
+    assert not printing + asserting
+
+
+def test_random_numbers_come_from_a_generator_that_is_given():
+    made = [
+        where(path, node)
+        for path, tree in trees(but=("cli",))
+        for node in calls(tree, "default_rng")
+        if not node.args and not node.keywords
+    ]
+    assert not made, "without a seed, two runs differ"
+
+
+def test_everything_public_is_described():
+    bare = []
+    for path, tree in trees():
+        if path.read_text(encoding="utf-8").strip() and not ast.get_docstring(tree):
+            bare.append(str(path.relative_to(PACKAGE)))
+        for node in tree.body:
+            if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_") and not ast.get_docstring(node):
+                bare.append(f"{where(path, node)} {node.name}")
+    assert not bare, "\n".join(bare)

@@ -1,0 +1,113 @@
+"""What the documentation says can be done: its commands are understood, its links lead somewhere, its Python runs."""
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from hmc import __version__
+from hmc.cli import COMMANDS, make_parser
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md"), *(ROOT / "benchmarks").glob("*.md")])
+README = ROOT / "README.md"
+
+BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+INLINE = re.compile(r"(?<!`)`([^`]+)`(?!`)")
+LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")
+HEADING = re.compile(r"^#+ +(.*)$", re.MULTILINE)
+PREFIXES = (("hmc",), ("python", "-m", "hmc"), (".venv/bin/hmc",), (".venv/bin/python", "-m", "hmc"))
+
+
+def name_of(path):
+    return str(path.relative_to(ROOT))
+
+
+def shell_lines(page):
+    """Every line of a page's shell blocks, and every command in running text."""
+    text = page.read_text(encoding="utf-8")
+    for language, block in BLOCK.findall(text):
+        if language in ("sh", "bash", "console"):
+            yield from (line.removeprefix("$ ") for line in block.replace("\\\n", " ").splitlines())
+    yield from (" ".join(code.split()) for code in INLINE.findall(BLOCK.sub("", text)))
+
+
+def hmc_commands(page):
+    """Arguments of every call of hmc in a page."""
+    for line in shell_lines(page):
+        try:
+            words = shlex.split(line, comments=True)
+        except ValueError:
+            continue  # prose with an apostrophe
+        for prefix in PREFIXES:
+            if tuple(words[: len(prefix)]) == prefix and len(words) > len(prefix):
+                yield words[len(prefix) :]
+
+
+def anchor_of(heading):
+    """As the sites that show Markdown make them."""
+    return re.sub(r"[^\w\- ]", "", heading.strip().lower()).replace(" ", "-")
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_commands_are_understood(page, capsys):
+    for words in hmc_commands(page):
+        if words[0] == "COMMAND" or (len(words) == 1 and words[0] in COMMANDS):
+            continue  # the form of a command, or its name
+        try:
+            make_parser().parse_args(words)
+        except SystemExit as leaving:
+            assert leaving.code == 0, f"hmc {shlex.join(words)}: {capsys.readouterr().err}"
+
+
+def test_readme_shows_every_command():
+    shown = {words[0] for words in hmc_commands(README)}
+    assert set(COMMANDS) <= shown
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_links_lead_somewhere(page):
+    for target in LINK.findall(page.read_text(encoding="utf-8")):
+        if target.startswith(("http://", "https://", "mailto:")):
+            continue
+        file, _, anchor = target.partition("#")
+        place = (page.parent / file) if file else page
+        assert place.exists(), f"{name_of(page)} links to {target}, which is not there"
+        if anchor:
+            anchors = [anchor_of(heading) for heading in HEADING.findall(place.read_text(encoding="utf-8"))]
+            assert anchor in anchors, f"{name_of(page)} links to {target}; {file or 'the page'} has no such heading"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_make_targets_and_scripts_exist(page):
+    targets = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
+    for line in shell_lines(page):
+        words = line.split("#")[0].split()
+        if len(words) > 1 and words[0] == "make":
+            wanted = {word for word in words[1:] if "=" not in word}
+            assert wanted <= targets, f"{name_of(page)}: {line}"
+        if len(words) > 1 and words[0].endswith("python") and words[1].endswith(".py"):
+            assert (ROOT / words[1]).exists(), f"{name_of(page)}: {line}"
+
+
+def test_version_is_the_same_everywhere():
+    assert f"\nversion: {__version__}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"\n## {__version__} " in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+
+
+def test_readme_names_every_part_of_the_tree():
+    tree = README.read_text(encoding="utf-8").split("## Where things are")[1].split("## ")[0]
+    parts = [path for path in (ROOT / "hmc").iterdir() if path.is_dir() and path.name != "__pycache__"]
+    unnamed = [path.name for path in parts if f"{path.name}/" not in tree]
+    assert not unnamed
+
+
+def test_python_of_the_readme_runs(tmp_path, monkeypatch, capsys):
+    code = next(block for language, block in BLOCK.findall(README.read_text(encoding="utf-8")) if language == "python")
+    (tmp_path / "data").symlink_to(ROOT / "data", target_is_directory=True)
+    monkeypatch.chdir(tmp_path)
+    exec(compile(code, str(README), "exec"), {})
+    assert capsys.readouterr().out.startswith("(30, 15, 3)")
+    rows = (tmp_path / "joints.csv").read_text().splitlines()
+    assert rows[0] == "frame,person,joint,x,y,z" and len(rows) == 1 + 30 * 15

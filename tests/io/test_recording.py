@@ -1,0 +1,422 @@
+"""Recordings on disk: what is read, what is survived, what is refused and in which words."""
+
+import re
+import shutil
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+from conftest import write_images, write_video
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+
+from hmc.camera.model import Rig
+from hmc.errors import InputError
+from hmc.io.calibration import write_calibration
+from hmc.io.recording import background_frames, iterate_frames, open_recording
+
+GIVEN_ONCE = settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+
+
+def indices(frame):
+    """Which frame each camera's image is, by its brightness; None where there is none."""
+    return [None if image is None else round((float(image.mean()) - 40) / 5) for image in frame.images]
+
+
+def read_all(folder, **selection):
+    problems = []
+    recording = open_recording(folder, **selection)
+    frames = list(iterate_frames(recording, on_problem=problems.append))
+    return recording, frames, [*recording.problems, *problems]
+
+
+def test_a_good_recording(recording_folder, ring):
+    recording, frames, problems = read_all(recording_folder)
+    assert recording.name == "take_1" and recording.fps == 25 and recording.n_frames == 12 and recording.start == 0
+    assert recording.rig.names == ring.names and recording.persons is None and recording.subject_height_m == ()
+    assert recording.room.shape == (2, 3) and recording.room_is_estimated
+    assert recording.has_images and not recording.has_silhouettes
+    assert [frame.index for frame in frames] == list(range(12))
+    assert all(indices(frame) == [frame.index] * 5 for frame in frames)
+    assert frames[0].images[0].shape == (120, 160, 3) and frames[0].images[0].dtype == np.uint8
+    assert frames[0].silhouettes is None and problems == []
+    background = list(background_frames(recording, 1))
+    assert len(background) == 4 and recording.n_background_frames == (4,) * 5
+    assert_allclose(background[0].mean(), 20, atol=2)
+    assert len(list(background_frames(recording, 1, limit=2))) == 2
+
+
+@given(st.integers(0, 11), st.integers(1, 20), st.integers(0, 14), st.integers(0, 14))
+@GIVEN_ONCE
+def test_parts_are_exact(recording_folder, start, count, first, last):
+    recording = open_recording(recording_folder, cameras=["cam_03", "cam_01"], start=start, frames=count)
+    selection = list(range(12))[start : start + count]
+    assert recording.rig.names == ("cam_03", "cam_01") and recording.n_frames == len(selection) and recording.start == start
+    frames = list(iterate_frames(recording, first, last))
+    assert [frame.index for frame in frames] == [i for i in selection if first <= i < last]
+    assert all(indices(frame) == [frame.index] * 2 for frame in frames)
+
+
+def test_seeking_is_exact_where_frames_depend_on_each_other(recording_folder, ring):
+    """MPEG-4 with few key frames and noise: a part is, bit by bit, what reading from the start gives."""
+    rng = np.random.default_rng(0)
+    for camera in ring:
+        (recording_folder / "videos" / f"{camera.name}.avi").unlink()
+        writer = cv2.VideoWriter(str(recording_folder / "videos" / f"{camera.name}.mp4"), cv2.VideoWriter_fourcc(*"mp4v"), 25, camera.size)
+        for _ in range(40):
+            writer.write(rng.integers(0, 255, (120, 160, 3), np.uint8))
+        writer.release()
+    _, whole, _ = read_all(recording_folder)
+    _, part, _ = read_all(recording_folder, start=29, frames=3)
+    assert len(whole) == 40 and [frame.index for frame in part] == [29, 30, 31]
+    for frame in part:
+        for image, expected in zip(frame.images, whole[frame.index].images, strict=True):
+            np.testing.assert_array_equal(image, expected)
+
+
+def test_settings_are_read(recording_folder):
+    (recording_folder / "recording.toml").write_text(
+        'name = "walk"\nfps = 50\nframes = 9\nunits = "m"\nup = "z"\npersons = 2\n'
+        "subject_height_m = [1.77, 1.6]\nroom = [[-1, -2, 0], [1, 2, 2.5]]\n"
+    )
+    recording = open_recording(recording_folder)
+    assert (recording.name, recording.fps, recording.n_frames, recording.persons) == ("walk", 50, 9, 2)
+    assert recording.subject_height_m == (1.77, 1.6) and not recording.room_is_estimated
+    assert_allclose(recording.room, [[-1, -2, 0], [1, 2, 2.5]])
+
+
+def test_images_and_silhouettes_by_number(tmp_path, ring):
+    """Numbers count from 1 here and some are missing; silhouettes bear the same numbers."""
+    write_calibration(tmp_path / "calibration.toml", ring.select(["cam_00", "cam_01"]))
+    write_images(tmp_path / "images" / "cam_00", [1, 2, 3, 5], (160, 120), lambda n: 35 + 5 * n, "shot_2_{:d}.png")
+    write_images(tmp_path / "images" / "cam_01", range(1, 12), (160, 120), lambda n: 35 + 5 * n, "{:d}.jpg")
+    write_images(tmp_path / "silhouettes" / "cam_00", [2, 3], (160, 120), lambda n: n - 2)
+    recording, frames, problems = read_all(tmp_path)
+    assert recording.n_frames == 5  # two cameras see the first five
+    assert [indices(frame) for frame in frames] == [[0, 0], [1, 1], [2, 2], [None, 3], [4, 4]]
+    masks = [frame.silhouettes for frame in frames]
+    assert all(mask is not None and mask[1] is None for mask in masks)
+    assert masks[0][0] is None and not masks[1][0].any() and masks[2][0].all() and masks[2][0].dtype == bool
+    assert masks[2][0].shape == (120, 160)
+    assert len(problems) == 2 and "cam_00: 1 of 5 images are missing, the first is frame 3" in problems[0]
+    assert "cameras differ in length (cam_00 5, cam_01 11); 5 frames are used" in problems[1]
+
+
+def test_numbers_count_from_the_first_of_all_cameras(tmp_path, ring):
+    """cam_01 starts two frames late; that is so too when it is read alone."""
+    write_calibration(tmp_path / "calibration.toml", ring.select(["cam_00", "cam_01"]))
+    write_images(tmp_path / "images" / "cam_00", range(100, 106), (160, 120), lambda n: 40 + 5 * (n - 100))
+    write_images(tmp_path / "images" / "cam_01", range(102, 106), (160, 120), lambda n: 40 + 5 * (n - 100))
+    _, frames, problems = read_all(tmp_path)
+    assert [indices(frame) for frame in frames] == [[0, None], [1, None], [2, 2], [3, 3], [4, 4], [5, 5]]
+    assert len(problems) == 1 and "cam_01: 2 of 6 images are missing, the first is frame 0" in problems[0]
+    _, frames, _ = read_all(tmp_path, cameras="cam_01")
+    assert [indices(frame) for frame in frames] == [[None], [None], [2], [3], [4], [5]]
+
+
+def test_videos_and_images_may_be_mixed(recording_folder):
+    (recording_folder / "videos" / "cam_01.avi").unlink()
+    write_images(recording_folder / "images" / "cam_01", range(12), (160, 120))
+    _, frames, problems = read_all(recording_folder)
+    assert all(indices(frame) == [frame.index] * 5 for frame in frames) and problems == []
+
+
+def test_calibration_in_another_format(recording_folder, ring):
+    """HumanEva's form, without sizes, in a folder of its own; sizes come from the videos."""
+    (recording_folder / "calibration.toml").unlink()
+    (recording_folder / "calibration").mkdir()
+    for camera in ring:
+        k, t = camera.matrix, 1000 * camera.translation
+        numbers = [k[0, 0], k[1, 1], k[0, 2], k[1, 2], 0, *camera.distortions, *camera.rotation.ravel(), *t]
+        (recording_folder / "calibration" / f"{camera.name}.cal").write_text(" ".join(map(repr, map(float, numbers))))
+    recording = open_recording(recording_folder)
+    assert recording.rig.names == ring.names and recording.rig[3].size == (160, 120)
+    assert_allclose(recording.rig.centres, ring.centres, atol=1e-9)
+
+
+def test_silhouettes_alone(tmp_path, ring):
+    write_calibration(tmp_path / "calibration.toml", ring)
+    for camera in ring:
+        write_images(tmp_path / "silhouettes" / camera.name, range(3), camera.size, lambda n: 127 + n, "{:04d}.jpg")
+    recording, frames, problems = read_all(tmp_path)
+    assert recording.n_frames == 3 and not recording.has_images and recording.has_silhouettes and recording.fps == 30 and problems == []
+    assert frames[0].images == (None,) * 5
+    assert [bool(frame.silhouettes[4].all()) for frame in frames] == [False, True, True]
+
+
+def test_unreadable_image_in_the_middle(recording_folder, ring, caplog):
+    folder = write_images(recording_folder / "images" / "cam_00", range(4), (160, 120))
+    (folder / "000002.png").write_bytes(b"not an image")
+    for camera in ring[1:]:
+        write_images(recording_folder / "images" / camera.name, range(4), (160, 120))
+    write_images(recording_folder / "images" / "cam_01", [1], (80, 60))
+    for file in (recording_folder / "videos").iterdir():
+        file.unlink()
+    (recording_folder / "videos").rmdir()
+    recording, frames, problems = read_all(recording_folder)
+    assert [indices(frame)[:2] for frame in frames] == [[0, 0], [1, None], [None, 2], [3, 3]]
+    assert problems == [
+        "cam_01: frame 1 is 80 x 60 and not 160 x 120; left out",
+        "cam_00: frame 2 cannot be read; left out",
+    ]
+    list(iterate_frames(recording))  # without a callback it is logged
+    assert [record.name for record in caplog.records] == ["hmc", "hmc"]
+
+
+def test_unreadable_images_at_the_end(recording_folder, ring):
+    folder = write_images(recording_folder / "images" / "cam_00", range(5), (160, 120))
+    for camera in ring[1:]:
+        write_images(recording_folder / "images" / camera.name, range(5), (160, 120))
+    for number in (2, 3, 4):
+        (folder / f"{number:06d}.png").write_bytes(b"not an image")
+    for file in (recording_folder / "videos").iterdir():
+        file.unlink()
+    (recording_folder / "videos").rmdir()
+    assert read_all(recording_folder)[2] == ["cam_00: frames 2 to 4 cannot be read; left out"]
+    assert read_all(recording_folder, frames=3)[2] == ["cam_00: frame 2 cannot be read; left out"]
+    # The last frame's loss is known with the frame; what was lost so far is known to who stops before the end.
+    problems: list[str] = []
+    frames = iterate_frames(open_recording(recording_folder, frames=3), on_problem=problems.append)
+    for _ in range(3):
+        next(frames)
+    assert problems == ["cam_00: frame 2 cannot be read; left out"]
+    frames = iterate_frames(open_recording(recording_folder), on_problem=problems.append)
+    for _ in range(4):
+        next(frames)
+    frames.close()
+    assert problems[1:] == ["cam_00: frames 2 to 3 cannot be read; left out"]
+
+
+def test_a_camera_drops_out(recording_folder):
+    write_video(recording_folder / "videos" / "cam_02.avi", 5, (160, 120))
+    recording, frames, problems = read_all(recording_folder)
+    assert recording.n_frames == 12
+    assert indices(frames[4])[2] == 4 and indices(frames[5]) == [5, 5, None, 5, 5]
+    assert len(problems) == 1 and "cam_02.avi 5" in problems[0]
+    _, frames, _ = read_all(recording_folder, start=7)
+    assert indices(frames[0]) == [7, 7, None, 7, 7]
+
+
+def test_longer_than_the_others(recording_folder):
+    write_video(recording_folder / "videos" / "cam_02.avi", 30, (160, 120))
+    assert open_recording(recording_folder).n_frames == 12
+    assert open_recording(recording_folder, cameras=["cam_02"]).n_frames == 30
+
+
+def test_truncated_video(recording_folder):
+    path = recording_folder / "videos" / "cam_01.avi"
+    data = path.read_bytes()
+    chunks = data[: data.index(b"idx1")].split(b"00dc")
+    path.write_bytes(b"00dc".join(chunks[:8]))
+    recording, frames, problems = read_all(recording_folder)
+    assert recording.n_frames == len(frames) == 12
+    seen = [indices(frame)[1] for frame in frames]
+    n = 12 - seen.count(None)
+    assert 2 < n < 12 and seen[: n - 1] == list(range(n - 1))  # the last one may be half a picture
+    assert seen[n:] == [None] * (12 - n)
+    assert any("cam_01.avi" in problem for problem in problems)
+
+
+def test_damage_in_the_middle_does_not_shift_the_rest(recording_folder):
+    """A damaged stretch of an MPEG-4 video: what comes after it keeps its place."""
+    path = recording_folder / "videos" / "cam_01.mp4"
+    (recording_folder / "videos" / "cam_01.avi").unlink()
+    rng = np.random.default_rng(0)
+    scenes = [cv2.resize(rng.integers(0, 255, (6, 8, 3), np.uint8), (160, 120)) for _ in range(60)]
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"mp4v"), 25, (160, 120))
+    for scene in scenes:
+        writer.write(scene)
+    writer.release()
+    data = bytearray(path.read_bytes())
+    middle = len(data) // 2
+    data[middle : middle + 3000] = bytes([0xAA]) * 3000
+    path.write_bytes(data)
+    recording, frames, _ = read_all(recording_folder, cameras=["cam_01"])
+    assert recording.n_frames == 60
+
+    def error(image, scene):
+        return np.abs(image.astype(float) - scene).mean()
+
+    for frame in (*frames[:20], *frames[-12:]):
+        (image,) = frame.images
+        assert image is not None and np.argmin([error(image, scene) for scene in scenes]) == frame.index
+
+
+def test_fewer_frames_than_stated(recording_folder):
+    (recording_folder / "recording.toml").write_text("frames = 20\n")
+    recording, _, problems = read_all(recording_folder)
+    assert recording.n_frames == 12 and "says 20 frames, but there are 12" in problems[0]
+
+
+def test_odd_background_is_reported_and_left_out(recording_folder):
+    write_video(recording_folder / "background" / "cam_00.avi", 3, (80, 60))
+    (recording_folder / "background" / "cam_01.avi").write_bytes(b"nothing")
+    (recording_folder / "background" / "cam_02.avi").unlink()
+    cv2.imwrite(str(recording_folder / "background" / "cam_02.png"), np.full((120, 160, 3), 9, np.uint8))
+    recording = open_recording(recording_folder)
+    assert recording.n_background_frames == (0, 0, 1, 4, 4)
+    assert len(recording.problems) == 2 and "80 x 60" in recording.problems[0] and "cam_01.avi" in recording.problems[1]
+    assert list(background_frames(recording, 0)) == []
+    assert next(background_frames(recording, 2)).mean() == 9
+
+
+def test_closing_early_is_fine(recording_folder):
+    frames = iterate_frames(open_recording(recording_folder))
+    next(frames)
+    frames.close()
+
+
+def edit(file, old, new):
+    text = file.read_text()
+    assert old in text
+    file.write_text(text.replace(old, new, 1))
+
+
+@pytest.mark.parametrize(
+    "spoil, message",
+    [
+        (lambda f: (f / "calibration.toml").unlink(), "no calibration found"),
+        (lambda f: (f / "videos" / "cam_01.avi").unlink(), "camera 'cam_01' of the calibration has no video"),
+        (lambda f: (f / "videos" / "cam_01.avi").write_bytes(b""), r"cam_01.avi: this video cannot be read"),
+        (lambda f: (f / "videos").rename(f / "films"), "no videos/, images/ or silhouettes/"),
+        (
+            lambda f: write_video(f / "videos" / "cam_01.avi", 3, (80, 60)),
+            "are 80 x 60 but the calibration of 'cam_01' says 160 x 120",
+        ),
+        (lambda f: edit(f / "calibration.toml", "translation = [", "translation = [nan, "), "camera 'cam_00': `translation`"),
+        (lambda f: edit(f / "calibration.toml", "rotation = [", "rotation = [nan, 0, 0]\n#"), "camera 'cam_00': `rotation` holds"),
+        (lambda f: (f / "images" / "cam_01").mkdir(parents=True) or (f / "videos" / "cam_01.avi").unlink(), "no image in this folder"),
+    ],
+)
+def test_what_cannot_be_used_is_refused(recording_folder, spoil, message):
+    spoil(recording_folder)
+    with pytest.raises(InputError, match=message) as caught:
+        open_recording(recording_folder)
+    assert "\n" not in str(caught.value) and str(recording_folder) in str(caught.value)
+
+
+def test_millimetres_are_refused(recording_folder, ring):
+    far = Rig(tuple(replace(camera, translation=1000 * camera.translation) for camera in ring))
+    write_calibration(recording_folder / "calibration.toml", far)
+    with pytest.raises(InputError, match="looks like millimetres; divide every `translation` by 1000"):
+        open_recording(recording_folder)
+
+
+@pytest.mark.parametrize(
+    "selection, message",
+    [
+        ({"cameras": ["cam_00", "cam_09"]}, "no camera named 'cam_09'"),
+        ({"start": 12}, "nothing to read from frame 12 on .*; it has 12 frames"),
+        ({"start": -1}, "nothing to read"),
+        ({"frames": 0}, "nothing to read"),
+    ],
+)
+def test_wrong_selections(recording_folder, selection, message):
+    with pytest.raises(InputError, match=message):
+        open_recording(recording_folder, **selection)
+
+
+def test_no_such_folder(tmp_path):
+    with pytest.raises(InputError, match="no such folder"):
+        open_recording(tmp_path / "nowhere")
+
+
+@pytest.mark.parametrize(
+    "text, message",
+    [
+        ("subject_heigth_m = [1.7]", r"unknown key `subject_heigth_m`; did you mean `subject_height_m`\?"),
+        ("fps = 0", "`fps` must be a number above 0; got 0"),
+        ("fps = nan", "`fps` must be"),
+        ('fps = "25"', "`fps` must be"),
+        ("frames = 0", "`frames` must be a whole number, 1 or more"),
+        ("persons = -1", "`persons` must be a whole number"),
+        ("persons = 1.5", "`persons` must be a whole number"),
+        ("name = 3", "`name` must be a text"),
+        ('units = "mm"', "`units` must be in metres"),
+        ('up = "y"', "`up` must be the z axis"),
+        ("subject_height_m = [177]", "`subject_height_m` must be statures in metres"),
+        ("room = [[0, 0, 0], [1, 1]]", r"`room` must be \[\[x0"),
+        ("room = [[0, 0, 0], [1, -1, 2]]", r"`room` must be \[\[x0"),
+        ("room = [[0, 0, 0], [5000, 4000, 2200]]", "looks like millimetres"),
+        ("room = [", "not a TOML file"),
+    ],
+)
+def test_wrong_settings(recording_folder, text, message):
+    (recording_folder / "recording.toml").write_text(text)
+    with pytest.raises(InputError, match=message) as caught:
+        open_recording(recording_folder)
+    assert "recording.toml" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "name, n_cameras, n_frames", [("balancing", 4, 100), ("bodytrack", 4, 2), ("rendered/r1", 7, 92), ("rendered/r3", 5, 180)]
+)
+def test_real_recordings_open(shared_data, name, n_cameras, n_frames):
+    recording = open_recording(shared_data / name)
+    assert len(recording.rig) == n_cameras and recording.n_frames == n_frames and recording.problems == ()
+    frame = next(iterate_frames(recording))
+    for image, camera in zip(frame.images, recording.rig, strict=True):
+        assert image.shape == (camera.size[1], camera.size[0], 3)
+    assert recording.has_silhouettes == (name == "bodytrack")
+
+
+def test_damaged_h264_loses_a_frame_and_keeps_the_rest_in_place(shared_data, tmp_path, monkeypatch):
+    """The decoder fails once and then skips a frame without a word; brute force tells which frames are which."""
+    monkeypatch.setenv("OPENCV_FFMPEG_LOGLEVEL", "-8")
+    source = shared_data / "rendered" / "r3"
+    whole = [frame.images[0] for frame in iterate_frames(open_recording(source, cameras=["cam_02"], frames=75))]
+    (tmp_path / "calibration.toml").write_bytes((source / "calibration.toml").read_bytes())
+    (tmp_path / "videos").mkdir()
+    data = bytearray((source / "videos" / "cam_02.mp4").read_bytes())
+    data[len(data) // 3 : len(data) // 3 + 4000] = bytes([0xAA]) * 4000
+    (tmp_path / "videos" / "cam_02.mp4").write_bytes(data)
+    recording, frames, problems = read_all(tmp_path, cameras=["cam_02"])
+    assert recording.n_frames == 180 and len(frames) == 180
+    lost = [frame.index for frame in frames if frame.images[0] is None]
+    assert 1 <= len(lost) <= 3 and 45 < lost[0] < 70 and len(problems) >= 1 and "cannot be read; left out" in problems[0]
+    for frame in frames[lost[-1] + 2 : 75]:
+        errors = [np.abs(frame.images[0].astype(float) - image).mean() for image in whole[frame.index - 4 : frame.index + 5]]
+        assert np.argmin(errors) == 4
+
+
+def test_cameras_that_did_not_start_together(recording_folder):
+    (recording_folder / "recording.toml").write_text("first_frame = { cam_01 = 4, cam_03 = 1 }\n")
+    recording = open_recording(recording_folder)
+    assert recording.n_frames == 12  # as long as two of the cameras last
+    late = {"cam_01": 4, "cam_03": 1}
+    for frame in iterate_frames(recording, first=2, last=9):
+        for camera, image in zip(recording.rig, frame.images, strict=True):
+            index = frame.index + late.get(camera.name, 0)
+            assert (image is None) == (index >= 12)
+            assert image is None or abs(float(image[..., 1].mean()) - (40 + 5 * index)) <= 1
+    assert [frame.images[1] is None for frame in iterate_frames(recording)] == [False] * 8 + [True] * 4
+
+
+def test_numbered_images_that_did_not_start_together(recording_folder, ring):
+    shutil.rmtree(recording_folder / "videos")
+    for camera in ring:
+        write_images(recording_folder / "images" / camera.name, [k for k in range(3, 12) if k != 7], camera.size)
+    (recording_folder / "recording.toml").write_text("first_frame = { cam_00 = 2 }\n")
+    for frame in iterate_frames(open_recording(recording_folder)):
+        for camera, image in zip(ring, frame.images, strict=True):
+            number = 3 + frame.index + 2 * (camera.name == "cam_00")
+            assert (image is None) == (number == 7 or number >= 12)
+            assert image is None or abs(float(image.mean()) - (40 + 5 * number)) <= 1
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("first_frame = { cam_01 = 12 }", "cam_01.avi: has 12 frames, but `first_frame`"),
+        ("first_frame = { cam_9 = 1 }", "names 'cam_9', no camera of"),
+        ("first_frame = { cam_01 = -1 }", "`first_frame` must be a table of cameras"),
+        ("first_frame = 3", "`first_frame` must be a table of cameras"),
+        ("first_frame = { cam_01 = 1.5 }", "`first_frame` must be a table of cameras"),
+    ],
+)
+def test_wrong_starts_are_told(recording_folder, text, words):
+    (recording_folder / "recording.toml").write_text(text + "\n")
+    with pytest.raises(InputError, match=re.escape(words)):
+        open_recording(recording_folder)

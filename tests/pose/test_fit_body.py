@@ -1,0 +1,109 @@
+"""A person's own dimensions, from rendered people of known stature."""
+
+import numpy as np
+import pytest
+from acted import act
+from numpy.testing import assert_allclose
+from posed import COST, body_of, mean_error, true_state
+
+from hmc.body.flesh import surface_coordinates
+from hmc.body.kinematics import landmarks
+from hmc.body.proportions import default_body
+from hmc.pose.objectives.symmetric import body_points
+from hmc.pose.starts.fit_body import FitBodySettings, fit_body
+from hmc.pose.steps.refine import RefineSettings, refine
+
+FRAMES = (0, 1, 3, 4, 6, 7)
+
+
+def start(acted, height_m: float):
+    """A body of some stature on the frames of an act, and the poses refined with it."""
+    body, points = body_of(height_m)
+    targets = [acted.targets[k] for k in FRAMES]
+    hulls = [target.surface[::4] for target in targets]
+    states = [
+        refine(body, points, true_state(body, acted, k), target, hull, COST, RefineSettings())[0]
+        for k, target, hull in zip(FRAMES, targets, hulls, strict=True)
+    ]
+    return body, np.array(states), targets, hulls
+
+
+def pose_cost(body, coordinates, states, targets, hulls) -> float:
+    points = body_points(body, coordinates)
+    costs = [refine(body, points, s, t, h, COST, RefineSettings())[1].cost_after for s, t, h in zip(states, targets, hulls, strict=True)]
+    return float(np.mean(costs))
+
+
+def stature(body) -> float:
+    """What the lengths from ankles to crown add up to, over what they do in a person of average proportions, metres."""
+
+    def sum_of_lengths(dimensions) -> float:
+        return sum(dimensions[name] for name in ("trunk", "head", "thigh", "shank"))
+
+    return sum_of_lengths(body.dimensions) / sum_of_lengths(default_body(1.0).dimensions)
+
+
+@pytest.mark.parametrize("height", [1.62, 1.84])
+def test_stature_is_recovered_from_perfect_silhouettes(height):
+    """Seven cameras keep the hull from being much fatter than the person."""
+    acted = act("gesture", cameras=7, height_m=height)
+    found = []
+    for assumed in (height - 0.1, height + 0.12):
+        body, states, targets, hulls = start(acted, assumed)
+        coordinates = surface_coordinates(body, 250)
+        fitted, poses, info = fit_body(body, coordinates, states, targets, hulls, COST, FitBodySettings())
+        found.append(stature(fitted))
+        assert info.cost_after < info.cost_before
+        assert pose_cost(fitted, coordinates, poses, targets, hulls) < pose_cost(body, coordinates, states, targets, hulls)
+        assert np.all((poses >= body.limits.low) & (poses <= body.limits.high))
+        errors = [mean_error(landmarks(fitted, s), acted.landmarks[k]) for s, k in zip(poses, FRAMES, strict=True)]
+        assert np.mean(errors) < 0.05
+    assert found == pytest.approx([height, height], rel=0.06)
+    assert found[0] == pytest.approx(found[1], rel=0.03)  # it comes from the data, not from what was assumed
+
+
+@pytest.fixture(scope="module")
+def walking():
+    return start(act("walk"), 1.78)
+
+
+def test_the_body_stays_a_person(walking):
+    body, states, targets, hulls = walking
+    fitted, _, _ = fit_body(body, surface_coordinates(body, 200), states, targets, hulls, COST, FitBodySettings())
+    assert set(fitted.dimensions) == set(body.dimensions)
+    ratio = np.array([fitted.dimensions[name] / body.dimensions[name] for name in body.dimensions])
+    assert np.all((ratio > 0.5) & (ratio < 2.0))
+    assert fitted.height_m == fitted.dimensions["height"]
+    assert_allclose(fitted.limits.low, body.limits.low)
+    # What the fit leaves free follows the common scale.
+    scale = fitted.height_m / body.height_m
+    for name in ("hand", "foot", "ankle_height"):
+        assert fitted.dimensions[name] == pytest.approx(scale * body.dimensions[name])
+
+
+def test_a_strong_prior_keeps_the_body(walking):
+    body, states, targets, hulls = walking
+    coordinates = surface_coordinates(body, 200)
+    strong, _, info = fit_body(body, coordinates, states, targets, hulls, COST, FitBodySettings(prior_weight=10.0))
+    weak, _, _ = fit_body(body, coordinates, states, targets, hulls, COST, FitBodySettings())
+
+    def change(fitted):
+        return max(abs(np.log(fitted.dimensions[name] / body.dimensions[name])) for name in body.dimensions)
+
+    assert change(strong) < 0.01 < change(weak)
+    assert info.cost_after <= info.cost_before
+
+
+def test_no_iterations_change_nothing(walking):
+    body, states, targets, hulls = walking
+    same, poses, info = fit_body(body, surface_coordinates(body, 200), states, targets, hulls, COST, FitBodySettings(iterations=0))
+    assert same.dimensions == pytest.approx(body.dimensions)
+    assert_allclose(poses, states)
+    assert info.cost_after == info.cost_before
+
+
+def test_one_frame_is_enough_to_run(walking):
+    body, states, targets, hulls = walking
+    fitted, poses, info = fit_body(body, surface_coordinates(body, 150), states[:1], targets[:1], hulls[:1], COST, FitBodySettings())
+    assert poses.shape == (1, 27) and np.isfinite(poses).all()
+    assert 1.4 < fitted.height_m < 2.2 and info.cost_after <= info.cost_before

@@ -1,0 +1,133 @@
+"""Left and right leg told apart over time: against brute force, on swinging points, and on a rendered walker's hulls."""
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import pytest
+from acted import act
+from numpy.testing import assert_array_equal
+from posed import COST, mean_error, true_state
+
+from hmc.body.exchange import swapped_pose
+from hmc.body.kinematics import landmarks
+from hmc.body.proportions import default_body
+from hmc.landmarks import landmark_index
+from hmc.pose.legs import LegSettings, choose_legs, leg_choice, leg_points
+from hmc.pose.steps.annealed import make_filter
+from hmc.pose.steps.preset import PRESETS
+from hmc.pose.steps.refine import refine
+
+FPS = 15.0
+
+
+def path_cost(path, frames, costs, legs, settings):
+    """The cost of one path, a frame at a time."""
+    reach = round(settings.reach_s * FPS)
+    costs = costs * [1, 1 + settings.doubt]
+    total = costs[0][path[0]]
+    for k in range(1, len(path)):
+        here, there = path[k - 1], path[k]
+        a, b = max(0, k - 1 - reach), min(len(path) - 1, k + reach)
+        step = (legs[k][there] - legs[k - 1][here]) / (frames[k] - frames[k - 1]) * FPS
+        before = (legs[k - 1][here] - legs[a][here]) / (frames[k - 1] - frames[a]) * FPS if a < k - 1 else step
+        after = (legs[b][there] - legs[k][there]) / (frames[b] - frames[k]) * FPS if b > k else step
+        jump = np.mean([np.mean(np.sum(d**2, axis=1)) for d in (step - before, after - step, after - before)])
+        total += settings.jump_weight * min(jump, settings.largest_jump_m_s**2) + costs[k][there]
+    return total
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_path_is_the_cheapest_of_all(seed):
+    rng = np.random.default_rng(seed)
+    n, settings = 8, LegSettings()
+    frames = np.cumsum(rng.integers(1, 3, n))
+    costs, legs = rng.uniform(0, 2e-4, (n, 2)), rng.normal(0, 0.1, (n, 2, 4, 3))
+    best = min(product((0, 1), repeat=n), key=lambda path: path_cost(path, frames, costs, legs, settings))
+    assert_array_equal(choose_legs(frames, costs, legs, FPS, settings), best)
+
+
+def swinging(n: int = 45):
+    """Knees and ankles of a walk at one step in 9 frames, (n, 2 sides, 2, 3), metres."""
+    phase = np.arange(n)[:, None] / 18 * 2 * np.pi + np.array([0, np.pi])
+    joints = [
+        np.stack(
+            [0.07 * np.arange(n)[:, None] + swing * np.sin(phase), np.broadcast_to([0.1, -0.1], phase.shape), np.full_like(phase, z)], -1
+        )
+        for swing, z in ((0.18, 0.5), (0.35, 0.1))
+    ]
+    return np.stack(joints, axis=2)
+
+
+def test_legs_that_were_exchanged_where_they_pass_are_put_right():
+    """Two steps of a walk with exchanged legs: no cost tells, but for the first frames."""
+    sides = swinging()
+    right = sides.reshape(len(sides), 4, 3)
+    wrong = sides[:, ::-1].reshape(len(sides), 4, 3)
+    exchanged = np.zeros(len(sides), int)
+    exchanged[9:18], exchanged[27:36] = 1, 1  # the legs pass at multiples of 9 frames
+    pair = np.stack([right, wrong], axis=1)
+    legs = np.where(exchanged[:, None, None, None] == 0, pair, pair[:, ::-1])
+    costs = np.zeros((len(sides), 2))
+    costs[:5, 1] = 2e-4
+    assert_array_equal(choose_legs(np.arange(45), costs, legs, FPS, LegSettings()), exchanged)
+
+
+def test_a_frame_that_went_wrong_does_not_turn_the_rest():
+    sides = swinging().reshape(45, 4, 3)
+    legs = np.stack([sides, sides[:, [2, 3, 0, 1]]], axis=1)
+    legs[20] += np.random.default_rng(0).normal(0, 0.3, (2, 4, 3))
+    costs = np.tile([2e-4, 3e-4], (45, 1))
+    picks = choose_legs(np.arange(45), costs, legs, FPS, LegSettings())
+    assert not picks[np.arange(45) != 20].any()
+
+
+@pytest.fixture(scope="module")
+def walker():
+    acted = act("walk", frames=10)
+    filt = make_filter(default_body(acted.height_m), replace(PRESETS["default"], symmetric=COST), acted.fps)
+    return acted, filt, [refined(filt, true_state(filt.body, acted, k), target) for k, target in enumerate(acted.targets)]
+
+
+def refined(filt, state, target):
+    return refine(filt.body, filt.samples, state, target, target.surface, filt.preset.symmetric, filt.preset.refine)[0]
+
+
+def test_the_other_choice_has_exchanged_legs(walker):
+    acted, filt, states = walker
+    wide = int(
+        np.argmax([np.linalg.norm(truth[landmark_index("l_ankle")] - truth[landmark_index("r_ankle")]) for truth in acted.landmarks])
+    )
+    choice = leg_choice(np.random.default_rng(0), filt, states[wide], acted.targets[wide])
+    assert_array_equal(choice.states[0], states[wide])
+    kept, other = leg_points(filt.body, choice.states)
+    assert np.linalg.norm(other[[1, 3]] - kept[[3, 1]], axis=1).max() < 0.15  # ankles
+    assert np.linalg.norm(kept[1] - kept[3]) > 0.3
+    assert np.all(choice.costs > 0)
+    assert np.all((choice.states >= filt.body.limits.low) & (choice.states <= filt.body.limits.high))
+
+
+def test_a_frame_without_a_hull_offers_nothing(walker):
+    _, filt, states = walker
+    choice = leg_choice(np.random.default_rng(0), filt, states[0], None)
+    assert_array_equal(choice.states, [states[0], states[0]])
+    assert_array_equal(choice.costs, 0)
+
+
+def test_a_walker_whose_legs_were_exchanged_is_put_right(walker):
+    """True poses, but for some frames whose legs were exchanged: hulls and swing tell which."""
+    acted, filt, states = walker
+    given = [
+        refined(filt, swapped_pose(filt.body, state, "legs"), acted.targets[k]) if 4 <= k < 8 else state for k, state in enumerate(states)
+    ]
+    rng = np.random.default_rng(1)
+    choices = [leg_choice(rng, filt, state, target) for state, target in zip(given, acted.targets, strict=True)]
+    legs = np.array([leg_points(filt.body, one.states) for one in choices])
+    picks = choose_legs(np.arange(len(given)), np.array([one.costs for one in choices]), legs, acted.fps, LegSettings())
+    errors = [
+        [mean_error(landmarks(filt.body, one), truth) for one in (state, choice.states[pick])]
+        for state, choice, pick, truth in zip(given, choices, picks, acted.landmarks, strict=True)
+    ]
+    before, after = np.mean(errors, axis=0)
+    assert_array_equal(picks[:3], 0)
+    assert after < 0.8 * before and after < 0.06
