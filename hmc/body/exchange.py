@@ -7,8 +7,9 @@ from typing import Literal
 import numpy as np
 
 from hmc.body.inverse import fit_landmarks
-from hmc.body.joints import DOF_NAMES, mirror_state
+from hmc.body.joints import mirror_state
 from hmc.body.kinematics import landmarks
+from hmc.body.limbs import LIMBS
 from hmc.body.model import BodyModel, neutral_state
 from hmc.landmarks import LANDMARKS
 
@@ -18,7 +19,7 @@ __all__ = ["swapped_pose", "swapped_poses"]
 _LOOSE = {"legs": ("knee", "ankle"), "arms": ("elbow", "wrist")}
 #: Steps towards exchanged legs.
 LEG_STEPS = 8
-_LEG_ANGLES = [k for k, name in enumerate(DOF_NAMES) if name[2:-2] in ("hip", "knee")]
+_LEG_ANGLES = np.concatenate([LIMBS["r_leg"].dofs, LIMBS["l_leg"].dofs])
 
 
 def swapped_pose(body: BodyModel, state: np.ndarray, what: Literal["all", "legs", "arms"]) -> np.ndarray:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hmc.body.joints import SEGMENTS
+from hmc.body.limbs import LIMBS
 from hmc.body.model import BodyModel
 
 __all__ = ["HANG_M", "SINK_M", "above_floor", "floor_gap", "lowest_support"]
@@ -18,7 +18,7 @@ HANG_M = 0.10
 #: ... and this far below it (a shallow error of the calibration), metres.
 SINK_M = 0.05
 
-_SHANKS = np.array([index for index, segment in enumerate(SEGMENTS) if segment.name.endswith("shank")])
+_SHANKS = np.array([LIMBS[leg].segments[1] for leg in ("r_leg", "l_leg")])
 
 
 def floor_gap(body: BodyModel, rotations: np.ndarray, positions: np.ndarray, floor_z: float) -> np.ndarray:

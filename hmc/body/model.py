@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from hmc.body.joints import N_DOF, SEGMENTS, JointLimits, default_limits, dof_index
+from hmc.body.rest import HANGING_DEG
 
 __all__ = ["PARTS", "PART_OF_DOF", "PART_OF_SEGMENT", "BodyModel", "Cones", "neutral_state"]
 
@@ -92,7 +93,7 @@ def neutral_state(arms: str = "down", limits: JointLimits | None = None) -> np.n
     Parameters
     ----------
     arms : {"sideways", "down"}
-        ``sideways`` is the model's neutral pose, all angles zero; ``down`` lets the arms hang.
+        ``sideways`` is the model's neutral pose, all angles zero; ``down`` lets the arms hang (`hmc.body.rest`).
     limits : JointLimits, optional
         Clip to these.
 
@@ -104,7 +105,6 @@ def neutral_state(arms: str = "down", limits: JointLimits | None = None) -> np.n
         raise ValueError(f"`arms` must be 'sideways' or 'down'; got {arms!r}")
     state = np.zeros(N_DOF)
     if arms == "down":
-        state[dof_index("r_shoulder_x", "l_shoulder_x")] = np.radians([80.0, -80.0])
-        state[dof_index("r_elbow_z", "l_elbow_z")] = np.radians([15.0, -15.0])
+        state[dof_index(*HANGING_DEG)] = np.radians(list(HANGING_DEG.values()))
     limits = limits or default_limits()
     return np.clip(state, limits.low, limits.high)

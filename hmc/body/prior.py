@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from hmc.body.joints import DOF_NAMES
+from hmc.body.rest import RELAXED_DEG
 
 __all__ = ["POSTURE", "posture_spread"]
 
-# Angles at rest and how far people commonly go from there, degrees; what is not named rests at 0.
-_REST_DEG = {"r_shoulder_x": 75, "l_shoulder_x": -75, "r_elbow_z": 25, "l_elbow_z": -25, "torso_y": 5, "r_knee_y": 8, "l_knee_y": 8}
+# How far people commonly go from rest, degrees.
 _SPREAD_DEG = {
     "torso_x": 25, "torso_y": 45, "torso_z": 25, "neck_x": 25, "neck_y": 30,
     "shoulder_x": 90, "shoulder_y": 40, "shoulder_z": 70, "elbow_z": 90,
@@ -19,7 +19,7 @@ _SPREAD_DEG = {
 
 def _posture() -> tuple[np.ndarray, np.ndarray]:
     spread = [next((value for key, value in _SPREAD_DEG.items() if name.endswith(key)), np.inf) for name in DOF_NAMES]
-    return np.radians([_REST_DEG.get(name, 0.0) for name in DOF_NAMES]), np.radians(spread)
+    return np.radians([RELAXED_DEG.get(name, 0.0) for name in DOF_NAMES]), np.radians(spread)
 
 
 #: Rest and spread of every angle, radians, each of shape (27,); the root's are free (spread infinite).

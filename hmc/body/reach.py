@@ -8,20 +8,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from hmc.body.joints import SEGMENTS, dof_index
+from hmc.body.joints import SEGMENTS
 from hmc.body.kinematics import segment_transforms
+from hmc.body.limbs import LIMBS
 from hmc.body.model import BodyModel
 
 __all__ = ["limb_joint", "limb_lengths", "reach"]
-
-_BALLS = {"r_arm": "r_upper_arm", "l_arm": "l_upper_arm", "r_leg": "r_thigh", "l_leg": "l_thigh"}
-_INDEX = {limb: next(k for k, segment in enumerate(SEGMENTS) if segment.name == name) for limb, name in _BALLS.items()}
 
 
 def limb_lengths(body: BodyModel, limb: str) -> tuple[float, float]:
     """Lengths of a limb's two links, metres: the lower one to the middle of the hand, or of the ankle's height."""
     d = body.dimensions
-    if limb.endswith("arm"):
+    if LIMBS[limb].is_arm:
         return d["upper_arm"], d["forearm"] + 0.5 * d["hand"]
     return d["thigh"], d["shank"] + 0.5 * d["ankle_height"]
 
@@ -29,7 +27,8 @@ def limb_lengths(body: BodyModel, limb: str) -> tuple[float, float]:
 def limb_joint(body: BodyModel, state: np.ndarray, limb: str) -> tuple[np.ndarray, np.ndarray]:
     """Centre of the shoulder or hip, world, metres, shape (3,); rotation, world from the segment that carries it, shape (3, 3)."""
     rotations, positions = segment_transforms(body, state[None])
-    return positions[0, _INDEX[limb]], rotations[0, SEGMENTS[_INDEX[limb]].parent]
+    upper = LIMBS[limb].segments[0]
+    return positions[0, upper], rotations[0, SEGMENTS[upper].parent]
 
 
 def reach(body: BodyModel, state: np.ndarray, limb: str, points: np.ndarray, swivels: np.ndarray) -> np.ndarray:
@@ -50,15 +49,14 @@ def reach(body: BodyModel, state: np.ndarray, limb: str, points: np.ndarray, swi
     ndarray, shape (n, 4)
         The ball joint's x, y, z and the hinge's angle, within the body's limits: there the end may miss the point.
     """
-    side, arm = limb[0], limb.endswith("arm")
     upper, lower = limb_lengths(body, limb)
     centre, carrier = limb_joint(body, state, limb)
     aim = (points - centre) @ carrier
     distance = np.clip(np.linalg.norm(aim, axis=1), abs(upper - lower) + 1e-6, upper + lower)
     bend = np.arccos(np.clip((distance**2 - upper**2 - lower**2) / (2 * upper * lower), -1, 1))
     zero = np.zeros_like(bend)
-    if arm:
-        sign = 1.0 if side == "l" else -1.0
+    if LIMBS[limb].is_arm:
+        sign = 1.0 if LIMBS[limb].is_left else -1.0
         hinge = -sign * bend
         end = sign * np.stack([-lower * np.sin(hinge), upper + lower * np.cos(hinge), zero], axis=1)
     else:
@@ -66,8 +64,7 @@ def reach(body: BodyModel, state: np.ndarray, limb: str, points: np.ndarray, swi
         end = -np.stack([lower * np.sin(hinge), zero, upper + lower * np.cos(hinge)], axis=1)
     aim, end = (v / np.maximum(np.linalg.norm(v, axis=1, keepdims=True), 1e-9) for v in (aim, end))
     turn = _about(aim, swivels) @ _between(end, aim)
-    ball, elbow = (f"{side}_shoulder", f"{side}_elbow_z") if arm else (f"{side}_hip", f"{side}_knee_y")
-    dofs = dof_index(*(f"{ball}_{axis}" for axis in "xyz"), elbow)
+    dofs = LIMBS[limb].dofs
     low, high = body.limits.low[dofs], body.limits.high[dofs]
     both = np.concatenate([_angles(turn), np.repeat(hinge[None, :, None], 2, axis=0)], axis=-1)
     clipped = np.clip(both, low, high)

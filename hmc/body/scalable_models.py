@@ -15,15 +15,10 @@ from typing import Literal
 import numpy as np
 
 from hmc.body.joints import DOF_NAMES, dof_index
-from hmc.body.model import PART_OF_DOF, PARTS
+from hmc.body.model import PARTS
 from hmc.errors import InputError
 
-__all__ = ["LIMB_OF_DOF", "LIMB_OF_PART", "MODEL_1", "MODEL_2", "UNITIVE", "UNITIVE_PIECES", "Inclusive", "Model", "Union", "Unitive"]
-
-#: The limb of each part, in the order of `PARTS`: 0 the trunk with the head, then right and left arm, right and left leg.
-LIMB_OF_PART = np.array([0, 0, 1, 1, 2, 2, 3, 3, 4, 4])
-#: The same of each degree of freedom, shape (27,).
-LIMB_OF_DOF = LIMB_OF_PART[PART_OF_DOF]
+__all__ = ["MODEL_1", "MODEL_2", "UNITIVE", "UNITIVE_PIECES", "Inclusive", "Model", "Union", "Unitive"]
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,8 @@ from functools import cached_property
 
 import numpy as np
 
-from hmc.body.joints import DOF_NAMES, SEGMENTS
+from hmc.body.joints import DOF_NAMES, SEGMENTS, dof_index
+from hmc.body.limbs import LIMBS
 from hmc.body.model import BodyModel
 from hmc.body.superellipsoids import Superellipsoids
 
@@ -21,14 +22,10 @@ __all__ = ["CHAINS", "FREE", "FREE_NAMES", "GROUPS", "SolidBody", "solid_body", 
 FREE: np.ndarray = np.array([k for k, name in enumerate(DOF_NAMES) if not name.startswith("torso_")])
 FREE_NAMES: tuple[str, ...] = tuple(DOF_NAMES[k] for k in FREE)
 #: What samples are shared out among: the trunk and the five chains that hang on it.
-GROUPS: tuple[str, ...] = ("trunk", "head", "r_arm", "l_arm", "r_leg", "l_leg")
-_JOINTS = {
-    "head": ("neck",), "r_arm": ("r_shoulder", "r_elbow"), "l_arm": ("l_shoulder", "l_elbow"), "r_leg": ("r_hip", "r_knee"),
-    "l_leg": ("l_hip", "l_knee"),
-}  # fmt: skip
+GROUPS: tuple[str, ...] = ("trunk", "head", *LIMBS)
 #: Degrees of freedom of each chain, as places among the 24, in the order of `GROUPS` without the trunk.
 CHAINS: tuple[np.ndarray, ...] = tuple(
-    np.array([k for k, name in enumerate(FREE_NAMES) if name.rsplit("_", 1)[0] in _JOINTS[group]]) for group in GROUPS[1:]
+    np.searchsorted(FREE, dofs) for dofs in (dof_index("neck_x", "neck_y"), *(limb.dofs for limb in LIMBS.values()))
 )
 _SEGMENT = {segment.name: k for k, segment in enumerate(SEGMENTS)}
 

@@ -13,8 +13,8 @@ import numpy as np
 
 from hmc.body.exchange import swapped_pose
 from hmc.body.kinematics import landmarks
+from hmc.body.limbs import LIMBS
 from hmc.body.model import BodyModel
-from hmc.landmarks import landmark_index
 from hmc.pose.objectives.residuals import residual_values
 from hmc.pose.steps.annealed import PoseFilter
 from hmc.pose.steps.refine import refine
@@ -25,7 +25,7 @@ __all__ = ["LegChoice", "LegSettings", "choose_legs", "leg_choice", "leg_points"
 
 #: Exchanged legs are refined until a step gains less than this share: half of what they count more than they cost (`LegSettings.doubt`).
 TOLERANCE = 0.01
-_LEGS = [landmark_index(name) for name in ("l_knee", "l_ankle", "r_knee", "r_ankle")]
+_LEGS = np.concatenate([LIMBS[leg].landmarks for leg in ("l_leg", "r_leg")])
 
 
 @dataclass(frozen=True)

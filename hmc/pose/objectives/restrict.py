@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hmc.body.flesh import SurfaceSamples
+from hmc.body.limbs import CHAIN_OF_PART
 from hmc.body.model import PART_OF_SEGMENT, PARTS, BodyModel, Cones
 from hmc.body.part_distances import part_distances
-from hmc.body.scalable_models import LIMB_OF_PART
 from hmc.pose.objectives.four_scores import (
     ScoreMaps,
     ScoreTable,
@@ -41,7 +41,7 @@ __all__ = [
 ]
 
 #: Sums over the parts of each limb, shape (n_parts, n_limbs).
-_LIMBS = np.eye(LIMB_OF_PART.max() + 1)[LIMB_OF_PART]
+_LIMBS = np.eye(CHAIN_OF_PART.max() + 1)[CHAIN_OF_PART]
 
 
 def part_mask(parts: Collection[str]) -> np.ndarray:

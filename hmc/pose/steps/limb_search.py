@@ -9,13 +9,12 @@ import numpy as np
 
 from hmc.body.cone_maps import cone_maps
 from hmc.body.cones import places_and_directions
-from hmc.body.joints import DOF_NAMES, dof_index
 from hmc.body.kinematics import landmarks, segment_transforms
-from hmc.body.model import PARTS, BodyModel
+from hmc.body.limbs import LIMBS as LIMB_TABLE
+from hmc.body.model import BodyModel
 from hmc.body.nearest_cone import candidates, nearest_cones
 from hmc.body.prior import POSTURE
 from hmc.body.reach import limb_joint, limb_lengths, reach
-from hmc.landmarks import landmark_index
 from hmc.pose.objectives.symmetric import BodyPoints, SymmetricSettings, symmetric_cost
 from hmc.pose.steps.refine import RefineSettings, refine_best
 from hmc.pose.views.hull_target import HullTarget, sample_points
@@ -24,23 +23,9 @@ from hmc.search.truncated import truncated_normal
 __all__ = ["LIMBS", "SearchSettings", "lost_limbs", "search_limbs"]
 
 #: Angles of each limb.
-LIMBS: dict[str, np.ndarray] = {
-    limb: dof_index(*(name for name in DOF_NAMES if name.startswith(joints)))
-    for limb, joints in {
-        "r_arm": ("r_shoulder", "r_elbow"),
-        "l_arm": ("l_shoulder", "l_elbow"),
-        "r_leg": ("r_hip", "r_knee"),
-        "l_leg": ("l_hip", "l_knee"),
-    }.items()
-}
-_PARTS = {
-    limb: [PARTS.index(f"{limb[0]}_{part}") for part in (("upper_arm", "forearm") if limb.endswith("arm") else ("thigh", "shank"))]
-    for limb in LIMBS
-}
-_LANDMARKS = {
-    limb: [landmark_index(f"{limb[0]}_{name}") for name in (("elbow", "wrist") if limb.endswith("arm") else ("knee", "ankle"))]
-    for limb in LIMBS
-}
+LIMBS: dict[str, np.ndarray] = {name: limb.dofs for name, limb in LIMB_TABLE.items()}
+_PARTS = {name: limb.parts for name, limb in LIMB_TABLE.items()}
+_LANDMARKS = {name: limb.landmarks for name, limb in LIMB_TABLE.items()}
 
 
 @dataclass(frozen=True)

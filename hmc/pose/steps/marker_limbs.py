@@ -16,9 +16,9 @@ import numpy as np
 from hmc.body.exchange import swapped_pose
 from hmc.body.inverse import fit_landmarks
 from hmc.body.kinematics import landmarks
+from hmc.body.limbs import LIMBS as LIMB_TABLE
 from hmc.body.model import BodyModel
 from hmc.body.prior import POSTURE, posture_spread
-from hmc.landmarks import landmark_index
 from hmc.pose.legs import LegChoice
 from hmc.pose.objectives.epipolar import SeenMarkers
 from hmc.pose.objectives.marker_points import find_points, matched_points
@@ -33,7 +33,7 @@ FARTHEST_M = 0.08
 #: Two markers nearer to each other than this are one, metres.
 SAME_M = 0.03
 #: Middle and end of every limb, by their places among the landmarks.
-LIMBS = np.array([landmark_index(f"{side}_{name}") for side in "lr" for name in ("elbow", "wrist", "knee", "ankle")])
+LIMBS = np.concatenate([LIMB_TABLE[f"{side}_{kind}"].landmarks for side in "lr" for kind in ("arm", "leg")])
 #: How far a marker may be from where it is found again, round by round, metres.
 SEARCH_GATES_M = (0.6, 0.4, 0.2)
 #: A trusted point farther than this from all markers is left over, metres.

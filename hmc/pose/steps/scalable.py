@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hmc.body.joints import N_DOF, dof_index
+from hmc.body.limbs import CHAIN_OF_DOF
 from hmc.body.model import PARTS
 from hmc.body.prior import POSTURE
-from hmc.body.scalable_models import LIMB_OF_DOF, Inclusive
+from hmc.body.scalable_models import Inclusive
 from hmc.pose.objectives.four_scores import ScoreMaps, ScoreTable
 from hmc.pose.objectives.restrict import ScoreData, SymmetricData, nearest_part, part_mask, restrict_filter, restrict_target
 from hmc.pose.steps.annealed import (
@@ -174,7 +175,7 @@ def _structural(rng, filt, state, data, there) -> _Found:
         starts = [starting_particles(filt, state)] * n
     group = np.where(there.dofs, hierarchy.group, n)
     low, high = filt.body.limits.low, filt.body.limits.high
-    threads, info = structural_step(rng, starts, likelihoods, group, filt.drift, low, high, filt.preset.structural, LIMB_OF_DOF)
+    threads, info = structural_step(rng, starts, likelihoods, group, filt.drift, low, high, filt.preset.structural, CHAIN_OF_DOF)
     return _Found(threads[-1].mean, info.best, info.best_log_likelihood, threads[-1], info.evaluations, threads[:-1], info.estimates)
 
 

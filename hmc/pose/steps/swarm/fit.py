@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from hmc.body.rest import SWARM_DEG
 from hmc.body.spin_skeleton import ANGLE_INDEX, ANGLES, N_PARAMETERS, SkeletonModel, part_chains, segment_ends
 from hmc.pose.objectives.curves import KINDS, Observed, error_of_chains, skeleton_error
 from hmc.pose.objectives.volume import volume_error
@@ -119,14 +120,7 @@ def rest_state(model: SkeletonModel, centre: np.ndarray, up: np.ndarray, spin: f
     state[:3] = centre
     state[3:6] = centre + 0.5 * model.torso * up / max(float(np.linalg.norm(up)), 1e-9)
     state[6] = spin
-    for name, degrees in (
-        ("l_shoulder_x", -80),
-        ("r_shoulder_x", 80),
-        ("l_elbow_z", -15),
-        ("r_elbow_z", 15),
-        ("l_knee_y", 5),
-        ("r_knee_y", 5),
-    ):
+    for name, degrees in SWARM_DEG.items():
         state[ANGLE_INDEX[name]] = np.radians(degrees)
     state[7:] = np.clip(state[7:], model.low, model.high)
     return state
