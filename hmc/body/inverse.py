@@ -2,23 +2,59 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 
 from hmc.body.joints import N_DOF
 from hmc.body.kinematics import dof_masks, joint_twists
 from hmc.body.model import BodyModel
 from hmc.body.proportions import landmark_segments
+from hmc.search.gauss_newton import Damping, GaussNewtonSettings, LeastSquares, gauss_newton_init, gauss_newton_run
 
 __all__ = ["fit_landmarks"]
 
 _SEGMENTS = landmark_segments()
 _MASKS = dof_masks()[_SEGMENTS].astype(float)
+#: Starts are often far off, so all angles are damped alike: relative damping lets those go that no landmark holds.
+_SETTINGS = GaussNewtonSettings(
+    tolerance=0.0,
+    least_gain=1e-9,  # square metres
+    longest_step=0.7,
+    damping=Damping(rise=4.0, least=1e-6, least_after_failure=0.0, most=1e3, is_relative=False),
+)
+
+
+@dataclass(frozen=True)
+class _Misses:
+    """How far landmarks are from where they should be, shape (k, 3), and what moves them: see `joint_twists` for axes and centres."""
+
+    miss: np.ndarray
+    places: np.ndarray
+    masks: np.ndarray
+    axes: np.ndarray
+    centres: np.ndarray
+    near: None = None
+
+    @property
+    def residuals(self) -> np.ndarray:
+        """Shape (3 k,), metres."""
+        return self.miss.ravel()
+
+    def pulls(self) -> tuple[slice, np.ndarray]:
+        """All residuals, and how they change with the state, shape (3 k, 27)."""
+        # axis x (p - centre) for all points and angles, coordinate by coordinate: `numpy.cross` takes several times as long.
+        (x, y, z), (u, v, w) = self.axes.T, (self.places[:, None] - self.centres).transpose(2, 0, 1)
+        jacobian = np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=1)
+        jacobian[:, :, :3] = np.eye(3)
+        jacobian *= self.masks
+        return slice(None), jacobian.reshape(-1, N_DOF)
 
 
 def fit_landmarks(
     body: BodyModel, points: np.ndarray, start: np.ndarray, iterations: int = 40, stay: float = 1e-4
 ) -> tuple[np.ndarray, float]:
-    """Least squares over the landmarks, within the joint limits, by damped Gauss-Newton steps.
+    """The state of least squares over the landmarks, within the joint limits.
 
     Parameters
     ----------
@@ -39,43 +75,14 @@ def fit_landmarks(
         Root mean squared distance of the known landmarks, metres.
     """
     known = np.isfinite(points).all(1)
-    target = points[known]
-    low, high = body.limits.low, body.limits.high
-    start = np.clip(start, low, high)
+    target, segments, tips, masks = points[known], _SEGMENTS[known], body.tips[known, :, None], _MASKS[known][:, None]
 
-    masks = _MASKS[known][:, None]
-
-    def evaluate(state):
+    def misses(state: np.ndarray, near: None) -> _Misses:
         axes, centres, rotations, positions = joint_twists(body, state)
-        places = positions[_SEGMENTS] + (rotations[_SEGMENTS] @ body.tips[..., None])[..., 0]
-        residual = places[known] - target
-        # axis x (p - centre) for all points and angles, coordinate by coordinate: `numpy.cross` takes several times as long.
-        (x, y, z), (u, v, w) = axes.T, (places[known][:, None] - centres).transpose(2, 0, 1)
-        jacobian = np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=1)
-        jacobian[:, :, :3] = np.eye(3)
-        jacobian *= masks
-        return residual.ravel(), jacobian.reshape(-1, N_DOF), float((residual**2).sum() + stay * ((state - start) ** 2).sum())
+        places = positions.take(segments, axis=0) + (rotations.take(segments, axis=0) @ tips)[..., 0]
+        return _Misses(places - target, places, masks, axes, centres)
 
-    state = start
-    residual, jacobian, cost = evaluate(state)
-    damping = 1e-2
-    for _ in range(iterations):
-        gradient = jacobian.T @ residual + stay * (state - start)
-        stuck = ((state <= low) & (gradient > 0)) | ((state >= high) & (gradient < 0))
-        active = np.flatnonzero(~stuck)
-        matrix = jacobian[:, active].T @ jacobian[:, active] + (stay + damping) * np.eye(active.size)
-        step = np.zeros(N_DOF)
-        step[active] = -np.linalg.solve(matrix, gradient[active])
-        trial = np.clip(state + np.clip(step, -0.7, 0.7), low, high)
-        trial_residual, trial_jacobian, trial_cost = evaluate(trial)
-        if trial_cost < cost:
-            done = cost - trial_cost < 1e-9
-            state, residual, jacobian, cost = trial, trial_residual, trial_jacobian, trial_cost
-            damping = max(damping * 0.3, 1e-6)
-            if done:
-                break
-        else:
-            damping *= 4
-            if damping > 1e3:
-                break
-    return state, float(np.sqrt((residual.reshape(-1, 3) ** 2).sum(1).mean()))
+    problem = LeastSquares(misses, body.limits.low, body.limits.high, np.full(N_DOF, stay))
+    settings = replace(_SETTINGS, iterations=iterations, evaluations=iterations + 1)
+    end = gauss_newton_run(problem, gauss_newton_init(problem, start, settings), settings)
+    return end.x, float(np.sqrt((end.found.miss**2).sum(1).mean()))

@@ -19,6 +19,7 @@ from hmc.body.proportions import make_body
 from hmc.pose.objectives.residuals import residual_rows, residual_values
 from hmc.pose.objectives.symmetric import SymmetricSettings, body_points
 from hmc.pose.views.hull_target import HullTarget
+from hmc.search.gauss_newton import damped, movable
 
 __all__ = ["FitBodyInfo", "FitBodySettings", "fit_body"]
 
@@ -162,17 +163,14 @@ def _gauss_newton(frames, shape, states, anchors, hold, precision, damping, low,
     solved = []
     for (residual, by_pose, by_shape), state, anchor in zip(frames, states, anchors, strict=True):
         pose_gradient = by_pose.T @ residual + hold * (state - anchor)
-        stuck = ((state <= low) & (pose_gradient > 0)) | ((state >= high) & (pose_gradient < 0))
-        free = np.flatnonzero(~stuck)
-        normal = by_pose[:, free].T @ by_pose[:, free] + np.diag(hold[free])
-        normal += damping * np.diag(np.diag(normal) + 1e-9)
+        free = movable(state, pose_gradient, low, high)
+        normal = damped(by_pose[:, free].T @ by_pose[:, free] + np.diag(hold[free]), damping)
         cross = by_pose[:, free].T @ by_shape
         inverse = np.linalg.solve(normal, np.column_stack([cross, pose_gradient[free]]))
         matrix += by_shape.T @ by_shape - cross.T @ inverse[:, :n_shape]
         gradient += by_shape.T @ residual - cross.T @ inverse[:, n_shape]
         solved.append((free, inverse))
-    matrix += damping * np.diag(np.diag(matrix))
-    step = np.clip(-np.linalg.solve(matrix, gradient), -0.1, 0.1)
+    step = np.clip(-np.linalg.solve(damped(matrix, damping, least=0.0), gradient), -0.1, 0.1)
     new_states = states.copy()
     for row, (free, inverse) in zip(new_states, solved, strict=True):
         row[free] += np.clip(-inverse[:, n_shape] - inverse[:, :n_shape] @ step, -0.3, 0.3)
