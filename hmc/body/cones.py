@@ -1,15 +1,20 @@
-"""Distances to truncated cones with elliptic cross-sections: of points, and of rays that pass by.
+"""Distances to truncated cones with elliptic cross-sections: of points, and of rays that pass by; and depths in them.
 
 Places come as (m, 3), or with directions as (m, 6): a ray goes through its place in a unit direction; a direction of zero is a point.
+A cone's coordinates are two across it and one along its axis, from its start.
 """
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from hmc.body.model import Cones
 
-__all__ = ["cone_shapes", "places_and_directions", "slide_to_axis", "squared_distance"]
+__all__ = [
+    "cone_depth", "cone_distance", "cone_shapes", "ellipses_at", "places_and_directions", "slide_to_axis", "squared_distance",
+    "way_out",
+]  # fmt: skip
 
 
 def places_and_directions(points: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
@@ -55,37 +60,57 @@ def slide_to_axis(local: np.ndarray, directions: np.ndarray, lengths: np.ndarray
     return nearest
 
 
-def cone_shapes(cones: Cones) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Lengths, shape (n_cones, 1), metres, radii at the start, shape (n_cones, 2, 1), metres, and their change a metre; float32."""
-    first, last = cones.radii[:, 0, :, None], cones.radii[:, 1, :, None]
-    slope = (last - first) / cones.lengths[:, None, None]
-    return cones.lengths[:, None].astype(np.float32), first.astype(np.float32), slope.astype(np.float32)
+def cone_shapes(cones: Cones, dtype: DTypeLike = np.float32) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """`Cones.shapes` with one axis more, for points along the last: shapes (n_cones, 1), (n_cones, 2, 1) and (n_cones, 2, 1)."""
+    length, first, slope = (values[..., None].astype(dtype) for values in cones.shapes)
+    return length, first, slope
 
 
-def squared_distance(local: np.ndarray, length: np.ndarray, first: np.ndarray, slope: np.ndarray, out: np.ndarray) -> None:
-    """Squared distance of points to a cone a row, as in `hmc.body.flesh.cone_distance` but in single precision.
+def ellipses_at(along: np.ndarray, length: np.ndarray, first: np.ndarray, slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Squared semi-axes of the cones' cross-sections beside points: all that distances and depths have in common.
 
     Parameters
     ----------
-    local : ndarray of float32, shape (3, m, n)
-        Points in the cones' coordinates, metres; written over.
-    length, first, slope : ndarray of float32, shapes (m, 1), (m, 2, 1) and (m, 2, 1)
-        The cones, as from `cone_shapes`.
-    out : ndarray of float32, shape (m, n)
-        Where the result goes, square metres; 0 inside.
+    along : ndarray, shape (m, ...)
+        Of points, along the axis of a cone a row, metres; written over with how far they are beyond its ends, 0 between them.
+    length, first, slope : ndarray, shapes (m, ...), (m, 2, ...) and (m, 2, ...)
+        The cones, as from `cone_shapes`; they broadcast against the points. A single row stands for all.
+
+    Returns
+    -------
+    ndarray, ndarray, shape (m, ...)
+        Square metres, of the type of `along`.
     """
-    x, y, along = local
     clipped = np.maximum(along, 0)  # `numpy.clip` takes twice as long
     np.minimum(clipped, length, out=clipped)
     along -= clipped
+    across, third = clipped * slope[:, 0], clipped * slope[:, 1]
+    across += first[:, 0]
+    third += first[:, 1]
+    across *= across
+    third *= third
+    return across, third
+
+
+def squared_distance(local: np.ndarray, length: np.ndarray, first: np.ndarray, slope: np.ndarray, out: np.ndarray) -> None:
+    """Squared distance of points to a cone a row, as of `way_out`, where speed matters: every step is in place.
+
+    Parameters
+    ----------
+    local : ndarray, shape (3, m, n)
+        Points in the cones' coordinates, metres; written over.
+    length, first, slope : ndarray
+        The cones, as for `ellipses_at`.
+    out : ndarray, shape (m, n)
+        Where the result goes, square metres; 0 inside.
+    """
+    x, y, along = local
+    a, b = ellipses_at(along, length, first, slope)
     along *= along
     x *= x
     np.add(x, np.multiply(y, y, out=y), out=out)
-    for squares, axis in ((x, 0), (y, 1)):
-        radius = clipped * slope[:, axis]
-        radius += first[:, axis]
-        radius *= radius
-        squares /= radius
+    x /= a
+    y /= b
     x += y
     # lateral * (1 - 1 / level), squared
     np.maximum(x, 1, out=x)
@@ -95,3 +120,61 @@ def squared_distance(local: np.ndarray, length: np.ndarray, first: np.ndarray, s
     x *= x
     out *= x
     out += along
+
+
+def way_out(local: np.ndarray, length: np.ndarray, first: np.ndarray, slope: np.ndarray) -> None:
+    """Turn points into the way to them from the cone, zero inside: its length is their distance.
+
+    Radially it is measured along the ray from the axis, which for a circular cross-section is the distance to the cylinder of the cone's
+    radius there; the ends are flat.
+
+    Parameters
+    ----------
+    local : ndarray, shape (3, m, ...)
+        Points in the coordinates of a cone a row, metres; written over.
+    length, first, slope : ndarray
+        The cones, as for `ellipses_at`.
+    """
+    x, y, along = local
+    a, b = ellipses_at(along, length, first, slope)
+    local[:2] *= 1 - 1 / np.sqrt(np.maximum(x * x / a + y * y / b, 1))
+
+
+def cone_depth(local: np.ndarray, length: np.ndarray, first: np.ndarray, slope: np.ndarray) -> np.ndarray:
+    """How deep points are in a cone a row, shape (m, ...), metres: by the narrower radius there; 0 outside.
+
+    Parameters
+    ----------
+    local : ndarray, shape (3, m, ...)
+        Points in the cones' coordinates, metres; written over.
+    length, first, slope : ndarray
+        The cones, as for `ellipses_at`.
+    """
+    x, y, along = local
+    between = (along > 0) & (along < length)
+    a, b = ellipses_at(along, length, first, slope)
+    x *= x
+    y *= y
+    x /= a
+    y /= b
+    x += y
+    level = np.sqrt(x, out=x)
+    depth = np.minimum(a, b, out=a)
+    np.sqrt(depth, out=depth)
+    depth *= np.subtract(1, level, out=level)
+    depth *= between
+    return np.maximum(depth, 0, out=depth)
+
+
+def cone_distance(cones: Cones, index: int | np.integer, points: np.ndarray) -> np.ndarray:
+    """Distance of points (segment's frame) to one cone, shape (...), metres: 0 on it and inside it, else the length of the `way_out`.
+
+    Parameters
+    ----------
+    cones : Cones
+    index : int
+    points : ndarray, shape (..., 3)
+    """
+    local = cones.bases[index] @ (points - cones.start[index]).reshape(-1, 3).T
+    way_out(local, *(values[None, index] for values in cones.shapes))
+    return np.sqrt(np.einsum("ik,ik->k", local, local)).reshape(points.shape[:-1])

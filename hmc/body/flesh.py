@@ -7,11 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
+from hmc.body.cones import cone_distance
 from hmc.body.joints import SEGMENTS
 from hmc.body.kinematics import segment_transforms
-from hmc.body.model import PARTS, BodyModel, Cones, neutral_state
+from hmc.body.model import PARTS, BodyModel, neutral_state
 
-__all__ = ["FleshTable", "SurfaceSamples", "cone_distance", "flesh_points", "place_points", "surface_coordinates", "surface_samples"]
+__all__ = ["FleshTable", "SurfaceSamples", "flesh_points", "place_points", "surface_coordinates", "surface_samples"]
 
 # The golden angle spreads points evenly around a cone.
 _GOLDEN = np.pi * (3 - np.sqrt(5))
@@ -89,35 +90,6 @@ def flesh_points(body: BodyModel, spacing_m: float) -> FleshTable:
             columns.append((grid[inside], np.full(inside.sum(), segment), np.full(inside.sum(), part), surface[inside]))
     points, segments, parts, surface = (np.concatenate(column) for column in zip(*columns, strict=True))
     return FleshTable(points, segments, parts, surface, spacing_m)
-
-
-def cone_distance(cones: Cones, index, points: np.ndarray) -> np.ndarray:
-    """Distance of points (segment's frame) to one cone: 0 on it and inside it.
-
-    Radially it is measured along the ray from the axis, which for a circular cross-section is the distance to the cylinder
-    of the cone's radius there; the ends are flat.
-
-    Parameters
-    ----------
-    cones : Cones
-    index : int
-    points : ndarray, shape (..., 3)
-
-    Returns
-    -------
-    ndarray, shape (...)
-        Metres.
-    """
-    local = (points - cones.start[index]) @ cones.bases[index].T
-    length = cones.lengths[index]
-    along = local[..., 2]
-    t = np.clip(along / length, 0, 1)[..., None]
-    radii = np.maximum((1 - t) * cones.radii[index, 0] + t * cones.radii[index, 1], 1e-6)
-    lateral = np.hypot(local[..., 0], local[..., 1])
-    level = np.hypot(local[..., 0] / radii[..., 0], local[..., 1] / radii[..., 1])
-    radial = lateral * np.maximum(1 - 1 / np.maximum(level, 1e-9), 0)
-    beyond = np.maximum(np.maximum(-along, along - length), 0)
-    return np.hypot(radial, beyond)
 
 
 def surface_coordinates(body: BodyModel, n: int, least: int = 8) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -55,6 +55,12 @@ class Cones:
         return np.linalg.norm(self.end - self.start, axis=1)
 
     @cached_property
+    def shapes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Lengths, shape (n_cones,), metres, radii at the start, shape (n_cones, 2), metres, and their change a metre, (n_cones, 2)."""
+        radii = np.maximum(self.radii, 1e-6)  # a point has no outside
+        return self.lengths, radii[:, 0], (radii[:, 1] - radii[:, 0]) / self.lengths[:, None]
+
+    @cached_property
     def bases(self) -> np.ndarray:
         """Rows across, third and axis of every cone, shape (n_cones, 3, 3): segment's frame to the cone's own."""
         axis = (self.end - self.start) / self.lengths[:, None]

@@ -1,4 +1,4 @@
-"""Which cone of one pose is nearest to each hull point or ray, how far off it is, and where: what the refinement pulls on.
+"""Distances of hull points and rays to one pose: the nearest cone, how far off it is, and where (what the refinement pulls on); each part.
 
 A refinement asks for pose after pose that hardly move, so cones that are out of reach of a point are left out until the body has moved by
 a hand's breadth, and so are points that some cone holds anyway.
@@ -10,11 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hmc.body.cone_maps import ConeMaps, cones_near, to_cones
-from hmc.body.cones import cone_shapes, places_and_directions, slide_to_axis, squared_distance
-from hmc.body.model import Cones
+from hmc.body.cone_maps import ConeMaps, cone_maps, cones_near, to_cones
+from hmc.body.cones import cone_shapes, places_and_directions, slide_to_axis, squared_distance, way_out
+from hmc.body.model import PARTS, BodyModel, Cones
+from hmc.body.placing import place_segments
 
-__all__ = ["Candidates", "Nearest", "candidates", "nearest_cones", "towards"]
+__all__ = ["Candidates", "Nearest", "candidates", "nearest_cones", "part_distances", "towards"]
 
 #: How far the ends of the cones may go before the candidates are looked for again, metres.
 SWAY_M = 0.06
@@ -38,7 +39,7 @@ class Candidates:
     at : ndarray of int, shape (3, n)
         Where the coordinates of each pair are among those of all pairs, shape (n_cones, 3, m).
     shapes : tuple of ndarray of float32, shapes (n, 1), (n, 2, 1) and (n, 2, 1)
-        Of each pair's cone, as from `hmc.pose.objectives.symmetric.cone_shapes`.
+        Of each pair's cone, as from `hmc.body.cones.cone_shapes`.
     ends : ndarray, shape (2, n_cones, 3)
         Of the cones' axes when the pairs were chosen, world, metres.
     """
@@ -128,16 +129,12 @@ def nearest_cones(cones: Cones, maps: ConeMaps, pairs: Candidates) -> Nearest:
     some = np.flatnonzero((squared > 0) & (squared < np.float32(1.01 * pairs.reach_m**2)))
     pulls, cone = point[some], cone[some]
     at = cone * (3 * n) + pulls + (np.arange(3) * n)[:, None]
-    local, lengths, radii, where = local.ravel().take(at), cones.lengths[cone], cones.radii.reshape(-1, 4)[cone].T, places[pulls]
+    local, where = local.ravel().take(at), places[pulls]
+    length, first, slope = (values.take(cone, axis=0) for values in cones.shapes)
     if directions is not None and along is not None:
         # The ray's nearest point moves along with the cone, but along the ray, where the distance does not change.
-        where += slide_to_axis(local, along.ravel().take(at), lengths)[:, None] * directions[pulls]
-    x, y, z = local
-    clipped = np.minimum(np.maximum(z, 0), lengths)
-    a, b = radii[:2] + clipped / lengths * (radii[2:] - radii[:2])
-    shrink = 1 - 1 / np.sqrt(np.maximum((x / a) ** 2 + (y / b) ** 2, 1.0))
-    local[:2] *= shrink
-    z -= clipped
+        where += slide_to_axis(local, along.ravel().take(at), length)[:, None] * directions[pulls]
+    way_out(local, length, first, slope)
     distance[pulls] = np.sqrt(np.einsum("ik,ik->k", local, local))
     return Nearest(distance, pulls, cone, local, where)
 
@@ -155,6 +152,34 @@ def towards(maps: ConeMaps, nearest: Nearest, rows: np.ndarray) -> np.ndarray:
     """
     outward = nearest.offsets[:, rows] / -np.maximum(nearest.distance[nearest.pulls[rows]], 1e-9)
     return np.einsum("ik,kij->kj", outward, maps.to_cone[..., 0].take(nearest.cone[rows], axis=0)[:, :, :3])
+
+
+def part_distances(body: BodyModel, state: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Distance of hull points, or of rays, to each part of a body.
+
+    Parameters
+    ----------
+    body : BodyModel
+    state : ndarray, shape (27,)
+    points : ndarray, shape (k, 3) or (k, 6)
+        World, metres (`hmc.pose.views.rays`).
+
+    Returns
+    -------
+    ndarray of float32, shape (n_parts, k)
+        Metres, in the order of `hmc.body.model.PARTS`; 0 inside, infinite of a part that the body lacks.
+    """
+    places, directions = places_and_directions(points)
+    origin = places.mean(axis=0)
+    maps = cone_maps(body.cones, place_segments(body, state[None], origin))
+    local = np.ascontiguousarray(to_cones(maps, (places - origin).astype(np.float32)).swapaxes(0, 1))
+    lengths, first, slope = cone_shapes(body.cones)
+    if directions is not None:
+        along = maps.to_cone[:, :, :3, 0].reshape(-1, 3) @ directions.T.astype(np.float32)
+        slide_to_axis(local, along.reshape(-1, 3, len(points)).swapaxes(0, 1), lengths)
+    squared = np.empty(local.shape[1:], np.float32)
+    squared_distance(local, lengths, first, slope, squared)
+    return np.sqrt([squared[body.cones.part == part].min(axis=0, initial=np.inf) for part in range(len(PARTS))])
 
 
 def _nearest(local: np.ndarray, along: np.ndarray | None, pairs: Candidates) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

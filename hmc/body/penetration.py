@@ -12,7 +12,8 @@ from itertools import pairwise
 import numpy as np
 
 from hmc.body.cone_maps import ConeMaps, cone_maps, cones_near, spread, to_cones
-from hmc.body.model import PARTS, BodyModel, Cones
+from hmc.body.cones import cone_depth, cone_shapes
+from hmc.body.model import PARTS, BodyModel
 
 __all__ = ["AxisPoints", "axis_points", "depths_placed", "penetration_depth", "penetration_rows"]
 
@@ -116,12 +117,16 @@ def depths_placed(body: BodyModel, axes: AxisPoints, placed: np.ndarray, maps: C
     middle, far = spread(points)
     cone, point = np.nonzero(cones_near(body.cones, maps, middle, far)[0] & axes.against.T)
     depth = np.empty((len(cone), placed.shape[-1]), placed.dtype)
+    shapes = [values[cone] for values in cone_shapes(body.cones, placed.dtype)]
     step = max(1, CHUNK // placed.shape[-1])
     for begin in range(0, len(cone), step):
         rows = slice(begin, begin + step)
         to_cone, members = maps.to_cone[cone[rows]], points[point[rows]]
-        local = [np.einsum("mjn,mjn->mn", to_cone[:, axis, :3], members) + to_cone[:, axis, 3] for axis in range(3)]
-        depth[rows] = _depth(body.cones, cone[rows], *local)
+        local = np.empty((3, *members[:, 0].shape), placed.dtype)
+        for axis in range(3):
+            np.einsum("mjn,mjn->mn", to_cone[:, axis, :3], members, out=local[axis])
+            local[axis] += to_cone[:, axis, 3]
+        depth[rows] = cone_depth(local, *(values[rows] for values in shapes))
     out = np.zeros((len(points), placed.shape[-1]), placed.dtype)
     for start, stop in pairwise([*np.flatnonzero(np.diff(cone, prepend=-1)), len(cone)]):
         out[point[start:stop]] = np.maximum(out[point[start:stop]], depth[start:stop])
@@ -132,18 +137,6 @@ def _place_points(axes: AxisPoints, placed: np.ndarray) -> np.ndarray:
     """The points in the world, shape (n_points, 3, n)."""
     local = np.c_[axes.points, np.ones(len(axes.points))].astype(placed.dtype)
     return (local[:, None, None] @ placed[axes.segment])[:, :, 0]
-
-
-def _depth(cones: Cones, cone: np.ndarray, x: np.ndarray, y: np.ndarray, along: np.ndarray) -> np.ndarray:
-    """Depth of points in one cone a row, from their coordinates there: shape (m, n)."""
-    length = cones.lengths.astype(x.dtype)[cone, None]
-    t = np.clip(along / length, 0, 1)
-    first = cones.radii[:, 0].astype(x.dtype)[cone, :, None]
-    slope = (cones.radii[:, 1] - cones.radii[:, 0]).astype(x.dtype)[cone, :, None]
-    a, b = first[:, 0] + slope[:, 0] * t, first[:, 1] + slope[:, 1] * t
-    level = np.sqrt((x / a) ** 2 + (y / b) ** 2)
-    inside = (level < 1) & (along > 0) & (along < length)
-    return np.where(inside, (1 - level) * np.minimum(a, b), 0)
 
 
 def penetration_rows(
@@ -173,7 +166,7 @@ def penetration_rows(
     cones = body.cones
     points = np.einsum("kij,kj->ki", rotations[axes.segment], axes.points) + positions[axes.segment]
     local = to_cones(maps, points)
-    depths = _depth(cones, np.arange(len(local)), local[:, 0], local[:, 1], local[:, 2])
+    depths = cone_depth(local.swapaxes(0, 1).copy(), *cone_shapes(cones, float))
     depths *= axes.against.T  # of one state it takes longer to tell which are near
     deepest, k = depths.argmax(axis=0), np.arange(len(points))
     lateral = local[deepest, :2, k]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hmc.body.flesh import cone_distance
+from hmc.body.cones import cone_distance
 from hmc.body.inverse import fit_landmarks
 from hmc.body.kinematics import segment_transforms
 from hmc.body.model import BodyModel

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 from posed import body_of
 
 from hmc.body.cone_maps import cone_maps, cones_near, spread
-from hmc.body.flesh import cone_distance
+from hmc.body.cones import cone_distance
 from hmc.body.kinematics import segment_transforms
 from hmc.body.model import neutral_state
 from hmc.body.placing import place_segments

@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from hmc.body.flesh import cone_distance, flesh_points, place_points, surface_coordinates, surface_samples
+from hmc.body.cones import cone_distance
+from hmc.body.flesh import flesh_points, place_points, surface_coordinates, surface_samples
 from hmc.body.joints import N_DOF, SEGMENTS
 from hmc.body.kinematics import segment_transforms
 from hmc.body.model import PARTS, Cones

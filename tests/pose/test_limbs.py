@@ -10,11 +10,12 @@ from numpy.testing import assert_allclose, assert_array_equal
 from posed import body_of
 from scipy.ndimage import binary_dilation, binary_fill_holes
 
-from hmc.body.flesh import cone_distance, flesh_points, place_points
+from hmc.body.cones import cone_distance
+from hmc.body.flesh import flesh_points, place_points
 from hmc.body.joints import N_DOF, dof_index
 from hmc.body.kinematics import landmark_masks, landmarks, segment_transforms
 from hmc.body.model import PARTS, neutral_state
-from hmc.body.part_distances import part_distances
+from hmc.body.nearest_cone import part_distances
 from hmc.body.scalable_models import MODEL_1, MODEL_2, UNITIVE, UNITIVE_PIECES
 from hmc.errors import InputError
 from hmc.landmarks import landmark_index

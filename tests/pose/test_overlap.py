@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hmc.body.flesh import cone_distance, flesh_points, place_points
+from hmc.body.cones import cone_distance
+from hmc.body.flesh import flesh_points, place_points
 from hmc.body.joints import dof_index
 from hmc.body.kinematics import segment_transforms
 from hmc.body.model import PARTS, neutral_state

@@ -12,7 +12,8 @@ from posed import COST, body_of, crossed_arms, true_state, with_cylinders
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
-from hmc.body.flesh import cone_distance, place_points
+from hmc.body.cones import cone_distance
+from hmc.body.flesh import place_points
 from hmc.body.joints import DOF_NAMES, N_DOF, dof_index
 from hmc.body.kinematics import landmarks, segment_transforms
 from hmc.body.model import neutral_state

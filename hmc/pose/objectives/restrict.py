@@ -13,7 +13,7 @@ import numpy as np
 from hmc.body.flesh import SurfaceSamples
 from hmc.body.limbs import CHAIN_OF_PART
 from hmc.body.model import PART_OF_SEGMENT, PARTS, BodyModel, Cones
-from hmc.body.part_distances import part_distances
+from hmc.body.nearest_cone import part_distances
 from hmc.pose.objectives.four_scores import (
     ScoreMaps,
     ScoreTable,

@@ -9,7 +9,7 @@ import numpy as np
 
 from hmc.body.flesh import place_points
 from hmc.body.kinematics import segment_transforms
-from hmc.body.part_distances import part_distances
+from hmc.body.nearest_cone import part_distances
 from hmc.pose.objectives.four_scores import ScoreMaps, ScoreTable
 from hmc.pose.objectives.restrict import part_mask
 from hmc.pose.steps.hidden.limbs import LimbSettings
