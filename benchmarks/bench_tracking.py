@@ -19,14 +19,13 @@ from bench_frontend import make_images
 from hmc.camera.segmentation import SegmentationSettings, segment_views, train_background
 from hmc.tracking.appearance import N_COLORS, histogram
 from hmc.tracking.blobs import Observation, observe
-from hmc.tracking.cloud import Cloud
-from hmc.tracking.following import TrackerState, init
-from hmc.tracking.ghosts import Views
-from hmc.tracking.lifecycle import Track
+from hmc.tracking.following import init
 from hmc.tracking.particle import overlap
 from hmc.tracking.sparse import SparseSettings, filter_samples, propagate, sample_likelihood
+from hmc.tracking.state import PersonMemory, Track, TrackerState
 from hmc.tracking.surroundings import Surroundings, look_around
 from hmc.tracking.trackers import make_tracker
+from hmc.tracking.views import FrameViews
 from hmc.voxels.carving import carve_levels, make_tables
 from hmc.voxels.completion import complete_masks, doubtful_hull, make_completion_tables
 from hmc.voxels.grid import VoxelGrid
@@ -61,12 +60,12 @@ def sparse_sampling(rng: np.random.Generator) -> list[bool]:
     tracks = tuple(Track(k, place, place, np.zeros(3), 0.08, 0, 0) for k, place in enumerate(predicted))
     around = colored(observation, look_around(observation, predicted, 0.53, 0.03, False), rng)
     look = histogram(around.colors[around.colors >= 0])
-    state = TrackerState(FPS, tracks, clouds=tuple(Cloud(k, histogram=look) for k in range(3)))
+    state = TrackerState(FPS, tracks, memories=tuple(PersonMemory(k, histogram=look) for k in range(3)))
     for _ in range(5):
-        clouds = filter_samples(rng, state, predicted, observation, around, settings).clouds
-        state = TrackerState(FPS, tracks, clouds=clouds)
+        memories = filter_samples(rng, state, predicted, observation, around, settings).memories
+        state = TrackerState(FPS, tracks, memories=memories)
     still = np.zeros((3, 3))
-    samples, person = propagate(rng, state.clouds, still, observation, around, settings)
+    samples, person = propagate(rng, state.memories, still, observation, around, settings)
 
     # The bare gather: occupancy and colour of every voxel in every sample's neighbourhood, from volumes of the whole room.
     grid = observation.grid
@@ -84,7 +83,7 @@ def sparse_sampling(rng: np.random.Generator) -> list[bool]:
     times = interleaved(
         {
             "gather": gather,
-            "likelihood": lambda: sample_likelihood(samples, person, state.clouds, observation, around, settings),
+            "likelihood": lambda: sample_likelihood(samples, person, state.memories, observation, around, settings),
             "filter": lambda: filter_samples(rng, state, predicted, observation, around, settings),
         },
         rounds=41,
@@ -160,7 +159,7 @@ def whole_chain(rng: np.random.Generator) -> list[bool]:
             if all(after is before for after, before in zip(whole, masks, strict=True)):
                 doubtful = (None,) * len(masks)
             strict, tolerant, _ = timed("carving", hulls, whole, doubtful)
-            observation = timed("components", observe, grid, tolerant, strict, Views(rig, whole, tuple(images)))
+            observation = timed("components", observe, grid, tolerant, strict, FrameViews(rig, whole, tuple(images)))
             state, info = timed("life cycle", tracker.step, rng, state, frame, observation)
             for stage, seconds in (("colour", info.color_s), ("filter", info.filter_s)):
                 spent[stage] += seconds

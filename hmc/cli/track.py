@@ -19,8 +19,6 @@ from hmc.cli.common import (
 
 __all__ = ["add_parser", "add_tracker_options", "run", "selected_tracker"]
 
-TRACKERS = ("naive", "particle", "sparse")
-PRESETS = ("default", "canton2009", "alike")
 #: The journal of a run that is not finished.
 JOURNAL = ".track.journal"
 
@@ -42,26 +40,39 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     return parser
 
 
+class _TrackerHelp(str):
+    """Help that names the registered trackers, which are imported when it is shown and not before."""
+
+    def __mod__(self, params: Any) -> str:
+        from hmc.tracking.trackers import DEFAULT, TRACKERS
+
+        names = "; ".join(f"{one.name}: {one.summary}{' (default)' * (one.name == DEFAULT)}" for one in TRACKERS.values())
+        presets = ", ".join(dict.fromkeys(preset for one in TRACKERS.values() for preset in one.presets))
+        return self.format(names=names, presets=presets)
+
+
 def add_tracker_options(parser: argparse.ArgumentParser) -> None:
     """Add ``--tracker``, ``--color``, ``--particles`` and ``--track-preset``."""
-    parser.add_argument("--tracker", choices=TRACKERS, default="sparse", help="method: Sparse Sampling (default), particle filter, naive")
+    parser.add_argument("--tracker", metavar="NAME", help=_TrackerHelp("method; {names}"))
     parser.add_argument(
-        "--color", action=argparse.BooleanOptionalAction, default=None, help="use colours (default, where the tracker can), or do not"
+        "--color", action=argparse.BooleanOptionalAction, default=None, help="use colors (default, where the tracker can), or do not"
     )
     parser.add_argument("--particles", type=whole_number, default=None, metavar="N", help="particles or samples a person")
     parser.add_argument(
         "--track-preset",
-        choices=PRESETS,
+        metavar="NAME",
         default="default",
-        help="the tracker's parameters; canton2009: the thesis's printed ones; alike: people who are dressed alike",
+        help=_TrackerHelp(
+            "the tracker's parameters ({presets}); canton2009: the thesis's printed ones; alike: people who are dressed alike"
+        ),
     )
 
 
 def selected_tracker(args: argparse.Namespace):
     """The tracker that the options describe."""
-    from hmc.tracking.trackers import make_tracker
+    from hmc.tracking.trackers import DEFAULT, make_tracker
 
-    return make_tracker(args.tracker, color=args.color, particles=args.particles, preset=args.track_preset)
+    return make_tracker(args.tracker or DEFAULT, color=args.color, particles=args.particles, preset=args.track_preset)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -90,7 +101,7 @@ def run(args: argparse.Namespace) -> int:
         "frontend": frontend,
     }
     source = recording_source(recording)
-    depends_on = {"method": args.tracker, "seed": args.seed, **source, "parameters": parameters}
+    depends_on = {"method": tracker.name, "seed": args.seed, **source, "parameters": parameters}
     key = to_toml(depends_on)
     if was_finished([tracks_path], run_path, depends_on):
         print(_summary(read_tracks(tracks_path), recording.n_frames))
@@ -112,7 +123,7 @@ def run(args: argparse.Namespace) -> int:
     )
     write_tracks(tracks_path, table)
     speed = {name: value for timing in timings for name, value in _speed(timing, recording.fps).items()}
-    write_run(run_path, args.tracker, parameters, args.seed, **source, problems=list(dict.fromkeys(problems)), speed=speed)
+    write_run(run_path, tracker.name, parameters, args.seed, **source, problems=list(dict.fromkeys(problems)), speed=speed)
     journal.unlink(missing_ok=True)
     print(_summary(table, recording.n_frames))
     if speed:

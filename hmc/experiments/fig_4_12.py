@@ -19,7 +19,6 @@ from hmc.view.plots import draw_tracks
 
 __all__ = ["EXPERIMENT"]
 
-PRESETS = ("default", "canton2009")
 SAMPLES = 400
 VOXEL_M = 0.05
 #: Least extent of the picture along y, metres.
@@ -32,7 +31,7 @@ def grid(plan: Plan) -> list[dict]:
     return [
         runs.parameters_of(source.label, VOXEL_M, ("sparse", color), SAMPLES, preset, repeat)
         for source in sources
-        for preset in PRESETS
+        for preset in runs.PRESETS
         for color in (False, True)
         for repeat in range(3 if plan.quick else 10)
     ]
@@ -59,9 +58,9 @@ def _table(plain: dict) -> TrackTable:
 def report(cells: Sequence[Cell], plan: Plan) -> Report:
     """Tracks from above, and how often identities change."""
     first = cells[0].parameters["recording"]
-    figure, axes = plt.subplots(len(PRESETS), 2, figsize=(8, 2.2 * len(PRESETS)), sharex=True, sharey=True)
+    figure, axes = plt.subplots(len(runs.PRESETS), 2, figsize=(8, 2.2 * len(runs.PRESETS)), sharex=True, sharey=True)
     rows, means = [], {}
-    for row, preset in zip(axes, PRESETS, strict=True):
+    for row, preset in zip(axes, runs.PRESETS, strict=True):
         for ax, color in zip(row, (False, True), strict=True):
             own = [one for one in cells if (one.parameters["preset"], one.parameters["color"]) == (preset, color)]
             means[preset, color] = float(np.mean([one.results["mismatches"] for one in own]))
@@ -88,7 +87,7 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
             means[preset, True] == 0 < means[preset, False],
             f"{means[preset, False]:.1f} mismatches a run without, {means[preset, True]:.1f} with colour",
         )
-        for preset in PRESETS
+        for preset in runs.PRESETS
     )
     caption = f"Two people pass each other: Sparse Sampling with {SAMPLES} samples, voxels of {100 * VOXEL_M:g} cm. The paper: Figure 4.12."
     return Report((Table("fig-4.12", caption, rows),), {"fig-4.12": figure}, claims)

@@ -14,7 +14,6 @@ import numpy as np
 from hmc.experiments import table_4_3
 from hmc.experiments import tracking_runs as runs
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
-from hmc.experiments.engine.style import COLOURS
 
 __all__ = ["EXPERIMENT"]
 
@@ -40,11 +39,11 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
             for voxel, n in own
         ]
     figure, (left, right) = plt.subplots(1, 2, figsize=(8, 3.4))
-    for (tracker, color), method in runs.METHODS.items():
+    for (tracker, color), method in runs.methods(PRESET).items():
         own_rows = [row for row in rows if row["method"] == method]
         most = max((row["N"] for row in own_rows if row["N"]), default=None)
         finest = min(row["voxel_cm"] for row in own_rows)
-        style = {"color": COLOURS[tracker], "linestyle": "-" if color or tracker == "naive" else "--"}
+        style = runs.style_of(tracker, color)
         label = method + (f", N = {most}" if most else "")
         for axes, key, part in (
             (left, "voxel_cm", [row for row in own_rows if row["N"] == most]),
@@ -81,8 +80,9 @@ def _claims(rows: list[dict]) -> list[Claim]:
             slopes.append(np.polyfit(np.log([row[key] for row in line]), np.log([row["measured_ms"] for row in line]), 1)[0])
         return float(np.mean(slopes)) * (-1 if key == "voxel_cm" else 1)
 
-    by_voxel = {method: growth(method, "voxel_cm") for method in runs.METHODS.values()}
-    by_number = {method: growth(method, "N") for method in runs.METHODS.values() if method != "naive"}
+    names = dict.fromkeys(row["method"] for row in rows)
+    by_voxel = {method: growth(method, "voxel_cm") for method in names}
+    by_number = {method: growth(method, "N") for method in names if any(row["N"] for row in rows if row["method"] == method)}
     return [
         Claim(
             "naive and PF grow with the number of voxels, SS less than they",

@@ -10,7 +10,6 @@ import numpy as np
 from hmc.experiments import table_4_3
 from hmc.experiments import tracking_runs as runs
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
-from hmc.experiments.engine.style import COLOURS
 
 __all__ = ["EXPERIMENT"]
 
@@ -31,14 +30,14 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
         for (preset, voxel, method, n), s in scores.items()
     ]
     figures = {}
-    for preset in table_4_3.PRESETS:
+    for preset in runs.PRESETS:
         voxels = sorted({row["voxel_cm"] for row in rows}, reverse=True)
         figure, axes = plt.subplots(2, len(voxels), figsize=(2.6 * len(voxels), 4.6), sharex="col", sharey="row", squeeze=False)
         for column, voxel in zip(axes.T, voxels, strict=True):
             column[0].set_title(f"{voxel:g} cm")
-            for (tracker, color), method in runs.METHODS.items():
+            for (tracker, color), method in runs.methods(preset).items():
                 part = [row for row in rows if (row["preset"], row["voxel_cm"], row["method"]) == (preset, voxel, method)]
-                style = {"color": COLOURS[tracker], "linestyle": "-" if color else "--", "marker": "o", "label": method}
+                style = runs.style_of(tracker, color) | {"marker": "o", "label": method}
                 for ax, key in zip(column, ("MOTP_mm", "MOTA_percent"), strict=True):
                     ax.plot([row["RTF"] for row in part], [row[key] for row in part], **style)
             column[1].set(xlabel="real-time factor of the filter", xlim=(0, None))
@@ -46,7 +45,7 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
         axes[1, 0].set_ylabel("MOTA (%)")
         axes[0, -1].legend()
         figures[f"fig-4.14-{preset}"] = figure
-    claims = tuple(claim for preset in table_4_3.PRESETS for claim in _claims(preset, rows))
+    claims = tuple(claim for preset in runs.PRESETS for claim in _claims(preset, rows))
     names = ", ".join(source.name for source in runs.sources(plan))
     caption = f"Real-time factor of the filter alone (Canton, Eq. 4.27 and 4.34), and accuracy, on {names}. The paper: Figure 4.14."
     return Report((Table("fig-4.14", caption, rows),), figures, claims)

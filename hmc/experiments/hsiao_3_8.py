@@ -17,7 +17,7 @@ from hmc.experiments.hsiao_runs import person_hulls, scene_of, sequences
 from hmc.io.recording import open_recording
 from hmc.pose.spectral.ghosts import check_ghosts, remove_ghosts
 from hmc.synthetic.truth import true_parts
-from hmc.tracking.ghosts import Views
+from hmc.tracking.views import FrameViews
 
 __all__ = ["EXPERIMENT"]
 
@@ -43,7 +43,7 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
         if step.index % EVERY:
             continue
         far = true_parts(scene, step.index, grid_.centres(voxels))[1]
-        found = check_ghosts(voxels, grid_, Views(recording.rig, step.masks, step.images))
+        found = check_ghosts(voxels, grid_, FrameViews(recording.rig, step.masks, step.images))
         left = remove_ghosts(voxels, grid_, found)
         far_left = true_parts(scene, step.index, grid_.centres(left))[1]
         litres = 1000 * grid_.voxel_size_m**3

@@ -13,11 +13,10 @@ from matplotlib.figure import Figure
 
 from hmc.experiments import tracking_runs as runs
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
-from hmc.experiments.engine.style import COLOURS
+from hmc.tracking.trackers import TRACKERS
 
 __all__ = ["EXPERIMENT", "PAPER", "SAMPLES", "configurations", "grid"]
 
-PRESETS = ("default", "canton2009")
 SAMPLES = {"sparse": (50, 100, 200, 400, 600, 800, 1000), "particle": (10, 25, 50, 100, 150, 200, 250)}
 SAMPLES_QUICK = {"sparse": (50, 200, 1000), "particle": (10, 50, 250)}
 #: By method and number, MOTP (mm) and MOTA (%) at voxels of 15, 10, 5 and 2 cm.
@@ -63,11 +62,11 @@ def grid(plan: Plan) -> list[dict]:
     return [
         runs.parameters_of(source.label, voxel, method, n, preset, repeat)
         for source in runs.sources(plan)
-        for preset in PRESETS
+        for preset in runs.PRESETS
         for voxel in runs.voxel_sizes(plan)
-        for method in runs.METHODS
+        for method in runs.methods(preset)
         for n in numbers.get(method[0], (None,))
-        for repeat in range(1 if plan.quick or method[0] == "naive" else 2)
+        for repeat in range(1 if plan.quick or TRACKERS[method[0]].particles is None else 2)
     ]
 
 
@@ -93,10 +92,11 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
                 "FP_percent": 100 * score.false_positives, "miss_percent": 100 * score.misses, "mismatch_percent": 100 * score.mismatches,
             }
         )  # fmt: skip
-    figures = {f"fig-4.11-{preset}": _draw(preset, scores) for preset in PRESETS}
+    figures = {f"fig-4.11-{preset}": _draw(preset, scores) for preset in runs.PRESETS}
     names = ", ".join(source.name for source in runs.sources(plan))
     caption = f"MOTP and MOTA on {names}; the paper's (Canton, Table 4.3) on CLEAR 2007, against the heads."
-    return Report((Table("table-4.3", caption, rows),), figures, tuple(claim for preset in PRESETS for claim in _claims(preset, scores)))
+    claims = tuple(claim for preset in runs.PRESETS for claim in _claims(preset, scores))
+    return Report((Table("table-4.3", caption, rows),), figures, claims)
 
 
 def _paper(method: str, n: int | None, voxel: float) -> tuple[float | None, float | None]:
@@ -112,11 +112,11 @@ def _draw(preset: str, scores: dict[Configuration, runs.Score]) -> Figure:
     figure, axes = plt.subplots(2, len(voxels), figsize=(2.6 * len(voxels), 4.6), sharex=True, sharey="row", squeeze=False)
     for column, voxel in zip(axes.T, voxels, strict=True):
         column[0].set_title(f"{100 * voxel:g} cm")
-        for (tracker, color), method in runs.METHODS.items():
+        for (tracker, color), method in runs.methods(preset).items():
             points = sorted((n or 0, score) for (p, v, m, n), score in scores.items() if (p, v, m) == (preset, voxel, method))
-            style = {"color": COLOURS[tracker], "linestyle": "-" if color or tracker == "naive" else "--", "label": method}
+            style = runs.style_of(tracker, color) | {"label": method}
             for ax, values in zip(column, ([s.motp_mm for _, s in points], [100 * s.mota for _, s in points]), strict=True):
-                if tracker == "naive":
+                if TRACKERS[tracker].particles is None:
                     ax.axhline(values[0], **style)
                 else:
                     ax.plot([n for n, _ in points], values, marker="o", **style)
@@ -130,11 +130,11 @@ def _draw(preset: str, scores: dict[Configuration, runs.Score]) -> Figure:
 
 def _claims(preset: str, scores: dict[Configuration, runs.Score]) -> list[Claim]:
     """The remarks of section 4.4.2, on this preset's runs."""
-    own = {key[1:]: score for key, score in scores.items() if key[0] == preset}
+    printed = {name for name, _ in PAPER}
+    own = {key[1:]: score for key, score in scores.items() if key[0] == preset and key[2] in printed}
     voxels = sorted({voxel for voxel, _, _ in own}, reverse=True)
-    best = {
-        name: max((s for (_, m, _), s in own.items() if m == name), key=lambda s: (s.mota, -s.motp_mm)) for name in runs.METHODS.values()
-    }
+    names = dict.fromkeys(method for _, method, _ in own)
+    best = {name: max((s for (_, m, _), s in own.items() if m == name), key=lambda s: (s.mota, -s.motp_mm)) for name in names}
     order = sorted(best, key=lambda name: (-best[name].mota, best[name].motp_mm))
     families = [next(word for word in ("SS", "PF", "naive") if name.startswith(word)) for name in order]
 

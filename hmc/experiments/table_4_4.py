@@ -34,7 +34,7 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     """The best cases, by MOTA and then by MOTP."""
     scores = table_4_3.configurations(cells)
     rows, best = [], {}
-    for preset in table_4_3.PRESETS:
+    for preset in runs.PRESETS:
         for family, paper in PAPER.items():
             own = {key: score for key, score in scores.items() if key[0] == preset and key[2].startswith(family)}
             (_, voxel, method, n), score = max(own.items(), key=lambda item: (item[1].mota, -item[1].motp_mm))
@@ -49,7 +49,7 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
             best[preset, "SS"].mota > best[preset, "PF"].mota > best[preset, "naive"].mota,
             ", ".join(f"{family} {100 * best[preset, family].mota:.2f} % {best[preset, family].motp_mm:.0f} mm" for family in PAPER),
         )
-        for preset in table_4_3.PRESETS
+        for preset in runs.PRESETS
     )
     names = ", ".join(source.name for source in runs.sources(plan))
     caption = f"Each tracker's best case on {names}; the paper's (Canton, Table 4.4) on CLEAR 2007."

@@ -14,33 +14,28 @@ import numpy as np
 
 from hmc.experiments.engine.experiment import Cell, Parameters, Plan, Results, Source
 from hmc.experiments.engine.inputs import Inputs, rendered
+from hmc.experiments.engine.style import COLOURS
 from hmc.io.recording import iterate_frames
 from hmc.io.results import TrackTable, read_centroids
 from hmc.metrics.scores import evaluate_tracks
 from hmc.tracking.following import finish, init
-from hmc.tracking.lifecycle import Row
 from hmc.tracking.resumable import Timing, observe_step, person_grid
-from hmc.tracking.trackers import make_tracker
+from hmc.tracking.state import TrackRow
+from hmc.tracking.trackers import TRACKERS, make_tracker
 from hmc.tracking.tracks import frame_rng, table_of
 from hmc.voxels.hulls import HullStep
 
 __all__ = [
-    "FAMILY", "METHODS", "VERSION", "Method", "Score", "cell", "follow", "method_name", "parameters_of", "scores_of", "sources",
-    "voxel_sizes",
+    "FAMILY", "PRESETS", "VERSION", "Method", "Score", "cell", "follow", "method_name", "methods", "parameters_of", "scores_of",
+    "sources", "style_of", "voxel_sizes",
 ]  # fmt: skip
 
 FAMILY = "tracking"
 VERSION = 1
 
 Method = tuple[str, bool]
-#: Tracker and whether it uses colour, in the thesis's order, and what the thesis calls it.
-METHODS: dict[Method, str] = {
-    ("naive", False): "naive",
-    ("sparse", False): "SS raw",
-    ("sparse", True): "SS color",
-    ("particle", False): "PF raw",
-    ("particle", True): "PF color",
-}
+#: What is compared; a tracker that lacks one of them is run with the others.
+PRESETS = ("default", "canton2009")
 _QUICK, _FULL = ("meeting_short",), ("meeting", "hug", "alike")
 
 
@@ -79,6 +74,16 @@ def voxel_sizes(plan: Plan) -> tuple[float, ...]:
     return (0.15, 0.10, 0.05) if plan.quick else (0.15, 0.10, 0.05, 0.02)
 
 
+def methods(preset: str | None = None) -> dict[Method, str]:
+    """Each registered tracker without and with color, where it can, and what tables call it; only those that have a preset, if given."""
+    return {
+        (name, color): (method.label or name) + (f" {'color' if color else 'raw'}" if method.uses_colors else "")
+        for name, method in TRACKERS.items()
+        if preset is None or preset in method.presets
+        for color in ((False, True) if method.uses_colors else (False,))
+    }
+
+
 def parameters_of(label: str, voxel_m: float, method: Method, particles: int | None, preset: str, repeat: int) -> dict:
     """The parameters of one run."""
     tracker, color = method
@@ -94,8 +99,13 @@ def parameters_of(label: str, voxel_m: float, method: Method, particles: int | N
 
 
 def method_name(parameters: Parameters) -> str:
-    """What the thesis calls the method of a run."""
-    return METHODS[parameters["tracker"], parameters["color"]]
+    """What tables call the method of a run."""
+    return methods()[parameters["tracker"], parameters["color"]]
+
+
+def style_of(tracker: str, color: bool) -> dict[str, str]:
+    """How a tracker's lines are drawn: with color whole, without dashed where it could use colors."""
+    return {"color": COLOURS.get(tracker, COLOURS["other"]), "linestyle": "-" if color or not TRACKERS[tracker].uses_colors else "--"}
 
 
 def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Results:
@@ -125,14 +135,14 @@ def follow(parameters: Parameters, inputs: Inputs, seed: int) -> tuple[TrackTabl
     recording = inputs.recording(parameters["recording"])
     tracker = make_tracker(
         parameters["tracker"],
-        color=color if parameters["tracker"] != "naive" else None,
+        color=color,
         particles=parameters["particles"],
         preset=parameters["preset"],
     )
     grid = person_grid(recording, parameters["voxel_m"])
     hulls = inputs.hulls(parameters["recording"], parameters["voxel_m"])
     state, timing = init(recording.fps), Timing()
-    rows: list[Row] = []
+    rows: list[TrackRow] = []
     for hull in _with_images(hulls, iterate_frames(recording)) if color else hulls:
         observation = observe_step(recording, grid, hull, images=color)
         state, info = tracker.step(frame_rng(seed, hull.index), state, hull.index, observation)

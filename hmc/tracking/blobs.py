@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hmc.tracking.ghosts import Views
+from hmc.tracking.views import FrameViews
 from hmc.voxels.components import label_voxels
 from hmc.voxels.grid import VoxelGrid
 
@@ -80,7 +80,7 @@ class Observation:
         Features of the components, in the order of their labels.
     certain : ndarray of bool, shape (n,)
         Voxels in which no camera is contradicted: those of the strict hull.
-    views : Views, optional
+    views : FrameViews, optional
         The silhouettes, by which ghosts are told from people, and the images, by which people are told from one another.
     """
 
@@ -91,7 +91,7 @@ class Observation:
     labels: np.ndarray
     blobs: Blobs
     certain: np.ndarray
-    views: Views | None = None
+    views: FrameViews | None = None
 
     @property
     def grid(self) -> VoxelGrid:
@@ -100,7 +100,7 @@ class Observation:
         return VoxelGrid(self.room[0], self.voxel_size_m, tuple(shape))
 
 
-def observe(grid: VoxelGrid, occupied: np.ndarray, certain: np.ndarray | None = None, views: Views | None = None) -> Observation:
+def observe(grid: VoxelGrid, occupied: np.ndarray, certain: np.ndarray | None = None, views: FrameViews | None = None) -> Observation:
     """Components and features of one frame's occupied voxels.
 
     Parameters
@@ -110,7 +110,7 @@ def observe(grid: VoxelGrid, occupied: np.ndarray, certain: np.ndarray | None = 
         The hull; best the tolerant one, so that nobody is lost whom a camera does not see.
     certain : ndarray of bool, shape (nx, ny, nz), optional
         The strict hull, by which people are located where it has enough of them. All of `occupied` where left out.
-    views : Views, optional
+    views : FrameViews, optional
         The silhouettes, their cameras and, where colours are asked for, the images.
 
     Returns

@@ -8,29 +8,37 @@ reach counts, not the part inside the ellipsoid only, so that stretched arms are
 
 from __future__ import annotations
 
-from hmc.tracking.association import FollowingSettings
-from hmc.tracking.blobs import Observation
-from hmc.tracking.following import StepInfo, TrackerState, advance, finish, init
+from dataclasses import dataclass, field
 
-__all__ = ["finish", "init", "step"]
+import numpy as np
+
+from hmc.tracking.blobs import Observation
+from hmc.tracking.following import advance
+from hmc.tracking.method import TrackerMethod
+from hmc.tracking.settings import ALIKE, CANTON_2009, FollowingSettings
+from hmc.tracking.state import StepInfo, TrackerState
+
+__all__ = ["METHOD", "NaiveSettings", "step"]
+
+
+@dataclass(frozen=True)
+class NaiveSettings:
+    """The naive tracker has no parameters beyond those that every tracker has."""
+
+    following: FollowingSettings = field(default_factory=FollowingSettings)
 
 
 def step(
-    state: TrackerState, frame: int, observation: Observation | None, settings: FollowingSettings | None = None
+    rng: np.random.Generator, state: TrackerState, frame: int, observation: Observation | None, settings: NaiveSettings
 ) -> tuple[TrackerState, StepInfo]:
-    """One frame on.
+    """The state after a frame, and what was found in it; no random numbers are drawn."""
+    return advance(state, frame, observation, settings.following)
 
-    Parameters
-    ----------
-    state : TrackerState
-    frame, observation
-        As for `hmc.tracking.following.advance`.
-    settings : FollowingSettings, optional
-        The naive tracker has no parameters beyond those that every tracker has.
 
-    Returns
-    -------
-    state : TrackerState
-    info : StepInfo
-    """
-    return advance(state, frame, observation, FollowingSettings() if settings is None else settings)
+METHOD = TrackerMethod(
+    name="naive",
+    source="Canton (2009), section 4.3.1",
+    summary="the centroid of the voxels near each person",
+    step=step,
+    presets={"default": NaiveSettings(), "canton2009": NaiveSettings(CANTON_2009), "alike": NaiveSettings(ALIKE)},
+)

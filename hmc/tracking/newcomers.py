@@ -1,6 +1,6 @@
 """People whom no track owns yet, among the voxels of a frame: pieces put together, crowds taken apart.
 
-What makes one a person is decided by `hmc.tracking.lifecycle.looks_like_person`. Source: Canton (2009), section 4.2.3.
+What makes one a person is decided by `hmc.tracking.likeness.looks_like_person`. Source: Canton (2009), section 4.2.3.
 """
 
 from __future__ import annotations
@@ -12,7 +12,8 @@ from scipy.spatial import cKDTree
 
 from hmc.tracking.blobs import Blobs, Observation, blob_features
 from hmc.tracking.joined import cut_between
-from hmc.tracking.lifecycle import LifecycleSettings, looks_like_person
+from hmc.tracking.likeness import looks_like_person
+from hmc.tracking.settings import LifecycleSettings
 from hmc.voxels.components import label_voxels
 
 __all__ = ["newcomers", "one_or_two", "unowned_blobs"]

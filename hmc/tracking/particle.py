@@ -13,14 +13,16 @@ import numpy as np
 
 from hmc.errors import InputError
 from hmc.search import survival_rate, systematic
-from hmc.tracking.association import FollowingSettings
 from hmc.tracking.blobs import Observation
-from hmc.tracking.cloud import Cloud
-from hmc.tracking.following import Filtered, StepInfo, TrackerState, advance, finish, init
+from hmc.tracking.following import advance
+from hmc.tracking.method import TrackerMethod
 from hmc.tracking.region import PERSON_RADIUS_M
+from hmc.tracking.settings import ALIKE, CANTON_2009, FollowingSettings
+from hmc.tracking.state import PersonMemory, StepInfo, TrackerState
 from hmc.tracking.surroundings import blocking, look_around, looks_of
+from hmc.tracking.update import FilterEstimate
 
-__all__ = ["ParticleSettings", "color_likelihood", "finish", "init", "overlap", "step"]
+__all__ = ["METHOD", "ParticleSettings", "color_likelihood", "overlap", "step"]
 
 #: An ellipsoid's centre is at least so high, metres.
 LEAST_HEIGHT_M = 0.2
@@ -69,7 +71,7 @@ class ParticleSettings:
 
 
 def step(
-    rng: np.random.Generator, state: TrackerState, frame: int, observation: Observation | None, settings: ParticleSettings | None = None
+    rng: np.random.Generator, state: TrackerState, frame: int, observation: Observation | None, settings: ParticleSettings
 ) -> tuple[TrackerState, StepInfo]:
     """One frame on.
 
@@ -79,16 +81,15 @@ def step(
     state : TrackerState
     frame, observation
         As for `hmc.tracking.following.advance`; for colours the observation's views hold the images.
-    settings : ParticleSettings, optional
+    settings : ParticleSettings
 
     Returns
     -------
     state : TrackerState
     info : StepInfo
     """
-    settings = ParticleSettings() if settings is None else settings
 
-    def follow(state: TrackerState, predicted: np.ndarray, observation: Observation) -> Filtered:
+    def follow(state: TrackerState, predicted: np.ndarray, observation: Observation) -> FilterEstimate:
         return _filter(rng, state, predicted, observation, settings)
 
     return advance(state, frame, observation, settings.following, follow)
@@ -179,37 +180,57 @@ def color_likelihood(points: np.ndarray, colors: np.ndarray, centres: np.ndarray
 
 def _filter(
     rng: np.random.Generator, state: TrackerState, predicted: np.ndarray, observation: Observation, settings: ParticleSettings
-) -> Filtered:
+) -> FilterEstimate:
     """Move everybody's particles by one frame."""
     last = np.array([track.position for track in state.tracks]).reshape(-1, 3)
     centres = last + settings.drift * (predicted - last)
     sd = np.array([settings.noise_m_s, settings.noise_m_s, settings.noise_z_m_s]) / state.fps
     reach = 2 * PERSON_RADIUS_M + 2 * sd[0]
     around = look_around(observation, centres, reach, settings.following.least_certain_m3, settings.color)
-    positions, efficiency, moved = centres.copy(), np.zeros(len(centres)), []
-    for k, cloud in enumerate(state.clouds):
-        begun = len(cloud.points) > 0
-        particles = cloud.points[systematic(rng, cloud.weights, settings.particles)] + centres[k] - last[k] if begun else centres[k]
+    positions, efficiency = centres.copy(), np.zeros(len(centres))
+    moved: list[dict[str, np.ndarray]] = []
+    for k, memory in enumerate(state.memories):
+        if memory.arrays:
+            kept = systematic(rng, memory.arrays["weights"], settings.particles)
+            particles = memory.arrays["points"][kept] + centres[k] - last[k]
+        else:
+            particles = centres[k]
         particles = particles + rng.normal(size=(settings.particles, 3)) * sd
         particles[:, 2] = np.maximum(particles[:, 2], LEAST_HEIGHT_M)
         radii = np.column_stack([np.full((len(particles), 2), PERSON_RADIUS_M), particles[:, 2]])
         rows = around.rows[k]
         weights = overlap(observation.indices[rows], particles, radii, observation.room[0], observation.voxel_size_m)
-        if settings.color and cloud.histogram.size:
+        if settings.color and memory.histogram.size:
             colored = rows[around.colors[rows] >= 0]
-            like = color_likelihood(observation.points[colored], around.colors[colored], particles, radii, cloud.histogram)
+            like = color_likelihood(observation.points[colored], around.colors[colored], particles, radii, memory.histogram)
             weights = settings.raw_share * weights + (1 - settings.raw_share) * like
         zones = blocking(particles, np.full(len(particles), k), centres, settings.blocking / PERSON_RADIUS_M**2)
         weights = weights * zones
         best = weights.max()
         if best <= 0:
-            moved.append((np.zeros((0, 3)), np.zeros(0)))
+            moved.append({})
             continue
         weights = (weights / best) ** settings.sharpness
         efficiency[k] = survival_rate(weights)
-        moved.append((particles, weights / weights.sum()))
-        positions[k] = moved[k][1] @ particles
+        moved.append({"points": particles, "weights": weights / weights.sum()})
+        positions[k] = moved[k]["weights"] @ particles
     looks = looks_of(observation, around, positions) if settings.color else ()
-    clouds = tuple(Cloud(cloud.person, *pair, cloud.histogram) for cloud, pair in zip(state.clouds, moved, strict=True))
-    seen = np.array([len(cloud.points) > 0 for cloud in clouds], bool)
-    return Filtered(positions, seen, clouds, looks, settings.keep_histogram, around.color_s, efficiency)
+    memories = tuple(PersonMemory(one.person, arrays, one.histogram) for one, arrays in zip(state.memories, moved, strict=True))
+    seen = np.array([len(arrays) > 0 for arrays in moved], bool)
+    return FilterEstimate(positions, seen, memories, looks, settings.keep_histogram, around.color_s, efficiency)
+
+
+METHOD = TrackerMethod(
+    name="particle",
+    source="Canton (2009), section 4.3.2",
+    summary="particle filter, each particle an ellipsoid",
+    step=step,
+    presets={
+        "default": ParticleSettings(),
+        "canton2009": ParticleSettings(drift=0.0, sharpness=1.0, following=CANTON_2009),
+        "alike": ParticleSettings(following=ALIKE),
+    },
+    label="PF",
+    uses_colors=True,
+    particles="particles",
+)

@@ -11,12 +11,10 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterable
-from dataclasses import asdict, astuple, dataclass, field, replace
+from dataclasses import astuple, dataclass, field, replace
 from pathlib import Path
 from time import perf_counter, thread_time
 from typing import Any
-
-import numpy as np
 
 from hmc.errors import InputError
 from hmc.io.journal import append_journal, open_journal
@@ -24,13 +22,12 @@ from hmc.io.masks import keep_masks
 from hmc.io.recording import Recording
 from hmc.io.results import TrackTable
 from hmc.tracking.blobs import Observation, observe
-from hmc.tracking.cloud import Cloud, Departed
-from hmc.tracking.following import TrackerState, finish, init
-from hmc.tracking.furniture import Furniture
-from hmc.tracking.ghosts import Views
-from hmc.tracking.lifecycle import Candidate, Row, Track
+from hmc.tracking.following import finish, init
+from hmc.tracking.state import TrackerState, TrackRow
+from hmc.tracking.stored import from_plain, to_plain
 from hmc.tracking.trackers import Tracker, make_tracker
 from hmc.tracking.tracks import frame_rng, table_of
+from hmc.tracking.views import FrameViews
 from hmc.voxels.grid import VoxelGrid
 from hmc.voxels.hulls import FrontendSettings, HullStep, stream_hulls
 
@@ -94,7 +91,7 @@ def track_recording(
     """
     tracker = make_tracker() if tracker is None else tracker
     grid = person_grid(recording, voxel_size_m)
-    done = _take_up(journal, key, recording)
+    done = _resumed(journal, key, recording)
     state, rows, problems = done.state, list(done.rows), list(done.problems)
     report = on_problem or logger.warning
 
@@ -123,13 +120,13 @@ def track_recording(
         rows += info.rows
         n_frames = hull.index + 1 - recording.start
         if journal is not None and (n_frames % CHECKPOINT_FRAMES == 0 or n_frames == recording.n_frames):
-            now_done = Done(hull.index + 1, state, tuple(rows), tuple(problems), timing)
-            append_journal(journal, _to_plain(now_done, since=done))
+            now_done = CompletedFrames(hull.index + 1, state, tuple(rows), tuple(problems), timing)
+            append_journal(journal, _record(now_done, since=done))
             done, before = now_done, perf_counter()
     rows += finish(state, recording.n_frames, tracker.following)
     if on_timing is not None:
         on_timing(timing)
-    return table_of(rows, recording.fps, same=state.same)
+    return table_of(rows, recording.fps, reidentified=state.reidentified)
 
 
 def person_grid(recording: Recording, voxel_size_m: float) -> VoxelGrid:
@@ -152,7 +149,7 @@ def observe_step(recording: Recording, grid: VoxelGrid, hull: HullStep, images: 
     """
     if not hull.usable:
         return None
-    return observe(grid, hull.tolerant, hull.strict, Views(recording.rig, hull.masks, hull.images if images else ()))
+    return observe(grid, hull.tolerant, hull.strict, FrameViews(recording.rig, hull.masks, hull.images if images else ()))
 
 
 @dataclass(frozen=True)
@@ -183,61 +180,25 @@ class Timing:
 
 
 @dataclass(frozen=True)
-class Done:
+class CompletedFrames:
     """What is done of a run: the frames before `next_frame`."""
 
     next_frame: int
     state: TrackerState
-    rows: tuple[Row, ...] = ()
+    rows: tuple[TrackRow, ...] = ()
     problems: tuple[str, ...] = ()
     timing: Timing = field(default_factory=Timing)
 
 
-def _take_up(journal: str | Path | None, key: str, recording: Recording) -> Done:
+def _resumed(journal: str | Path | None, key: str, recording: Recording) -> CompletedFrames:
     """What the journal says is done."""
-    done = Done(recording.start, init(recording.fps))
+    done = CompletedFrames(recording.start, init(recording.fps))
     for record in open_journal(journal, key):
-        done = Done(
-            record["next_frame"],
-            _state_of(record["state"]),
-            done.rows + tuple(_row_of(row) for row in record["rows"]),
-            done.problems + tuple(record["problems"]),
-            Timing(**record["timing"]),
-        )
+        new = from_plain(CompletedFrames, record)
+        done = replace(new, rows=done.rows + new.rows, problems=done.problems + new.problems)
     return done
 
 
-def _to_plain(done: Done, since: Done) -> dict[str, Any]:
+def _record(done: CompletedFrames, since: CompletedFrames) -> dict[str, Any]:
     """A record of the journal: the state, and what is new since the last record."""
-    new = replace(done, rows=done.rows[len(since.rows) :], problems=done.problems[len(since.problems) :])
-    plain = asdict(new)
-    for cloud in (*plain["state"]["clouds"], *plain["state"]["departed"]):  # nearly all of a histogram is zero
-        colors = np.flatnonzero(cloud["histogram"])
-        cloud["histogram"] = {"size": len(cloud["histogram"]), "colors": colors, "shares": cloud["histogram"][colors]}
-    return plain
-
-
-def _histogram_of(plain: dict[str, Any]) -> np.ndarray:
-    histogram = np.zeros(plain["size"])
-    histogram[np.array(plain["colors"], int)] = plain["shares"]
-    return histogram
-
-
-def _state_of(plain: dict[str, Any]) -> TrackerState:
-    tracks = tuple(Track(**_arrays(track) | {"doubtful": tuple(_row_of(row) for row in track["doubtful"])}) for track in plain["tracks"])
-    candidates = tuple(Candidate(tuple(_row_of(row) for row in one["rows"]), one["missed"]) for one in plain["candidates"])
-    clouds = tuple(Cloud(**_arrays(one) | {"histogram": _histogram_of(one["histogram"])}) for one in plain["clouds"])
-    clouds = tuple(replace(cloud, points=cloud.points.reshape(-1, 3)) for cloud in clouds)
-    departed = tuple(Departed(one["person"], _histogram_of(one["histogram"]), one["last_frame"]) for one in plain["departed"])
-    same = tuple((now, before) for now, before in plain["same"])
-    things = tuple(_row_of(row) for row in plain["things"])
-    furniture = Furniture(**{name: np.array(value, np.int64) for name, value in plain["furniture"].items()})
-    return TrackerState(plain["fps"], tracks, candidates, plain["next_person"], clouds, departed, same, things, furniture)
-
-
-def _row_of(plain: dict[str, Any]) -> Row:
-    return Row(**_arrays(plain))
-
-
-def _arrays(plain: dict[str, Any]) -> dict[str, Any]:
-    return {name: np.array(value, float) if isinstance(value, list) else value for name, value in plain.items()}
+    return to_plain(replace(done, rows=done.rows[len(since.rows) :], problems=done.problems[len(since.problems) :]))

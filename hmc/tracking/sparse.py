@@ -15,18 +15,19 @@ import numpy as np
 from hmc.errors import InputError
 from hmc.search import systematic
 from hmc.tracking.appearance import similar_colors
-from hmc.tracking.association import FollowingSettings
 from hmc.tracking.blobs import Observation
-from hmc.tracking.cloud import Cloud
-from hmc.tracking.following import Filtered, StepInfo, TrackerState, advance, finish, init
+from hmc.tracking.following import advance
+from hmc.tracking.method import TrackerMethod
 from hmc.tracking.region import PERSON_RADIUS_M
+from hmc.tracking.settings import ALIKE, CANTON_2009, FollowingSettings
+from hmc.tracking.state import PersonMemory, StepInfo, TrackerState
 from hmc.tracking.surroundings import Surroundings, blocking, look_around, looks_of
+from hmc.tracking.update import FilterEstimate
 
 __all__ = [
+    "METHOD",
     "SparseSettings",
     "filter_samples",
-    "finish",
-    "init",
     "neighbourhood_counts",
     "propagate",
     "pseudo_likelihood",
@@ -103,7 +104,7 @@ class SparseSettings:
 
 
 def step(
-    rng: np.random.Generator, state: TrackerState, frame: int, observation: Observation | None, settings: SparseSettings | None = None
+    rng: np.random.Generator, state: TrackerState, frame: int, observation: Observation | None, settings: SparseSettings
 ) -> tuple[TrackerState, StepInfo]:
     """One frame on.
 
@@ -113,16 +114,15 @@ def step(
     state : TrackerState
     frame, observation
         As for `hmc.tracking.following.advance`; for colours the observation's views hold the images.
-    settings : SparseSettings, optional
+    settings : SparseSettings
 
     Returns
     -------
     state : TrackerState
     info : StepInfo
     """
-    settings = SparseSettings() if settings is None else settings
 
-    def follow(state: TrackerState, predicted: np.ndarray, observation: Observation) -> Filtered:
+    def follow(state: TrackerState, predicted: np.ndarray, observation: Observation) -> FilterEstimate:
         last = np.array([track.position for track in state.tracks]).reshape(-1, 3)
         centres = last + settings.drift * (predicted - last)
         reach = settings.reach_m + settings.radius * observation.voxel_size_m
@@ -262,7 +262,7 @@ def filter_samples(
     observation: Observation,
     around: Surroundings,
     settings: SparseSettings,
-) -> Filtered:
+) -> FilterEstimate:
     """Move everybody's samples by one frame, weigh them and take their means (Canton, Eq. 4.18).
 
     Parameters
@@ -278,14 +278,14 @@ def filter_samples(
 
     Returns
     -------
-    Filtered
+    FilterEstimate
     """
     n, size, origin = len(state.tracks), observation.voxel_size_m, observation.room[0]
     last = np.array([track.position for track in state.tracks]).reshape(-1, 3)
-    samples, person = propagate(rng, state.clouds, np.rint((centres - last) / size), observation, around, settings)
+    samples, person = propagate(rng, state.memories, np.rint((centres - last) / size), observation, around, settings)
     weights, drawn = np.zeros(0), np.bincount(person, minlength=n)
     if len(samples):
-        weights = sample_likelihood(samples, person, state.clouds, observation, around, settings)
+        weights = sample_likelihood(samples, person, state.memories, observation, around, settings)
         x, y = (origin[:2] + size * (samples[:, :2] + 0.5)).T
         weights *= (x - centres[person, 0]) ** 2 + (y - centres[person, 1]) ** 2 <= settings.reach_m**2
         weights *= blocking(np.stack([x, y], axis=1), person, centres, settings.blocking / PERSON_RADIUS_M**2)
@@ -299,15 +299,14 @@ def filter_samples(
     positions = np.where(seen[:, None], origin + size * (mean + 0.5), centres)
     looks = looks_of(observation, around, positions) if settings.color else ()
     parts = np.split(np.arange(len(samples)), np.cumsum(np.bincount(person, minlength=n))[:-1]) if n else []
-    clouds = tuple(
-        Cloud(cloud.person, samples[part], weights[part], cloud.histogram) for cloud, part in zip(state.clouds, parts, strict=True)
-    )
-    return Filtered(positions, seen, clouds, looks, settings.keep_histogram, around.color_s, efficiency)
+    kept = [{"samples": samples[part], "weights": weights[part]} if len(part) else {} for part in parts]
+    memories = tuple(PersonMemory(one.person, arrays, one.histogram) for one, arrays in zip(state.memories, kept, strict=True))
+    return FilterEstimate(positions, seen, memories, looks, settings.keep_histogram, around.color_s, efficiency)
 
 
 def propagate(
     rng: np.random.Generator,
-    clouds: tuple[Cloud, ...],
+    memories: tuple[PersonMemory, ...],
     drift: np.ndarray,
     observation: Observation,
     around: Surroundings,
@@ -318,7 +317,7 @@ def propagate(
     Parameters
     ----------
     rng : numpy.random.Generator
-    clouds : tuple of Cloud
+    memories : tuple of PersonMemory
     drift : ndarray, shape (k, 3)
         By how many voxels each person's samples move, whole numbers.
     observation, around, settings
@@ -333,10 +332,10 @@ def propagate(
     """
     most = max(1, round(settings.noise_m / observation.voxel_size_m))
     parts = []
-    for k, (cloud, rows) in enumerate(zip(clouds, around.rows, strict=True)):
-        n_scouts = round(settings.scouts * settings.samples) if len(cloud.points) else settings.samples
+    for k, (memory, rows) in enumerate(zip(memories, around.rows, strict=True)):
+        n_scouts = round(settings.scouts * settings.samples) if memory.arrays else settings.samples
         if n_scouts < settings.samples:
-            kept = cloud.points[systematic(rng, cloud.weights, settings.samples - n_scouts)].astype(np.int64)
+            kept = memory.arrays["samples"][systematic(rng, memory.arrays["weights"], settings.samples - n_scouts)]
             parts.append((k, kept + drift[k].astype(np.int64) + rng.integers(-most, most, kept.shape, endpoint=True)))
         parts.append((k, observation.indices[_draw(rng, rows, n_scouts)]))
     samples = np.concatenate([part for _, part in parts]) if parts else np.zeros((0, 3), np.int64)
@@ -353,7 +352,7 @@ def _draw(rng: np.random.Generator, rows: np.ndarray, n: int) -> np.ndarray:
 def sample_likelihood(
     samples: np.ndarray,
     person: np.ndarray,
-    clouds: tuple[Cloud, ...],
+    memories: tuple[PersonMemory, ...],
     observation: Observation,
     around: Surroundings,
     settings: SparseSettings,
@@ -364,7 +363,7 @@ def sample_likelihood(
     ----------
     samples, person
         As from `propagate`; at least one.
-    clouds : tuple of Cloud
+    memories : tuple of PersonMemory
     observation, around, settings
         As for `filter_samples`.
 
@@ -375,13 +374,29 @@ def sample_likelihood(
     """
     rows = np.concatenate(around.rows)
     codes = np.ones(len(rows), np.int32)
-    known = np.array([settings.color and cloud.histogram.size > 0 for cloud in clouds])
+    known = np.array([settings.color and one.histogram.size > 0 for one in memories])
     ends = np.cumsum([len(mine) for mine in around.rows])
-    for cloud, mine, end in zip(clouds, around.rows, ends, strict=True):
-        if settings.color and cloud.histogram.size:
+    for memory, mine, end in zip(memories, around.rows, ends, strict=True):
+        if settings.color and memory.histogram.size:
             colors = around.colors[mine]
-            similar = similar_colors(cloud.histogram, settings.similar_share)
+            similar = similar_colors(memory.histogram, settings.similar_share)
             codes[end - len(mine) : end] += np.where(colors >= 0, CODES[similar[colors].astype(np.int8)], 0)
-    whose = np.repeat(np.arange(len(clouds)), [len(mine) for mine in around.rows])
+    whose = np.repeat(np.arange(len(memories)), [len(mine) for mine in around.rows])
     counts, own = neighbourhood_counts(observation.indices[rows], codes, whose, samples, person, settings.radius)
     return pseudo_likelihood(counts, own, settings, known[person])
+
+
+METHOD = TrackerMethod(
+    name="sparse",
+    source="Canton (2009), section 4.3.3",
+    summary="Sparse Sampling, samples on the voxels of the surface",
+    step=step,
+    presets={
+        "default": SparseSettings(),
+        "canton2009": SparseSettings(drift=0.0, scouts=0.0, solid=False, following=CANTON_2009),
+        "alike": SparseSettings(following=ALIKE),
+    },
+    label="SS",
+    uses_colors=True,
+    particles="samples",
+)

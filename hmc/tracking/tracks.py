@@ -9,10 +9,11 @@ from itertools import pairwise
 import numpy as np
 
 from hmc.io.results import TrackTable
-from hmc.tracking.association import FollowingSettings, assign_voxels
+from hmc.tracking.association import assign_voxels
 from hmc.tracking.blobs import Observation
 from hmc.tracking.following import finish, init, original_number
-from hmc.tracking.lifecycle import Row
+from hmc.tracking.settings import FollowingSettings
+from hmc.tracking.state import TrackRow
 from hmc.tracking.trackers import Tracker, make_tracker
 
 __all__ = ["fill_gaps", "frame_rng", "from_rows", "person_voxels", "run", "table_of", "velocities"]
@@ -42,13 +43,13 @@ def run(
     """
     tracker = make_tracker() if tracker is None else tracker
     state, n_frames = init(fps), 0
-    rows: list[Row] = []
+    rows: list[TrackRow] = []
     for frame, observation in observations:
         state, info = tracker.step(frame_rng(seed, frame), state, frame, observation)
         rows += info.rows
         n_frames += 1
     rows += finish(state, n_frames, tracker.following)
-    return table_of(rows, fps, gap_s, state.same)
+    return table_of(rows, fps, gap_s, state.reidentified)
 
 
 def frame_rng(seed: int, frame: int) -> np.random.Generator:
@@ -56,16 +57,16 @@ def frame_rng(seed: int, frame: int) -> np.random.Generator:
     return np.random.default_rng((seed, frame))
 
 
-def table_of(rows: Iterable[Row], fps: float, gap_s: float = 1.0, same: tuple[tuple[int, int], ...] = ()) -> TrackTable:
+def table_of(rows: Iterable[TrackRow], fps: float, gap_s: float = 1.0, reidentified: tuple[tuple[int, int], ...] = ()) -> TrackTable:
     """The finished table: gaps up to `gap_s` seconds filled, persons numbered in the order in which they were first seen.
 
-    `same` are the persons who came back, with the numbers that they had before (`hmc.tracking.following.TrackerState`).
+    `reidentified` are the persons who came back, with the numbers that they had before (`hmc.tracking.state.TrackerState`).
     """
-    rows = [replace(row, person=original_number(same, row.person)) for row in rows]
+    rows = [replace(row, person=original_number(reidentified, row.person)) for row in rows]
     return renumber(fill_gaps(from_rows(rows), round(gap_s * fps)))
 
 
-def from_rows(rows: Iterable[Row]) -> TrackTable:
+def from_rows(rows: Iterable[TrackRow]) -> TrackTable:
     """The table of these rows, sorted by frame, then person."""
     rows = sorted(rows, key=lambda row: (row.frame, row.person))
     return TrackTable(

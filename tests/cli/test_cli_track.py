@@ -1,12 +1,15 @@
 """The track command: results, resuming, repeated runs and wrong input."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from drawn import draw_recording, walk
 
 from hmc.cli import main
 from hmc.io.results import read_run, read_tracks
-from hmc.tracking import resumable, sparse
+from hmc.tracking import resumable
+from hmc.tracking.trackers import TRACKERS
 
 
 @pytest.fixture(scope="module")
@@ -40,15 +43,15 @@ def test_tracks_are_where_people_were_drawn(folder, tmp_path, capsys):
 def test_a_stopped_run_goes_on_and_ends_as_if_it_had_not_been(folder, tmp_path, monkeypatch, stop):
     monkeypatch.setattr(resumable, "CHECKPOINT_FRAMES", 5)
     assert track(folder, tmp_path / "whole") == 0
-    step, calls = sparse.step, []
+    method, calls = TRACKERS["sparse"], []
 
     def dying(rng, state, frame, *rest):
         calls.append(frame)
         if frame == stop and calls.count(frame) == 1:
             raise KeyboardInterrupt
-        return step(rng, state, frame, *rest)
+        return method.step(rng, state, frame, *rest)
 
-    monkeypatch.setattr(sparse, "step", dying)
+    monkeypatch.setitem(TRACKERS, "sparse", replace(method, step=dying))
     assert track(folder, tmp_path / "cut") == 130
     assert not (tmp_path / "cut" / "tracks.csv").exists()
     with open(tmp_path / "cut" / ".track.journal", "a") as journal:
@@ -62,7 +65,7 @@ def test_a_finished_run_is_not_repeated_and_a_changed_one_is(folder, tmp_path, c
     assert track(folder, tmp_path, "--frames", "8") == 0
     before = (tmp_path / "tracks.csv").stat().st_mtime_ns
     with monkeypatch.context() as patch:
-        patch.setattr(sparse, "step", None)
+        patch.setitem(TRACKERS, "sparse", replace(TRACKERS["sparse"], step=None))
         assert track(folder, tmp_path, "--frames", "8") == 0
     assert "finished before" in capsys.readouterr().out
     assert (tmp_path / "tracks.csv").stat().st_mtime_ns == before
@@ -73,15 +76,15 @@ def test_a_finished_run_is_not_repeated_and_a_changed_one_is(folder, tmp_path, c
 
 def test_a_journal_of_other_parameters_is_begun_anew(folder, tmp_path, monkeypatch):
     monkeypatch.setattr(resumable, "CHECKPOINT_FRAMES", 5)
-    step = sparse.step
+    method = TRACKERS["sparse"]
 
     def dying(rng, state, frame, *rest):
         if frame == 12:
             raise KeyboardInterrupt
-        return step(rng, state, frame, *rest)
+        return method.step(rng, state, frame, *rest)
 
     with monkeypatch.context() as patch:
-        patch.setattr(sparse, "step", dying)
+        patch.setitem(TRACKERS, "sparse", replace(method, step=dying))
         assert track(folder, tmp_path / "cut", "--voxel", "0.1") == 130
     assert track(folder, tmp_path / "cut") == 0
     assert track(folder, tmp_path / "whole") == 0

@@ -382,13 +382,13 @@ def tracking_cell(preset, voxel, method, n, motp_mm, mota, filter_s):
 
 def papers_cells():
     """Cells that say what the thesis's Table 4.3 says, with times as in its Table 4.5."""
-    from hmc.experiments.table_4_3 import PAPER, PAPER_VOXELS, PRESETS
-    from hmc.experiments.tracking_runs import METHODS
+    from hmc.experiments.table_4_3 import PAPER, PAPER_VOXELS
+    from hmc.experiments.tracking_runs import PRESETS, methods
 
     cells = []
     for preset in PRESETS:
         for (name, n), values in PAPER.items():
-            method = next(key for key, label in METHODS.items() if label == name)
+            method = next(key for key, label in methods().items() if label == name)
             for k, voxel in enumerate(PAPER_VOXELS):
                 size = voxel**-3 if method[0] != "sparse" else 1000 * voxel**-0.1
                 cells.append(

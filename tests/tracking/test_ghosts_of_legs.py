@@ -5,7 +5,7 @@ import pytest
 
 from hmc.camera.model import Rig, look_at
 from hmc.pose.spectral.ghosts import check_ghosts, remove_ghosts
-from hmc.tracking.ghosts import Views
+from hmc.tracking.views import FrameViews
 from hmc.voxels.carving import pixel_of_voxel
 from hmc.voxels.grid import VoxelGrid
 
@@ -41,7 +41,7 @@ def views(colours):
             for dy in range(-4, 5):
                 for dx in range(-4, 5):
                     image[np.clip(row + dy, 0, 239), np.clip(column + dx, 0, 239)] = colour
-    return Views(RIG, [image.any(-1) for image in images], images)
+    return FrameViews(RIG, [image.any(-1) for image in images], images)
 
 
 def test_ghosts_have_the_colours_of_others():

@@ -22,8 +22,11 @@ from hmc.tracking.blobs import blob_features, observe
 from hmc.tracking.classifiers import CLASSIFIERS, detection_scores, fit_classifier, fit_tree, frame_groups, plain_tree
 from hmc.tracking.feature_table import FeatureTable, feature_table, join_tables
 from hmc.tracking.features import FEATURES, assign_components, feature_matrix
-from hmc.tracking.lifecycle import LifecycleSettings, Track, delete, looks_like_person
+from hmc.tracking.likeness import looks_like_person
 from hmc.tracking.person_tree import PersonTree, default_tree, person_share, predict_person, read_tree, write_tree
+from hmc.tracking.rules.death import TrackVerdict, judge_track
+from hmc.tracking.settings import LifecycleSettings
+from hmc.tracking.state import Track
 from hmc.voxels.grid import VoxelGrid
 
 ROOM = np.array([[-3.0, -3.0, 0.0], [3.0, 3.0, 2.5]])
@@ -221,22 +224,19 @@ def test_settings_with_a_tree_decide_by_it_and_say_so():
     assert replace(by_tree, person="rules").tree is None
 
 
-def a_track(person, x=0.0):
-    return Track(person, np.array([x, 0, 0.9]), np.zeros(3), np.zeros(3), 0.08, 0, 10)
-
-
-@pytest.mark.parametrize("bad", [{"efficiency": {0: 0.01, 1: 0.5}}, {"like_person": {0: False, 1: True}}])
-def test_tracks_that_do_badly_for_long_die(bad):
+@pytest.mark.parametrize(
+    ("bad", "good"),
+    [(TrackVerdict(efficiency=0.01), TrackVerdict(efficiency=0.5)), (TrackVerdict(like_person=False), TrackVerdict(like_person=True))],
+)
+def test_tracks_that_do_badly_for_long_die(bad, good):
     limits = LifecycleSettings(unlike_s=1.0, efficiency_s=1.0)
-    tracks = (a_track(0), a_track(1, 1.0))
-    for k in range(10):
-        tracks = delete(tracks, 10, 10.0, ROOM, limits, **bad)
-        assert len(tracks) == 2, k
-    assert [track.person for track in delete(tracks, 10, 10.0, ROOM, limits)] == [0, 1]  # not judged in this frame
-    good = {name: {0: 1.0} for name in bad}
-    recovered = delete(tracks, 10, 10.0, ROOM, limits, **good)
-    assert len(delete(recovered, 10, 10.0, ROOM, limits, **bad)) == 2
-    assert [track.person for track in delete(tracks, 10, 10.0, ROOM, limits, **bad)] == [1]
+    track = Track(0, np.array([0, 0, 0.9]), np.zeros(3), np.zeros(3), 0.08, 0, 10)
+    assert judge_track(track, good, [], 10.0, limits) is not None
+    for _ in range(10):
+        track = judge_track(track, bad, [], 10.0, limits)
+    assert judge_track(track, TrackVerdict(), [], 10.0, limits) is not None  # not judged in this frame
+    assert judge_track(judge_track(track, good, [], 10.0, limits), bad, [], 10.0, limits) is not None
+    assert judge_track(track, bad, [], 10.0, limits) is None
 
 
 def test_table_of_a_recording(recording_folder):

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from test_tracking_naive import FPS, GRID, box, follow, line, nothing, person
 
-from hmc.tracking.association import FollowingSettings
 from hmc.tracking.blobs import observe
-from hmc.tracking.cloud import Cloud
-from hmc.tracking.following import Filtered, advance, init
-from hmc.tracking.furniture import Furniture, learn_furniture, without_furniture
-from hmc.tracking.lifecycle import LifecycleSettings
-from hmc.tracking.trackers import make_tracker, tracker_of
+from hmc.tracking.following import advance, init
+from hmc.tracking.rules.static_objects import learn_static, without_static
+from hmc.tracking.settings import FollowingSettings, LifecycleSettings
+from hmc.tracking.state import PersonMemory, StaticObjects, TrackRow
+from hmc.tracking.trackers import make_tracker
 from hmc.tracking.tracks import run
+from hmc.tracking.update import FilterEstimate
 
 CHAIR = box((-0.3, -0.25, 0), (0.25, 0.25, 0.8))
 
@@ -51,8 +51,8 @@ def followed_with(efficiency, n=40):
 
     def filter(state, predicted, observation):
         k = len(state.tracks)
-        clouds = tuple(Cloud(track.person, np.zeros((1, 3)), np.ones(1)) for track in state.tracks)
-        return Filtered(predicted, np.ones(k, bool), clouds, efficiency=np.full(k, efficiency))
+        memories = tuple(PersonMemory(track.person, {"points": np.zeros((1, 3))}) for track in state.tracks)
+        return FilterEstimate(predicted, np.ones(k, bool), memories, efficiency=np.full(k, efficiency))
 
     for frame in range(n):
         state, _ = advance(state, frame, observe(GRID, person(0, 0)), settings, filter)
@@ -71,7 +71,7 @@ def test_filters_work_well_on_people_and_not_at_all_on_nothing(name, size):
     # Nothing else may end the track: not the missing voxels, and not the verdict.
     lifecycle = replace(tracker.following.lifecycle, patience_s=100.0, edge_patience_s=100.0, unlike_s=100.0)
     following = replace(tracker.following, lifecycle=lifecycle)
-    tracker = tracker_of(replace(tracker.settings, following=following))
+    tracker = tracker.method.tracker(replace(tracker.settings, following=following))
     path = [person(*place) for place in line((-0.8, 0), (0.8, 0), 30)]
     alive = [len(state.tracks) for state in states(tracker, path + [nothing()] * 40)]
     assert set(alive[10:30]) == {1}
@@ -143,30 +143,30 @@ def test_a_chair_that_was_pushed_and_left_takes_nobody_over():
     assert max(np.hypot(*(position[:2] - truth[frame])) for frame, position in zip(table.frames, table.positions, strict=True)) < 0.1
 
 
-def learnt(observation, people, n, furniture=None, fps=10.0):
+def learnt(observation, people, n, static=None, fps=10.0):
     """What is known after n frames with people [(x, y, height of the head)]."""
-    furniture = Furniture() if furniture is None else furniture
-    centroids, heads = (np.array([(x, y, z * share) for x, y, z in people]).reshape(-1, 3) for share in (0.6, 1.0))
+    static = StaticObjects() if static is None else static
+    rows = [TrackRow(0, -1, np.array([x, y, 0.6 * z]), np.array([x, y, z])) for x, y, z in people]
     for _ in range(n):
-        furniture = learn_furniture(furniture, observation, centroids, heads, np.zeros(len(observation.points), bool), fps)
-    return furniture
+        static = learn_static(static, observation, rows, np.zeros(len(observation.points), bool), fps)
+    return static
 
 
 def test_standing_furniture_is_nobody_s_and_is_forgotten_when_it_goes():
     chair, fps = observe(GRID, CHAIR), 10.0
-    furniture = learnt(chair, [(1.5, 0, 1.6)], 6)
+    static = learnt(chair, [(1.5, 0, 1.6)], 6)
     both = observe(GRID, CHAIR | person(1.5, 0))
-    rest, kept = without_furniture(both, furniture, fps)
+    rest, kept = without_static(both, static, fps)
     assert np.array_equal(rest.points, both.points[kept]) and np.array_equal(kept, both.points[:, 0] > 0.5)
-    furniture = learnt(observe(GRID, nothing()), [], 3, furniture)
-    assert without_furniture(both, furniture, fps)[1].all()
+    static = learnt(observe(GRID, nothing()), [], 3, static)
+    assert without_static(both, static, fps)[1].all()
     assert len(learnt(chair, [(0, 0, 0.7)], 20).voxels) == 0
 
 
 def test_a_chair_beside_somebody_who_stands_is_known_though_their_centroid_is_near():
     chair = observe(GRID, box((0.4, -0.2, 0), (0.8, 0.2, 0.8)))
-    furniture = learnt(chair, [(0, 0, 1.6)], 8)
-    assert len(furniture.voxels) == len(chair.points)
+    static = learnt(chair, [(0, 0, 1.6)], 8)
+    assert len(static.voxels) == len(chair.points)
     legs = observe(GRID, box((-0.3, -0.15, 0), (0.3, 0.15, 0.9)) | box((-0.9, -0.1, 1.2), (0.9, 0.1, 1.4)))
     assert len(learnt(legs, [(0, 0, 1.6)], 20).voxels) == np.count_nonzero(np.abs(legs.points[:, 0]) > 0.5)  # arms held out for 2 s
     assert len(learnt(chair, [(0.1, 0, 0.9)], 20).voxels) < len(chair.points)  # the feet of somebody who sits

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from hmc.errors import InputError
 from hmc.tracking.appearance import N_COLORS, adapt, bhattacharyya, color_bins, histogram, similar_colors
-from hmc.tracking.association import FollowingSettings
 from hmc.tracking.particle import ParticleSettings, color_likelihood, overlap
+from hmc.tracking.settings import FollowingSettings
 from hmc.tracking.sparse import SparseSettings, neighbourhood_counts, pseudo_likelihood, spread_out
 from hmc.tracking.surroundings import blocking
 from hmc.tracking.trackers import make_tracker
@@ -160,9 +160,9 @@ def test_exclusion_zones_are_a_product_over_the_others():
     ("arguments", "message"),
     [
         ({"name": "kalman"}, "no tracker `kalman`"),
-        ({"preset": "quick"}, "no tracking preset `quick`"),
-        ({"name": "naive", "color": True}, "neither colours nor particles"),
-        ({"name": "naive", "particles": 5}, "neither colours nor particles"),
+        ({"preset": "quick"}, "`sparse` has no preset `quick`"),
+        ({"name": "naive", "color": True}, "`naive` does not use colors"),
+        ({"name": "naive", "particles": 5}, "`naive` has no particles"),
         ({"particles": 0}, "`samples` must be 1 or more"),
         ({"name": "particle", "particles": 0}, "`particles` must be 1 or more"),
     ],

@@ -4,12 +4,14 @@ import numpy as np
 import pytest
 
 from hmc.io.results import TrackTable
-from hmc.tracking.association import FollowingSettings, assign_voxels
+from hmc.tracking.association import assign_voxels
 from hmc.tracking.blobs import observe
+from hmc.tracking.following import advance, finish, init
 from hmc.tracking.joined import cut_between
-from hmc.tracking.naive import finish, init, step
+from hmc.tracking.naive import NaiveSettings
 from hmc.tracking.newcomers import one_or_two
-from hmc.tracking.trackers import tracker_of
+from hmc.tracking.settings import FollowingSettings
+from hmc.tracking.trackers import TRACKERS
 from hmc.tracking.tracks import fill_gaps, from_rows, person_voxels, run, velocities
 from hmc.voxels.grid import VoxelGrid
 
@@ -33,8 +35,12 @@ def follow(volumes, settings=None):
     return run(
         ((frame, None if volume is None else observe(GRID, volume)) for frame, volume in enumerate(volumes)),
         FPS,
-        tracker_of(settings or FollowingSettings()),
+        TRACKERS["naive"].tracker(NaiveSettings(settings or FollowingSettings())),
     )
+
+
+def step(state, frame, observation):
+    return advance(state, frame, observation, FollowingSettings())
 
 
 def nothing():

@@ -8,10 +8,12 @@ from hypothesis import strategies as st
 from scipy import ndimage
 
 from hmc.tracking.blobs import blob_features, observe
-from hmc.tracking.ghosts import Views, real_people
 from hmc.tracking.heading import arm_reach, facing_hypotheses, shoulder_axis, walking_direction
-from hmc.tracking.lifecycle import LifecycleSettings, looks_like_person
+from hmc.tracking.likeness import looks_like_person
 from hmc.tracking.region import person_radii, region_distance
+from hmc.tracking.rules.ghosts import real_people
+from hmc.tracking.settings import LifecycleSettings
+from hmc.tracking.views import FrameViews
 from hmc.voxels.carving import carve, make_tables
 from hmc.voxels.grid import VoxelGrid
 
@@ -65,7 +67,7 @@ def test_a_ghost_is_told_from_the_people_who_cast_it(ring):
     masks = [np.any([silhouette(camera, *place) for place in people], axis=0) for camera in ring]
     grid = VoxelGrid(np.array([-1.6, -1.6, 0.0]), 0.05, (64, 64, 40))
     hull = observe(grid, carve(make_tables(grid, ring), masks, tolerance=1))
-    views = Views(ring, masks)
+    views = FrameViews(ring, masks)
 
     def standing_at(x, y):
         return hull.points[np.hypot(hull.points[:, 0] - x, hull.points[:, 1] - y) < 0.3]
@@ -85,7 +87,7 @@ def test_one_of_two_sets_at_one_place_is_enough(ring):
     masks = [silhouette(camera, 0, 0) for camera in ring]
     grid = VoxelGrid(np.array([-1.0, -1.0, 0.0]), 0.05, (40, 40, 40))
     points = observe(grid, carve(make_tables(grid, ring), masks)).points
-    assert real_people(Views(ring, masks), np.zeros((0, 3)), [points, points[::2]], 0.05).sum() == 1
+    assert real_people(FrameViews(ring, masks), np.zeros((0, 3)), [points, points[::2]], 0.05).sum() == 1
 
 
 def body(angle, reach=0.0, rng=None):

@@ -9,9 +9,9 @@ from test_tracking_sparse import RIG, line
 from test_tracking_sparse import seen as drawn
 
 from hmc.tracking.blobs import observe
-from hmc.tracking.ghosts import Views
 from hmc.tracking.trackers import make_tracker
 from hmc.tracking.tracks import run
+from hmc.tracking.views import FrameViews
 from hmc.voxels.grid import VoxelGrid
 
 FPS = 10.0
@@ -71,7 +71,7 @@ def walk(start, end, n):
 def follow(volumes, name, color):
     """The table of the tracks; images are grey, so that colours tell nothing, as where people are dressed alike."""
     tracker = make_tracker(name, color=color)
-    views = Views(RIG, [np.ones(image.shape[:2], bool) for image in VIEWS.images], VIEWS.images) if tracker.color else None
+    views = FrameViews(RIG, [np.ones(image.shape[:2], bool) for image in VIEWS.images], VIEWS.images) if tracker.color else None
     seen = ((k, None if volume is None else observe(GRID, volume, None, views)) for k, volume in enumerate(volumes))
     return run(seen, FPS, tracker)
 

@@ -9,13 +9,12 @@ import pytest
 from hmc.camera.model import Rig, look_at, project
 from hmc.tracking.appearance import color_surface
 from hmc.tracking.blobs import observe
-from hmc.tracking.cloud import Cloud, Departed
-from hmc.tracking.following import TrackerState, init
-from hmc.tracking.ghosts import Views
-from hmc.tracking.lifecycle import Candidate, Row
-from hmc.tracking.resumable import Done, Timing, _state_of, _to_plain
+from hmc.tracking.following import init
+from hmc.tracking.state import Candidate, DepartedTrack, PersonMemory, TrackerState, TrackRow
+from hmc.tracking.stored import from_plain, to_plain
 from hmc.tracking.trackers import make_tracker
 from hmc.tracking.tracks import run
+from hmc.tracking.views import FrameViews
 from hmc.voxels.grid import VoxelGrid
 
 FPS = 20.0
@@ -57,7 +56,7 @@ def seen(people):
                     image[row[order], column[order]], depth[row[order], column[order]] = colour, far[order]
         images.append(image)
         masks.append(np.isfinite(depth))
-    return observe(GRID, occupied, None, Views(RIG, masks, images))
+    return observe(GRID, occupied, None, FrameViews(RIG, masks, images))
 
 
 def line(start, end, n):
@@ -116,10 +115,9 @@ def test_people_who_were_exchanged_get_their_numbers_back(crossing):
     mixed = replace(
         state,
         tracks=(replace(two, person=one.person), replace(one, person=two.person)),
-        clouds=(replace(state.clouds[0], points=state.clouds[1].points), replace(state.clouds[1], points=state.clouds[0].points)),
+        memories=tuple(replace(mine, arrays=other.arrays) for mine, other in zip(state.memories, state.memories[::-1], strict=True)),
     )
-    assert all(len(cloud.points) for cloud in mixed.clouds)
-    mixed = replace(mixed, clouds=tuple(replace(c, weights=np.full(len(c.points), 1 / len(c.points))) for c in mixed.clouds))
+    assert all(len(memory.arrays["samples"]) for memory in mixed.memories)
     after, _ = tracker.step(np.random.default_rng(10), mixed, 10, observations[10])
     assert [track.person for track in after.tracks] == [one.person, two.person]
     for track, before in zip(after.tracks, (one, two), strict=True):
@@ -151,18 +149,24 @@ def test_a_state_comes_back_from_the_journal_as_it_was(crossing):
     tracker, state = make_tracker("sparse", color=True, particles=40), init(FPS)
     for frame, observation in enumerate(crossing[2][:9]):
         state, _ = tracker.step(np.random.default_rng(frame), state, frame, observation)
-    candidate = Candidate((Row(3, -1, np.ones(3), np.zeros(3)),), 1)
-    look = state.clouds[0].histogram
-    state = replace(state, candidates=(candidate,), clouds=(state.clouds[0], Cloud(1)), departed=(Departed(7, look, 4),), same=((8, 2),))
-    plain = json.loads(
-        json.dumps(_to_plain(Done(9, state, timing=Timing(9, 1.0, 2.0, 3.0)), Done(0, init(FPS))), default=lambda a: a.tolist())
+    candidate = Candidate((TrackRow(3, -1, np.ones(3), np.zeros(3)),), 1)
+    look = state.memories[0].histogram
+    state = replace(
+        state,
+        candidates=(candidate,),
+        memories=(state.memories[0], PersonMemory(1)),
+        departed=(DepartedTrack(7, look, 4),),
+        reidentified=((8, 2),),
+        arrays={"counts": np.arange(6, dtype=np.int32).reshape(2, 3), "empty": np.zeros((0, 3)), "flags": np.array([True, False])},
     )
-    back: TrackerState = _state_of(plain["state"])
-    np.testing.assert_equal(vars(back.clouds[0]), vars(state.clouds[0]))
-    np.testing.assert_equal(vars(back.clouds[1]), vars(state.clouds[1]))
-    np.testing.assert_equal(vars(back.departed[0]), vars(state.departed[0]))
-    assert back.same == state.same and back.fps == FPS and back.candidates[0].missed == 1
-    assert plain["timing"] == {"frames": 9, "input_s": 1.0, "filter_s": 2.0, "lifecycle_s": 3.0}
+    back: TrackerState = from_plain(TrackerState, json.loads(json.dumps(to_plain(state))))
+    for one, other in ((back.memories[0], state.memories[0]), (back.memories[1], state.memories[1]), (back.departed[0], state.departed[0])):
+        np.testing.assert_equal(vars(one), vars(other))
+    for name, array in state.arrays.items():
+        assert (
+            np.array_equal(back.arrays[name], array) and back.arrays[name].dtype == array.dtype and back.arrays[name].shape == array.shape
+        )
+    assert back.reidentified == state.reidentified and back.fps == FPS and back.candidates[0].missed == 1
     on, resumed = (tracker.step(np.random.default_rng(9), s, 9, crossing[2][9])[0] for s in (state, back))
     assert np.array_equal(on.tracks[0].position, resumed.tracks[0].position)
-    assert np.array_equal(on.clouds[0].points, resumed.clouds[0].points)
+    assert np.array_equal(on.memories[0].arrays["samples"], resumed.memories[0].arrays["samples"])

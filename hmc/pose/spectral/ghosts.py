@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from hmc.camera.model import Camera
-from hmc.tracking.ghosts import Views
+from hmc.tracking.views import FrameViews as Views
 from hmc.voxels.carving import pixel_of_voxel
 from hmc.voxels.color import visibility
 from hmc.voxels.components import components

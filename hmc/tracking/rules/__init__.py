@@ -1,0 +1,50 @@
+"""The rules by which a frame becomes tracks, in their order; what shows each of them is on ``docs/tracking.md``."""
+
+from __future__ import annotations
+
+from hmc.tracking.rules.birth import confirm_candidates, locate_births, propose_candidates
+from hmc.tracking.rules.death import delete_tracks
+from hmc.tracking.rules.detection import detect_people
+from hmc.tracking.rules.false_tracks import reject_false_tracks, remember_false_tracks
+from hmc.tracking.rules.filtering import filter_tracks
+from hmc.tracking.rules.gating import associate_voxels
+from hmc.tracking.rules.ghosts import reject_ghosts
+from hmc.tracking.rules.handover import hand_over_tracks
+from hmc.tracking.rules.identity import exchange_identities, learn_appearance, reidentify
+from hmc.tracking.rules.measurement import measure_tracks
+from hmc.tracking.rules.pushed_objects import release_pushed_objects
+from hmc.tracking.rules.reacquisition import reacquire_tracks
+from hmc.tracking.rules.separation import separate_detections, separate_tracks
+from hmc.tracking.rules.state_update import update_tracks
+from hmc.tracking.rules.static_objects import hide_static_objects, learn_static_objects, reject_static_objects
+from hmc.tracking.rules.unseen_by_one import reject_unsolid
+from hmc.tracking.update import Rule
+
+__all__ = ["RULES"]
+
+RULES: tuple[Rule, ...] = (
+    hide_static_objects,
+    filter_tracks,
+    associate_voxels,
+    separate_tracks,
+    reacquire_tracks,
+    release_pushed_objects,
+    measure_tracks,
+    update_tracks,
+    exchange_identities,
+    learn_appearance,
+    detect_people,
+    reject_static_objects,
+    reject_ghosts,
+    reject_unsolid,
+    separate_detections,
+    locate_births,
+    reject_false_tracks,
+    propose_candidates,
+    confirm_candidates,
+    hand_over_tracks,
+    delete_tracks,
+    remember_false_tracks,
+    learn_static_objects,
+    reidentify,
+)

@@ -1,0 +1,30 @@
+"""Detection of people whom no track owns: person-like sets of voxels.
+
+Canton (2009), section 4.2.3. Shown by all tests of the trackers; sets in pieces by `test_a_person_in_pieces_is_one_person`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from hmc.tracking.newcomers import newcomers
+from hmc.tracking.settings import FollowingSettings
+from hmc.tracking.update import FrameUpdate
+
+__all__ = ["detect_people", "owned_voxels"]
+
+
+def detect_people(update: FrameUpdate, settings: FollowingSettings) -> FrameUpdate:
+    """The update with the detections."""
+    owners = np.where(owned_voxels(update), 0, -1)
+    return replace(update, detections=tuple(newcomers(update.observation, owners, settings.lifecycle)))
+
+
+def owned_voxels(update: FrameUpdate) -> np.ndarray:
+    """Voxels that are of no detection, shape (n,) bool: those of the tracks, of what their persons push, and of who parts from them."""
+    held = update.claimed >= 0
+    for rows in update.parted.values():
+        held[rows] = True
+    return held

@@ -1,0 +1,53 @@
+"""What the owned voxels say of each track, and which tracks they keep alive.
+
+Canton (2009), section 4.3.1. Shown by all tests of the trackers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from time import thread_time
+
+import numpy as np
+
+from hmc.tracking.association import locating_voxels
+from hmc.tracking.blobs import Blobs, blob_features
+from hmc.tracking.likeness import is_established, looks_like_object, looks_like_person
+from hmc.tracking.settings import FollowingSettings, LifecycleSettings
+from hmc.tracking.state import TrackerState
+from hmc.tracking.update import FrameUpdate, Measurement
+
+__all__ = ["measure_tracks"]
+
+#: Who lies flat has at least this share of their usual volume; less, so low, is what is left where a person went.
+LYING_SHARE = 0.5
+
+
+def measure_tracks(update: FrameUpdate, settings: FollowingSettings) -> FrameUpdate:
+    """The update with the measurement."""
+    observation, owners, n = update.observation, update.owners, len(update.state.tracks)
+    locating = locating_voxels(observation, owners, n, settings)
+
+    def features(voxels: np.ndarray) -> Blobs:
+        return blob_features(observation.points, np.where(voxels, owners, -1), n, observation.voxel_size_m)
+
+    owned, located = features(owners >= 0), features(locating)
+    filter_s = update.filter_s if update.filter else thread_time() - update.begun_s
+    certain = features(observation.certain)
+    like = looks_like_person(owned, settings.lifecycle)
+    supported = _supports(owned, certain, like, update.state, settings.lifecycle)
+    measurement = Measurement(locating, owned, located, certain, supported, like, looks_like_object(owned, settings.lifecycle))
+    return replace(update, measurement=measurement, filter_s=filter_s)
+
+
+def _supports(owned: Blobs, certain: Blobs, like: np.ndarray, state: TrackerState, settings: LifecycleSettings) -> np.ndarray:
+    """Which tracks the voxels that they own keep alive, shape (k,) bool.
+
+    Enough of the strict hull does, or a set that looks like a person as a whole (whom one camera cannot see), but not a remnant of what
+    the track was: remnants stay behind where a person leaves the room.
+    """
+    usual = np.array([track.volume_m3 for track in state.tracks])
+    established = np.array([is_established(track, state.fps, settings) for track in state.tracks], bool)
+    low = established & (owned.volume_m3 >= LYING_SHARE * usual)
+    solid = (certain.volume_m3 >= settings.keep_volume_m3) & ((certain.top_m >= settings.keep_top_m) | low)
+    return (solid | like) & (owned.volume_m3 >= settings.keep_share * usual)

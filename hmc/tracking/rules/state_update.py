@@ -1,0 +1,90 @@
+"""The update of each track by its measurement: position, velocity and volume, and which rows are told.
+
+The filter's gain and the shared component's are shown by `test_two_who_meet_talk_and_part` and the recipe `hug`; withheld rows by
+`test_what_an_established_person_left_behind_ends_and_who_sits_still_does_not`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hmc.tracking.association import head_centre
+from hmc.tracking.likeness import is_established
+from hmc.tracking.rules.death import FORGIVEN
+from hmc.tracking.settings import FollowingSettings
+from hmc.tracking.state import PersonMemory, Track, TrackRow
+from hmc.tracking.update import FrameUpdate
+
+__all__ = ["update_tracks"]
+
+#: Velocity that a track keeps from a frame without support to the next.
+COASTING = 0.8
+
+
+@dataclass(frozen=True)
+class _Correction:
+    """What one track is corrected by: a measured position, how much of it is believed, and whether the filter knows the person."""
+
+    measured: np.ndarray
+    gain: float
+    known: bool
+
+
+def update_tracks(update: FrameUpdate, settings: FollowingSettings) -> FrameUpdate:
+    """The update with the tracks after their measurements, and their rows."""
+    tracks, rows = [], []
+    corrections = _corrections(update, settings)
+    for k, track in enumerate(update.state.tracks):
+        if update.measurement.supported[k]:
+            track, told = _measured(update, k, corrections[k], settings)
+            tracks.append(track)
+            rows += told
+        else:
+            tracks.append(replace(track, position=update.predicted[k], velocity=track.velocity * COASTING))
+    memories = tuple(
+        memory if correction.known else PersonMemory(memory.person, histogram=memory.histogram)
+        for memory, correction in zip(update.memories, corrections, strict=True)
+    )
+    return replace(update, tracks=tuple(tracks), rows=tuple(rows), memories=memories)
+
+
+def _corrections(update: FrameUpdate, settings: FollowingSettings) -> list[_Correction]:
+    """The filter's position where it knows the person, else the centroid; of one who was found elsewhere the filter knows nothing, and
+    of one who held another it stands between the two.
+    """
+    k = len(update.state.tracks)
+    known = update.estimate.seen & ~update.reacquired & ~np.isin(np.arange(k), list(update.parted))
+    measured = np.where(known[:, None], update.estimate.positions, update.measurement.located.centroid)
+    gain = np.where(update.shared, np.where(known, settings.filter_gain, settings.shared_gain), 1.0)
+    return [_Correction(*one) for one in zip(measured, gain, known.tolist(), strict=True)]
+
+
+def _measured(update: FrameUpdate, k: int, correction: _Correction, settings: FollowingSettings) -> tuple[Track, list[TrackRow]]:
+    """Track k after its measurement, and the rows that are told of it."""
+    track, predicted, fps = update.state.tracks[k], update.predicted[k], update.state.fps
+    head = head_centre(update.observation.points[update.measurement.locating & (update.owners == k)])
+    moved = predicted + correction.gain * (correction.measured - predicted)
+    row = TrackRow(update.frame, track.person, correction.measured if correction.gain == 1 or not correction.known else moved, head)
+    held = (*track.withheld, row)
+    told = (update.measurement.like_person[k] and track.unlike <= FORGIVEN) or (
+        is_established(track, fps, settings.lifecycle) and len(held) >= settings.lifecycle.unlike_s * fps
+    )
+    velocity, volume = _motion(update, k, moved, correction.gain, settings)
+    track = replace(track, position=moved, head=head, velocity=velocity, volume_m3=volume, last_frame=update.frame)
+    if not told:
+        return replace(track, withheld=held), []
+    return replace(track, withheld=()), [replace(one, person=track.person) for one in held]
+
+
+def _motion(update: FrameUpdate, k: int, position: np.ndarray, gain: float, settings: FollowingSettings) -> tuple[np.ndarray, float]:
+    """Smoothed velocity and volume; what is measured with little gain changes them little."""
+    track, fps = update.state.tracks[k], update.state.fps
+    blend = gain * (1 - np.exp(-1 / (fps * settings.velocity_time_s)))
+    velocity = track.velocity + blend * ((position - track.position) * fps - track.velocity)
+    velocity = velocity * min(1.0, settings.most_speed_m_s / max(float(np.linalg.norm(velocity)), 1e-9))
+    volume = float(update.measurement.owned.volume_m3[k])
+    if track.volume_m3 > 0:
+        volume = track.volume_m3 if update.shared[k] else track.volume_m3 + blend * (min(volume, 2 * track.volume_m3) - track.volume_m3)
+    return velocity, volume

@@ -1,0 +1,151 @@
+"""What all trackers are told of people: when a set of voxels is a person, and which voxels a track owns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from hmc.errors import InputError
+from hmc.tracking.person_tree import PersonTree, default_tree, read_tree
+
+__all__ = ["ALIKE", "CANTON_2009", "FollowingSettings", "LifecycleSettings"]
+
+
+@dataclass(frozen=True)
+class LifecycleSettings:
+    """When a set of voxels is a person, and how long it takes to come and go.
+
+    Attributes
+    ----------
+    person : str
+        What decides whether a set of voxels looks like a person: "rules", the limits from `least_top_m` to `least_side_m` alone; "tree",
+        the decision tree that comes with the package, within these limits; or the path of a tree of the user's own
+        (`hmc.tracking.train_person_tree`), within them too.
+    least_top_m, most_top_m : float
+        Height of the highest point of a person who appears: bent down or on the knees, and with a hand up.
+    least_height_m : float
+        Least extent from lowest to highest point: no table top, no shadow.
+    most_bottom_m : float
+        Furniture may hide the legs, but nobody floats higher than this.
+    least_volume_m3, most_volume_m3 : float
+        A hull is fatter than its person; the most leaves room for two who come in arm in arm.
+    least_joined_m3 : float
+        A set larger than this may be several people; so may one of which the strict hull is.
+    most_side_m, least_side_m : float
+        Longest horizontal side (arms stretched out) and least value of the longer side (a ghost is a thin column).
+    keep_volume_m3, keep_top_m : float
+        What is enough of the strict hull for a person who is tracked already.
+    keep_share : float
+        And what share of the person's usual volume.
+    confirm_s, confirm_frames : float, int
+        A candidate becomes a person after this time and at least this many frames.
+    patience_s, edge_patience_s : float
+        A track is deleted after this time without support; the second holds for people who were last seen at the edge of the room.
+    edge_m : float
+        Width of that edge.
+    unlike_s : float
+        A track is deleted when its voxels have not looked like a person for so long, however many they are: furniture that somebody left
+        behind (Canton, section 4.2.3, third criterion of deletion). A frame in which they do makes up for two in which they do not.
+    established_s : float
+        A track whose voxels have looked like a person for so long altogether is one, whatever they look like now: people sit on the floor,
+        lie and crouch. Verdicts do not end it (beyond the thesis).
+    still_s, still_m : float
+        But it ends when what it holds has looked like a thing and has not moved by more than this for so long (beyond the thesis).
+    least_lying_m : float
+        Things that people leave behind are not as long as what is seen of somebody who lies.
+    least_efficiency, efficiency_s : float
+        A track is deleted when the survival rate of its filter's particles (Canton, Eq. 3.11) has been below this share for so long
+        (section 4.2.3, second criterion). Of Sparse Sampling, the share of the samples that found a voxel of their own.
+    least_distance_m : float
+        No candidate nearer to a track than this, horizontally (section 4.2.3, criterion of creation).
+    same_place_m, same_place_s : float
+        Two tracks nearer than this for so long follow one person; the younger is deleted (section 4.2.3, first criterion of deletion).
+    fragment_gap_m : float
+        Unowned pieces that stand nearer than this, seen from above, are judged together.
+    tree : PersonTree or None
+        What `person` names; None for "rules". Not to be given.
+    """
+
+    person: str = "tree"
+    least_top_m: float = 0.9
+    most_top_m: float = 2.6
+    least_height_m: float = 0.6
+    most_bottom_m: float = 0.9
+    least_volume_m3: float = 0.025
+    most_volume_m3: float = 0.7
+    least_joined_m3: float = 0.2
+    most_side_m: float = 2.2
+    least_side_m: float = 0.25
+    keep_volume_m3: float = 0.012
+    keep_top_m: float = 0.4
+    keep_share: float = 0.2
+    confirm_s: float = 0.3
+    confirm_frames: int = 4
+    patience_s: float = 1.0
+    edge_patience_s: float = 0.3
+    edge_m: float = 0.3
+    unlike_s: float = 2.0
+    established_s: float = 3.0
+    still_s: float = 8.0
+    still_m: float = 0.06
+    least_lying_m: float = 0.95
+    least_efficiency: float = 0.05
+    efficiency_s: float = 1.0
+    least_distance_m: float = 0.45
+    same_place_m: float = 0.2
+    same_place_s: float = 0.5
+    fragment_gap_m: float = 0.2
+    tree: PersonTree | None = field(init=False, default=None)
+
+    def __post_init__(self) -> None:
+        if self.person != "rules":
+            object.__setattr__(self, "tree", default_tree() if self.person == "tree" else read_tree(self.person))
+
+
+@dataclass(frozen=True)
+class FollowingSettings:
+    """What every tracker needs to know of people and of the voxels that they own.
+
+    Attributes
+    ----------
+    enlarge_xy, enlarge_z : float
+        Canton's alpha and beta (section 4.3.1).
+    exclusion : {"nearest", "remove"}
+        What becomes of voxels in several regions.
+    reach : float
+        Voxels of a person's component count up to this distance, in radii of the region.
+    velocity_time_s : float
+        Time constant of the velocity's smoothing.
+    most_speed_m_s : float
+        Nobody is faster.
+    most_reach_m : float
+        A person who was lost is not looked for further away than this.
+    shared_gain : float
+        Share of the measured correction that is believed while persons share one component, where no filter tells them apart.
+    filter_gain : float
+        The same of what a filter says.
+    least_certain_m3 : float
+        A person with so much of the strict hull is located by it; else by the tolerant one.
+    lifecycle : LifecycleSettings
+    """
+
+    enlarge_xy: float = 1.5
+    enlarge_z: float = 1.2
+    exclusion: str = "nearest"
+    reach: float = 2.0
+    velocity_time_s: float = 0.3
+    most_speed_m_s: float = 4.0
+    most_reach_m: float = 1.2
+    shared_gain: float = 0.5
+    filter_gain: float = 1.0
+    least_certain_m3: float = 0.03
+    lifecycle: LifecycleSettings = field(default_factory=LifecycleSettings)
+
+    def __post_init__(self) -> None:
+        if self.exclusion not in ("nearest", "remove"):
+            raise InputError(f"`exclusion` must be 'nearest' or 'remove'; got {self.exclusion!r}")
+
+
+#: As Canton (2009) prints it, Eq. 4.7.
+CANTON_2009 = FollowingSettings(exclusion="remove")
+#: For people who are dressed alike: where they share a component, filters tell them apart less surely.
+ALIKE = FollowingSettings(filter_gain=0.5)
