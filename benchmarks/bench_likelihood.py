@@ -15,14 +15,13 @@ from _scene import ROOM
 from _timing import interleaved, report
 
 from hmc.body.flesh import flesh_points, place_points
-from hmc.body.kinematics import segment_transforms
+from hmc.body.kinematics import place_segments, segment_transforms
 from hmc.body.model import PARTS, neutral_state
-from hmc.body.placing import place_segments
 from hmc.body.proportions import default_body
 from hmc.pose.objectives.four_scores import ScoreVariances, log_likelihood_factorised, make_score_table, map_scores, observe, scores
 from hmc.pose.objectives.overlap import quick_overlap
 from hmc.pose.objectives.overlap_exact import exact_overlap
-from hmc.pose.steps.preset import PRESETS, drift
+from hmc.pose.steps.presets import PRESETS, drift
 from hmc.search import annealed_step, filter_layer, particle_init, truncated_drift, truncated_normal
 from hmc.voxels.grid import VoxelGrid
 

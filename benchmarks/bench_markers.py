@@ -17,11 +17,12 @@ from hmc.body.marker_places import place_tips
 from hmc.body.model import neutral_state
 from hmc.body.proportions import default_body
 from hmc.camera.model import Rig, look_at, project
-from hmc.pose.objectives.epipolar import marker_cost, marker_views, observe_markers, project_markers
+from hmc.pose.objectives.epipolar import marker_cost, project_markers
 from hmc.pose.objectives.nearest_detections import nearest_detections
 from hmc.pose.steps.annealed import pose_init
 from hmc.pose.steps.marker_filter import make_marker_filter, marker_preset, marker_step
-from hmc.pose.steps.preset import drift
+from hmc.pose.steps.presets import drift
+from hmc.pose.views.markers import marker_views, observe_markers
 from hmc.search import truncated_normal
 from hmc.synthetic.marker_detector import SyntheticDetector, detect_synthetic, seen_by_ideal_detector
 

@@ -15,7 +15,7 @@ from scipy import stats
 
 from hmc.body.model import neutral_state
 from hmc.body.proportions import default_body
-from hmc.pose.steps.preset import drift
+from hmc.pose.steps.presets import drift
 from hmc.search import find_beta, systematic, truncated_normal
 
 

@@ -28,7 +28,7 @@ from hmc.body.proportions import default_body
 from hmc.camera.model import project
 from hmc.pose.legs import leg_choice
 from hmc.pose.steps.annealed import PoseFilter, make_filter, pose_init, pose_step
-from hmc.pose.steps.preset import PRESETS
+from hmc.pose.steps.presets import PRESETS
 from hmc.pose.views.hull_target import FAR_M, HullTarget, make_target
 from hmc.pose.views.near_distance import near_distance
 from hmc.pose.views.rays import with_rays

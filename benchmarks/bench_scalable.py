@@ -23,9 +23,9 @@ from hmc.body.joints import N_DOF
 from hmc.body.kinematics import landmarks, segment_transforms
 from hmc.body.proportions import default_body
 from hmc.pose.methods.scalable import method_preset
-from hmc.pose.objectives.restrict import part_mask
+from hmc.pose.steps.restrict import part_mask
 from hmc.pose.steps.annealed import make_filter, pose_init
-from hmc.pose.steps.preset import PRESETS, PosePreset
+from hmc.pose.steps.presets import PRESETS, PosePreset
 from hmc.pose.steps.scalable import step_of
 from hmc.pose.views.hull_target import make_target
 from hmc.search.filters import AnnealedSettings

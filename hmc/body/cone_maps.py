@@ -35,7 +35,7 @@ def cone_maps(cones: Cones, placed: np.ndarray) -> ConeMaps:
     ----------
     cones : Cones
     placed : ndarray, shape (11, 3, 4, n)
-        As from `hmc.body.placing.place_segments`.
+        As from `hmc.body.kinematics.place_segments`.
     """
     local = np.zeros((len(cones.part), 4, 4), placed.dtype)
     local[:, :3, :3], local[:, 3, :3], local[:, 3, 3] = cones.bases, cones.start, 1

@@ -3,17 +3,23 @@
 A joint's transform is the product of the exponential maps of its axes, ordered from the root outwards; written in the
 parent's frame that is a rotation about the joint's centre, which is what is computed here (the test holds it against
 ``scipy.linalg.expm`` of the twists).
+
+There is one form for one state and for many, `_place`: states lie along the last axis, so that every step is arithmetic on whole rows, and
+all segments of one depth in the tree are turned at once. The public functions differ in precision and in the order of axes alone.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
+from numpy.typing import DTypeLike
 
 from hmc.body.joints import N_DOF, SEGMENTS
 from hmc.body.model import BodyModel
 from hmc.body.proportions import landmark_segments
 
-__all__ = ["SEGMENT_DOFS", "dof_masks", "joint_twists", "landmark_masks", "landmarks", "segment_transforms"]
+__all__ = ["SEGMENT_DOFS", "dof_masks", "joint_twists", "landmark_masks", "landmarks", "place_segments", "segment_transforms"]
 
 _LANDMARK_SEGMENTS = landmark_segments()
 
@@ -29,7 +35,128 @@ def _segment_dofs() -> tuple[tuple[int, ...], ...]:
 #: Places in the state of each segment's angles.
 SEGMENT_DOFS = _segment_dofs()
 
-_AXIS = np.array(["xyz".index(axis) for segment in SEGMENTS for axis in segment.axes])
+#: Segments by their depth in the tree; within a depth, those that turn about one axis stand side by side.
+_DEPTHS = (
+    ("pelvis",),
+    ("torso", "r_thigh", "l_thigh"),
+    ("r_upper_arm", "l_upper_arm", "head", "r_shank", "l_shank"),
+    ("r_forearm", "l_forearm"),
+)
+_UNIT = np.eye(3)
+#: Columns of a frame that change when it is turned about one of its own axes, and the same exchanged.
+_TURNED = {"x": (slice(1, 3), slice(2, 0, -1)), "y": (slice(2, None, -2), slice(0, 3, 2)), "z": (slice(0, 2), slice(1, None, -1))}
+
+
+@dataclass(frozen=True)
+class _Turn:
+    """Turns of some segments of one depth about one of their axes: places in the order of `_DEPTHS`, and in that of the turns."""
+
+    segments: slice
+    angles: slice
+    axis: int
+    columns: slice
+    exchanged: slice
+
+
+@dataclass(frozen=True)
+class _Depth:
+    """Segments of one depth: places of themselves and of their parents in the order of `_DEPTHS`; the root has no parent."""
+
+    segments: slice
+    parents: np.ndarray
+    turns: tuple[_Turn, ...]
+
+
+def _plan() -> tuple[tuple[_Depth, ...], np.ndarray, np.ndarray]:
+    """The tree by depth, the segments in that order, and the degrees of freedom in the order of the turns."""
+    names = [segment.name for segment in SEGMENTS]
+    order = [names.index(name) for depth in _DEPTHS for name in depth]
+    depths: list[_Depth] = []
+    dofs: list[int] = []
+    start = 0
+    for members in _DEPTHS:
+        own = order[start : start + len(members)]
+        turns = []
+        for axis in "zyx" if start == 0 else "xyz":
+            which = [k for k, index in enumerate(own) if axis in SEGMENTS[index].axes]
+            if not which:
+                continue
+            moved = [SEGMENT_DOFS[index][SEGMENTS[index].axes.index(axis)] for index in own[which[0] : which[-1] + 1]]
+            turns.append(
+                _Turn(
+                    slice(start + which[0], start + which[-1] + 1),
+                    slice(len(dofs), len(dofs) + len(moved)),
+                    "xyz".index(axis),
+                    *_TURNED[axis],
+                )
+            )
+            dofs += moved
+        parents = np.array([order.index(SEGMENTS[index].parent) for index in own if SEGMENTS[index].parent >= 0], int)
+        depths.append(_Depth(slice(start, start + len(members)), parents, tuple(turns)))
+        start += len(members)
+    return tuple(depths), np.array(order), np.array(dofs)
+
+
+_TREE, _ORDER, _TURN_DOFS = _plan()
+_SEGMENT_PLACES, _TURN_PLACES = np.argsort(_ORDER), np.argsort(_TURN_DOFS)
+#: The segment at whose joint each angle turns, shape (24,).
+_SEGMENT_OF_ANGLE = np.repeat(np.arange(len(SEGMENTS)), [len(segment.axes) for segment in SEGMENTS])
+
+
+def _place(body: BodyModel, states: np.ndarray, origin: np.ndarray | float, dtype: DTypeLike, axes: np.ndarray | None = None) -> np.ndarray:
+    """Frames of all segments, shape (11, 3, 4, n): rotation (world from segment) and position, from `origin`, side by side.
+
+    Parameters
+    ----------
+    body : BodyModel
+    states : ndarray, shape (n, 27)
+    origin : ndarray, shape (3,), or 0
+    dtype : data type
+    axes : ndarray, shape (24, 3, n), optional
+        Where the directions of the angles' axes go, world, in the order of the turns.
+    """
+    angles = states.T.take(_TURN_DOFS, axis=0).astype(dtype, copy=False)
+    cos, sin = np.cos(angles)[:, None, None], np.empty((len(angles), 1, 2, len(states)), dtype)
+    np.sin(angles, out=sin[:, 0, 0])
+    np.negative(sin[:, 0, 0], out=sin[:, 0, 1])
+    offsets = body.offsets.take(_ORDER, axis=0).astype(dtype, copy=False)[:, None, :, None]
+    placed = np.empty((len(SEGMENTS), 3, 4, len(states)), dtype)
+    placed[0, :, :3] = _UNIT[:, :, None]
+    placed[0, :, 3] = (states[:, :3] - origin).T
+    for depth in _TREE:
+        frames = placed[depth.segments]
+        if len(depth.parents):
+            placed[: depth.segments.start].take(depth.parents, axis=0, out=frames, mode="clip")
+            position, shift = frames[:, :, 3], frames[:, :, :3] * offsets[depth.segments]
+            for axis in range(3):
+                position += shift[:, :, axis]
+        for turn in depth.turns:
+            if axes is not None:
+                axes[turn.angles] = placed[turn.segments, :, turn.axis]
+            # The first column becomes cos * first + sin * second, the second cos * second - sin * first.
+            changed = placed[turn.segments, :, turn.exchanged] * sin[turn.angles]
+            changed += placed[turn.segments, :, turn.columns] * cos[turn.angles]
+            placed[turn.segments, :, turn.columns] = changed
+    return placed.take(_SEGMENT_PLACES, axis=0)
+
+
+def place_segments(body: BodyModel, states: np.ndarray, origin: np.ndarray) -> np.ndarray:
+    """Where every rigid segment is in every particle, particles last and in single precision.
+
+    Parameters
+    ----------
+    body : BodyModel
+    states : ndarray, shape (n, 27)
+        Metres and radians.
+    origin : ndarray, shape (3,)
+        Somewhere near, world, metres: positions are counted from here, as single precision is coarse far from its zero.
+
+    Returns
+    -------
+    ndarray of float32, shape (11, 3, 4, n)
+        Rotation (world from segment) and position side by side.
+    """
+    return _place(body, np.asarray(states, float), origin, np.float32)
 
 
 def segment_transforms(body: BodyModel, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -49,21 +176,8 @@ def segment_transforms(body: BodyModel, states: np.ndarray) -> tuple[np.ndarray,
         The segments' joints in the world, metres.
     """
     states = np.asarray(states, float)
-    cos, sin = np.cos(states[..., 3:]), np.sin(states[..., 3:])
-    rotations = np.empty((*states.shape[:-1], len(SEGMENTS), 3, 3))
-    positions = np.empty((*states.shape[:-1], len(SEGMENTS), 3))
-    for index, segment in enumerate(SEGMENTS):
-        local = None
-        for axis, dof in zip(segment.axes, SEGMENT_DOFS[index], strict=True):
-            local = _turn(local, axis, cos[..., dof - 3], sin[..., dof - 3])
-        if segment.parent < 0:
-            rotations[..., index, :, :] = local
-            positions[..., index, :] = states[..., :3]
-        else:
-            parent = rotations[..., segment.parent, :, :]
-            rotations[..., index, :, :] = parent @ local
-            positions[..., index, :] = positions[..., segment.parent, :] + parent @ body.offsets[index]
-    return rotations, positions
+    placed = np.moveaxis(_place(body, states.reshape(-1, N_DOF), 0.0, float), -1, 0).reshape(*states.shape[:-1], len(SEGMENTS), 3, 4)
+    return np.ascontiguousarray(placed[..., :3]), np.ascontiguousarray(placed[..., 3])
 
 
 def landmarks(body: BodyModel, states: np.ndarray) -> np.ndarray:
@@ -104,34 +218,14 @@ def joint_twists(body: BodyModel, state: np.ndarray) -> tuple[np.ndarray, np.nda
         As from `segment_transforms`, for this one state.
     """
     state = np.asarray(state, float)
-    turns = _elementary_turns(state[3:])
-    axes, centres = np.zeros((N_DOF, 3)), np.zeros((N_DOF, 3))
-    rotations, positions = np.empty((len(SEGMENTS), 3, 3)), np.empty((len(SEGMENTS), 3))
-    axes[:3] = np.eye(3)
-    for index, segment in enumerate(SEGMENTS):
-        if segment.parent < 0:
-            frame, positions[index] = np.eye(3), state[:3]
-        else:
-            frame = rotations[segment.parent]
-            positions[index] = positions[segment.parent] + frame @ body.offsets[index]
-        for dof in SEGMENT_DOFS[index]:
-            axes[dof] = frame[:, _AXIS[dof - 3]]
-            centres[dof] = positions[index]
-            frame = frame @ turns[dof - 3]
-        rotations[index] = frame
+    directions = np.empty((N_DOF - 3, 3, 1))
+    placed = _place(body, state[None], 0.0, float, directions)[..., 0]
+    rotations, positions = placed[:, :, :3].copy(), placed[:, :, 3].copy()
+    axes, centres = np.empty((2, N_DOF, 3))
+    axes[:3], centres[:3] = _UNIT, 0
+    directions[:, :, 0].take(_TURN_PLACES, axis=0, out=axes[3:], mode="clip")
+    positions.take(_SEGMENT_OF_ANGLE, axis=0, out=centres[3:], mode="clip")
     return axes, centres, rotations, positions
-
-
-def _elementary_turns(angles: np.ndarray) -> np.ndarray:
-    """Rotation matrix of every angle about its own axis, (24,) to (24, 3, 3)."""
-    k = np.arange(len(angles))
-    first, second = (_AXIS + 1) % 3, (_AXIS + 2) % 3
-    cos, sin = np.cos(angles), np.sin(angles)
-    out = np.zeros((len(angles), 3, 3))
-    out[k, _AXIS, _AXIS] = 1.0
-    out[k, first, first] = out[k, second, second] = cos
-    out[k, first, second], out[k, second, first] = -sin, sin
-    return out
 
 
 def dof_masks() -> np.ndarray:
@@ -152,16 +246,3 @@ def landmark_masks(body: BodyModel) -> np.ndarray:
         SEGMENTS[k].parent if still and SEGMENTS[k].parent >= 0 else k for k, still in zip(_LANDMARK_SEGMENTS, at_joint, strict=True)
     ]
     return masks[carriers]
-
-
-def _turn(frame: np.ndarray | None, axis: str, cos: np.ndarray, sin: np.ndarray) -> np.ndarray:
-    """``frame`` times the rotation about one of its own axes; only two columns change."""
-    first, second = {"x": (1, 2), "y": (2, 0), "z": (0, 1)}[axis]
-    if frame is None:
-        frame = np.broadcast_to(np.eye(3), (*np.shape(cos), 3, 3))
-    out = np.array(frame)
-    a, b = frame[..., :, first], frame[..., :, second]
-    cos, sin = np.asarray(cos)[..., None], np.asarray(sin)[..., None]
-    out[..., :, first] = cos * a + sin * b
-    out[..., :, second] = cos * b - sin * a
-    return out

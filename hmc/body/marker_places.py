@@ -10,9 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from hmc.body.kinematics import segment_transforms
+from hmc.body.kinematics import place_segments, segment_transforms
 from hmc.body.model import BodyModel
-from hmc.body.placing import place_segments
 from hmc.body.proportions import landmark_segments
 from hmc.landmarks import LANDMARKS
 

@@ -12,8 +12,8 @@ import numpy as np
 
 from hmc.body.cone_maps import ConeMaps, cone_maps, cones_near, to_cones
 from hmc.body.cones import cone_shapes, places_and_directions, slide_to_axis, squared_distance, way_out
+from hmc.body.kinematics import place_segments
 from hmc.body.model import PARTS, BodyModel, Cones
-from hmc.body.placing import place_segments
 
 __all__ = ["Candidates", "Nearest", "candidates", "nearest_cones", "part_distances", "towards"]
 

@@ -104,7 +104,7 @@ def depths_placed(body: BodyModel, axes: AxisPoints, placed: np.ndarray, maps: C
     body : BodyModel
     axes : AxisPoints
     placed : ndarray, shape (11, 3, 4, n)
-        As from `hmc.body.placing.place_segments`.
+        As from `hmc.body.kinematics.place_segments`.
     maps : ConeMaps
         Of the same.
 

@@ -11,15 +11,31 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hmc.body.joints import N_DOF, JointLimits, dof_index
 from hmc.body.joints import default_limits as body_limits
-from hmc.body.joints import dof_index
-from hmc.body.proportions import CANTON_LENGTHS, DEFAULT_LENGTHS
+from hmc.body.model import BodyModel
+from hmc.body.proportions import canton_body, default_body, make_body
 from hmc.landmarks import LANDMARKS
 
 __all__ = [
-    "ANGLES", "ANGLE_INDEX", "N_PARAMETERS", "SEGMENTS", "SkeletonModel", "default_limits", "joint_shares", "model_of_height",
-    "part_chains", "part_lengths", "segment_ends", "skeleton_landmarks", "thesis_limits", "torso_frames",
-]  # fmt: skip
+    "ANGLES",
+    "ANGLE_INDEX",
+    "N_PARAMETERS",
+    "SEGMENTS",
+    "SkeletonModel",
+    "default_limits",
+    "joint_shares",
+    "model_of_body",
+    "model_of_height",
+    "part_chains",
+    "part_lengths",
+    "segment_ends",
+    "skeleton_landmarks",
+    "skeleton_state",
+    "thesis_body",
+    "thesis_limits",
+    "torso_frames",
+]
 
 #: The sixteen angles, in the order of Table 3-2 (theta 1 to 16).
 ANGLES: tuple[str, ...] = (
@@ -105,7 +121,34 @@ def model_of_height(height_m: float, thesis: bool = False) -> SkeletonModel:
     thesis : bool
         Ranges as printed, shoulders as high as the neck, and one length a part (Canton's table 6.1: the thesis prints none).
     """
-    part = {name: value * height_m for name, value in (CANTON_LENGTHS if thesis else DEFAULT_LENGTHS).items()}
+    return model_of_body(thesis_body(height_m) if thesis else default_body(height_m), thesis)
+
+
+def thesis_body(height_m: float) -> BodyModel:
+    """The thesis's skeleton as a body of `hmc.body`: straight, one length a part, shoulders as high as the neck, ranges as printed.
+
+    Parameters
+    ----------
+    height_m : float
+    """
+    low, high = np.full(N_DOF, -np.inf), np.full(N_DOF, np.inf)
+    places = dof_index(*ANGLES)
+    low[places], high[places] = thesis_limits()
+    for name in ("torso_x", "torso_y", "torso_z", "r_hip_z", "l_hip_z"):  # the skeleton has none of these
+        low[dof_index(name)] = high[dof_index(name)] = 0.0
+    return make_body(canton_body(height_m).dimensions | {"shoulder_drop": 0.0}, JointLimits(low, high))
+
+
+def model_of_body(body: BodyModel, thesis: bool = False) -> SkeletonModel:
+    """The skeleton with the lengths of a body.
+
+    Parameters
+    ----------
+    body : BodyModel
+    thesis : bool
+        Ranges as printed.
+    """
+    part = body.dimensions
     low, high = thesis_limits() if thesis else default_limits()
     return SkeletonModel(
         part["trunk"],
@@ -118,10 +161,36 @@ def model_of_height(height_m: float, thesis: bool = False) -> SkeletonModel:
         2 * part["hip_half_width"],
         part["forearm"],
         part["shank"],
-        0.0 if thesis else part["shoulder_drop"],
+        part["shoulder_drop"],
         low,
         high,
     )
+
+
+def skeleton_state(model: SkeletonModel, points: np.ndarray, state: np.ndarray) -> np.ndarray:
+    """The skeleton's state that is nearest to a pose of a body.
+
+    Parameters
+    ----------
+    model : SkeletonModel
+    points : ndarray, shape (15, 3)
+        The body's landmarks, world, metres.
+    state : ndarray, shape (27,)
+        The body's angles; a bent waist is taken into the torso's axis and spin, and arms and legs keep their angles.
+
+    Returns
+    -------
+    ndarray, shape (23,)
+    """
+    at = dict(zip(LANDMARKS, points, strict=True))
+    out = np.zeros(N_PARAMETERS)
+    out[:3] = 0.5 * (at["pelvis"] + at["neck"])
+    axis = at["neck"] - at["pelvis"]
+    out[3:6] = out[:3] + 0.5 * model.torso * axis / max(float(np.linalg.norm(axis)), 1e-9)
+    across = torso_frames(out).T @ (at["l_hip"] - at["r_hip"] + at["l_shoulder"] - at["r_shoulder"])
+    out[6] = np.arctan2(-across[0], across[1])
+    out[7:] = np.clip(state[dof_index(*ANGLES)], model.low, model.high)
+    return out
 
 
 def torso_frames(states: np.ndarray) -> np.ndarray:

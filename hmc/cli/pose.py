@@ -16,20 +16,19 @@ from hmc.cli.common import (
     was_finished,
     whole_number,
 )
-from hmc.cli.pose_markers import add_marker_options, run_markers
+from hmc.cli.pose_markers import add_marker_options, read_markers
 from hmc.cli.track import JOURNAL, add_tracker_options, selected_tracker
+from hmc.pose.registry import INITS, METHODS, pose_method
 
 __all__ = ["add_parser", "run"]
 
-METHODS = ("apf", "shbm-apf", "ddm-apf", "shbm-ddm-apf", "smd", "pso", "marker-apf")
 #: The journal of a run that is not finished.
 POSE_JOURNAL = ".pose.journal"
-#: Methods whose poses can be smoothed.
-SMOOTHABLE = ("apf", "shbm-apf", "ddm-apf", "shbm-ddm-apf")
 #: Time over which poses are smoothed where no other is said, seconds.
 SMOOTH_S = 0.3
 #: Its silhouettes, which the tracker leaves for the poses.
 MASKS = ".masks"
+RESULTS = ("joints.csv", "tracks.csv", "pose.npz", "run.toml")
 
 
 def add_parser(subparsers) -> argparse.ArgumentParser:
@@ -44,12 +43,7 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     add_selection_options(parser)
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the result")
     parser.add_argument(
-        "--method",
-        choices=METHODS,
-        default="apf",
-        help="apf: annealed particle filter (default); shbm-apf: by models of rising "
-        "detail; ddm-apf: without the limbs that the data does not show; shbm-ddm-apf: both; smd: superellipsoids by stochastic "
-        "meta descent, the quickest; pso: spectral skeleton and particle swarm, without tracking of the pose; marker-apf: on markers",
+        "--method", choices=tuple(METHODS), default="apf", help="; ".join(f"{entry.name}: {entry.help}" for entry in METHODS.values())
     )
     parser.add_argument(
         "--model",
@@ -61,11 +55,14 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--init",
-        choices=("hypotheses", "spectral"),
-        help="where particle filters start, and start anew after a loss: typical poses at every heading (default), or the skeleton in the "
+        choices=INITS,
+        help="where poses start, and start anew after a loss: typical poses at every heading (default), or the skeleton in the "
         "voxels themselves",
     )
-    parser.add_argument("--preset", default="default", metavar="NAME", help="default, or canton2009 or kehl2006 (smd): as printed")
+    named = {name for entry in METHODS.values() for name in entry.presets}
+    parser.add_argument(
+        "--preset", default="default", metavar="NAME", help=f"{', '.join(sorted(named))}: as printed, where a work is named"
+    )
     parser.add_argument("--voxel", type=positive_float, default=0.03, metavar="M", help="side of a voxel, metres (default: 0.03)")
     add_tracker_options(parser)
     parser.add_argument("--track-voxel", type=positive_float, default=0.05, metavar="M", help="the same for the tracker (default: 0.05)")
@@ -91,116 +88,125 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from dataclasses import replace
-
-    import numpy as np
-
-    from hmc.body.proportions import stature
     from hmc.errors import InputError
     from hmc.io.files import to_toml
     from hmc.io.results import write_joints, write_pose, write_run, write_tracks
-    from hmc.pose.methods.pso import SwarmTask, pose_by_swarm, swarm_preset, write_fits
-    from hmc.pose.methods.scalable import method_preset
-    from hmc.pose.methods.smd import smd_preset
-    from hmc.pose.methods.smd_sequence import SmdTask, pose_by_descent
-    from hmc.pose.person import FollowSettings
-    from hmc.pose.sequence import pose_recording
+    from hmc.pose.follow import FollowOptions, RunOptions, follow
     from hmc.pose.smoothing import smooth_people
-    from hmc.pose.steps.preset import pose_preset
-    from hmc.tracking.resumable import person_grid, track_recording
+    from hmc.tracking.resumable import person_grid
     from hmc.voxels.hulls import FrontendSettings
 
-    if args.smooth and args.method not in SMOOTHABLE:
-        raise InputError(f"--smooth: not for --method {args.method}; it is for {', '.join(SMOOTHABLE)}")
+    method = pose_method(args.method, args.preset, args.model, args.init, args.markers == "skin")
     recording = open_selected(args)
-    if args.method == "marker-apf":
-        return run_markers(args, _height(args.height, recording), recording)
-    smd, pso = args.method == "smd", args.method == "pso"
-    if args.init and (smd or pso):
-        raise InputError(f"--init: not for --method {args.method}; it is for the particle filters")
-    preset: Any
-    if pso:
-        preset = swarm_preset(args.preset)
-    else:
-        preset = smd_preset(args.preset) if smd else method_preset(pose_preset(args.preset), args.method, args.model)
-    if args.init:
-        preset = replace(preset, start=args.init)
     if args.out.is_file():
         raise InputError(f"--out {args.out}: is a file; give a folder")
-    height = _height(args.height, recording)
-    person_grid(recording, args.voxel)  # voxels that will not do are refused before any work is done
-    tracker, frontend, following = selected_tracker(args), FrontendSettings(), FollowSettings()
+    height, tracked, frontend = _height(args.height, recording), METHODS[args.method].needs_tracks, FrontendSettings()
     parameters: dict[str, Any] = {
-        "voxel_size_m": args.voxel,
-        "track_voxel_size_m": args.track_voxel,
         "start": recording.start,
         "frames": recording.n_frames,
         "cameras": list(recording.rig.names),
         "room_m": recording.room,
         "fps": recording.fps,
         "height_m": height or "auto",
-        "preset": preset,
-        "following": following,
-        "tracker": tracker.settings,
-        "frontend": frontend,
+        "preset": method.settings,
+        "init": args.init,
+        "window_s": method.window_s,
+        "recovery": getattr(method.recover, "settings", None),
+        "legs": method.legs,
         "smooth_s": args.smooth or 0.0,
     }
-    source = recording_source(recording)
+    if tracked:
+        person_grid(recording, args.voxel)  # voxels that will not do are refused before any work is done
+        tracker = selected_tracker(args)
+        parameters |= {"voxel_size_m": args.voxel, "track_voxel_size_m": args.track_voxel}
+        parameters |= {"tracker": tracker.settings, "frontend": frontend}
+    source, markers = recording_source(recording), None
+    if "detections" in method.needs:
+        markers = read_markers(args, recording)
+        parameters |= markers.parameters
+        source |= markers.source
     depends_on = {"method": args.method, "seed": args.seed, **source, "parameters": parameters}
-    key = to_toml(depends_on)
-    paths = {name: args.out / name for name in ("tracks.csv", "joints.csv", "pose.npz", "run.toml")}
-    if was_finished([paths["joints.csv"], paths["tracks.csv"], paths["pose.npz"]], paths["run.toml"], depends_on):
+    key, paths = to_toml(depends_on), {name: args.out / name for name in RESULTS}
+    if was_finished([paths[name] for name in RESULTS[:3]], paths["run.toml"], depends_on):
         return 0
 
     problems: list[str] = [*recording.problems]
-    track_journal, pose_journal, masks = args.out / JOURNAL, args.out / POSE_JOURNAL, args.out / MASKS
-    tracks = track_recording(
+    masks = args.out / MASKS if tracked else None
+    tracks = _track(args, recording, (tracker, frontend), key, problems) if tracked else None
+    detections = None if markers is None else markers.table(args, key, problems)
+    people = follow(
+        recording,
+        tracks,
+        method,
+        FollowOptions(args.voxel, args.seed, height, detections),
+        RunOptions(
+            frontend=frontend,
+            journal=args.out / POSE_JOURNAL,
+            masks=masks,
+            key=key,
+            on_problem=problems.append,
+            progress=lambda steps, total: progress(steps, total, "pose", args.quiet),
+        ),
+    )
+    if markers is not None:
+        markers.refuse_nothing(people)
+    if args.smooth:
+        people = smooth_people(people, method.limits, recording.fps, args.smooth)
+    problems += people.notes
+    write_tracks(paths["tracks.csv"], _pelvis_tracks(people) if tracks is None else tracks)
+    write_joints(paths["joints.csv"], people.poses)
+    write_pose(paths["pose.npz"], people.states)
+    if any(people.details):
+        from hmc.pose.methods.pso import write_fits
+
+        write_fits(args.out / "fits.csv", people)
+    if markers is not None:
+        markers.write(args)
+    write_run(paths["run.toml"], args.method, parameters, args.seed, **source, problems=list(dict.fromkeys(problems)))
+    for name in (JOURNAL, POSE_JOURNAL, MASKS):
+        for file in args.out.glob(f"{name}*"):
+            file.unlink()
+    _tell(people, recording, paths["joints.csv"])
+    print_problems(problems)
+    return 0
+
+
+def _track(args: argparse.Namespace, recording, how, key: str, problems: list[str]):
+    """The tracks, with the silhouettes kept for the poses."""
+    from hmc.tracking.resumable import track_recording
+
+    tracker, frontend = how
+    return track_recording(
         recording,
         args.track_voxel,
         tracker,
         frontend,
         seed=args.seed,
-        journal=track_journal,
-        masks=masks,
+        journal=args.out / JOURNAL,
+        masks=args.out / MASKS,
         key=key,
         on_problem=problems.append,
         progress=lambda steps, total: progress(steps, total, "track", args.quiet),
     )
-    passed: dict[str, Any] = {
-        "frontend": frontend,
-        "journal": pose_journal,
-        "masks": masks,
-        "key": key,
-        "on_problem": problems.append,
-        "progress": lambda steps, total: progress(steps, total, "pose", args.quiet),
-    }
-    if pso:
-        swarm = SwarmTask(recording, preset, args.seed, height)
-        people, fits = pose_by_swarm(swarm, tracks, args.voxel, **passed)
-        write_fits(args.out / "fits.csv", fits)
-    elif smd:
-        people = pose_by_descent(SmdTask(recording, preset, args.seed, height), tracks, args.voxel, **passed)
-    else:
-        people = pose_recording(
-            recording,
-            tracks,
-            args.voxel,
-            preset,
-            args.seed,
-            height_m=height,
-            settings=following,
-            **passed,
-        )
-    if args.smooth:
-        people = smooth_people(people, preset, recording.fps, args.smooth)
-    problems += people.notes
-    write_tracks(paths["tracks.csv"], tracks)
-    write_joints(paths["joints.csv"], people.poses)
-    write_pose(paths["pose.npz"], people.states)
-    write_run(paths["run.toml"], args.method, parameters, args.seed, **source, problems=list(dict.fromkeys(problems)))
-    for temporary in (track_journal, pose_journal, masks):
-        for file in args.out.glob(f"{temporary.name}*"):
-            file.unlink()
+
+
+def _pelvis_tracks(people):
+    """Where a person was who was not tracked: the pelvis and the top of the head."""
+    from hmc.io.results import TrackTable
+    from hmc.landmarks import landmark_index
+
+    positions = people.poses.positions
+    fitted = [status == "fitted" for status in people.status]
+    pelvis, head = (positions[fitted, landmark_index(name)] for name in ("pelvis", "head_top"))
+    return TrackTable(people.poses.frames[fitted], people.poses.persons[fitted], pelvis, head)
+
+
+def _tell(people, recording, path: Path) -> None:
+    """Print who was found."""
+    import numpy as np
+
+    from hmc.body.proportions import stature
+
     for person in np.unique(people.poses.persons):
         rows = people.poses.persons == person
         frames, body = people.poses.frames[rows], people.states.bodies.get(int(person))
@@ -208,9 +214,7 @@ def run(args: argparse.Namespace) -> int:
         print(f"person {person}: {rows.sum()} frames, from {frames.min()} to {frames.max()}, {tall}")
     if not len(people.poses.frames):
         print(f"nobody in {recording.n_frames} frames")
-    print(f"wrote {paths['joints.csv']}")
-    print_problems(problems)
-    return 0
+    print(f"wrote {path}")
 
 
 def _height(text: str, recording) -> float | None:

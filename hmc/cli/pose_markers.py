@@ -1,14 +1,15 @@
-"""``hmc pose --method marker-apf``: the pose of one person who wears markers."""
+"""``hmc pose`` on markers: detections from a table, or from the images by the markers' colour."""
 
 from __future__ import annotations
 
 import argparse
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from hmc.cli.common import print_problems, progress, recording_source, was_finished
+from hmc.cli.common import progress
 
-__all__ = ["add_marker_options", "run_markers"]
+__all__ = ["Markers", "add_marker_options", "read_markers"]
 
 #: Found in the recording's folder where no option says otherwise.
 DETECTIONS, LABELS = Path("markers/detections.csv"), Path("markers/labels.csv")
@@ -39,67 +40,78 @@ def add_marker_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def run_markers(args: argparse.Namespace, height_m: float | None, recording) -> int:
-    """Run the method.
+@dataclass(frozen=True)
+class Markers:
+    """Where a run has its detections from.
 
     Parameters
     ----------
-    args : Namespace
-        Of `hmc pose`.
-    height_m : float or None
-        Stature, or None where it is to be estimated.
     recording : Recording
+    used : Path
+        The file of detections, or that of labelled points.
+    ready : bool
+        It is one of detections.
+    markers : str
+        Where they lie.
     """
-    import numpy as np
 
-    from hmc.camera.marker_color import ColourSettings
-    from hmc.errors import InputError
+    recording: Any
+    used: Path
+    ready: bool
+    markers: str
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """What a run depends on."""
+        from hmc.camera.marker_color import ColourSettings
+
+        where = {"detections": self.used.resolve()} if self.ready else {"labels": self.used.resolve(), "colour": ColourSettings()}
+        return {"markers": self.markers, **where}
+
+    @property
+    def source(self) -> dict[str, str]:
+        """When the file last changed."""
+        return {"markers_changed": str(self.used.stat().st_mtime_ns)}
+
+    def table(self, args: argparse.Namespace, key: str, problems: list[str]):
+        """The detections of the recording's selection; learnt and looked for in the images where there are only labels."""
+        from hmc.camera.marker_color import ColourSettings
+        from hmc.errors import InputError
+
+        if self.ready:
+            table = _read(self.used, self.recording)
+        else:
+            table = _detect(args, self.recording, self.used, ColourSettings(), args.out / JOURNAL, key, problems)
+            write_detections_of(args.out, table)
+        if not len(table.frames):
+            raise InputError(f"{self.used}: no marker in these frames; check the labelled points or the detections")
+        return table
+
+    def refuse_nothing(self, people) -> None:
+        """Raise an InputError where no frame has a pose."""
+        from hmc.errors import InputError
+
+        if "fitted" not in people.status:
+            raise InputError(
+                f"{self.used}: in no frame do enough markers appear in enough views at places that agree; check the detections and the "
+                "calibration"
+            )
+
+    def write(self, args: argparse.Namespace) -> None:
+        """Remove what is no longer needed."""
+        (args.out / JOURNAL).unlink(missing_ok=True)
+
+
+def write_detections_of(folder: Path, table) -> None:
+    """Write what was detected beside the result."""
     from hmc.io.detections import write_detections
-    from hmc.io.files import to_toml
-    from hmc.io.results import TrackTable, write_joints, write_pose, write_run, write_tracks
-    from hmc.landmarks import LANDMARKS
-    from hmc.pose.methods.marker_apf import pose_from_markers
-    from hmc.pose.steps.marker_filter import marker_preset
 
-    preset, colour = marker_preset(args.preset), ColourSettings()
-    used, ready = _source(args, recording)
-    if args.out.is_file():
-        raise InputError(f"--out {args.out}: is a file; give a folder")
-    parameters: dict[str, Any] = {
-        "start": recording.start, "frames": recording.n_frames, "cameras": list(recording.rig.names), "fps": recording.fps,
-        "room_m": recording.room, "height_m": height_m or "auto", "markers": args.markers, "preset": preset,
-    }  # fmt: skip
-    parameters |= {"detections": used.resolve()} if ready else {"labels": used.resolve(), "colour": colour}
-    source = recording_source(recording) | {"markers_changed": str(used.stat().st_mtime_ns)}
-    depends_on = {"method": args.method, "seed": args.seed, **source, "parameters": parameters}
-    key = to_toml(depends_on)
-    paths = {name: args.out / name for name in ("tracks.csv", "joints.csv", "pose.npz", "run.toml")}
-    if was_finished([paths["joints.csv"], paths["tracks.csv"], paths["pose.npz"]], paths["run.toml"], depends_on):
-        return 0
+    write_detections(folder / "detections.csv", table)
 
-    problems = [*recording.problems]
-    frames = list(range(recording.start, recording.start + recording.n_frames))
-    table = _read(used, recording) if ready else _detect(args, recording, used, colour, args.out / JOURNAL, key, problems)
-    if not len(table.frames):
-        raise InputError(f"{used}: no marker in these frames; check the labelled points or the detections")
-    people = pose_from_markers(
-        recording.rig, table, frames, recording.fps, preset, args.seed, height_m=height_m, skin=args.markers == "skin",
-        room=recording.room, progress=lambda steps, total: progress(steps, total, "pose", args.quiet),
-    )  # fmt: skip
-    problems += people.notes
-    fitted = np.isfinite(people.poses.positions).all(axis=(1, 2))
-    pelvis, head = (people.poses.positions[fitted, LANDMARKS.index(name)] for name in ("pelvis", "head_top"))
-    write_tracks(paths["tracks.csv"], TrackTable(people.poses.frames[fitted], people.poses.persons[fitted], pelvis, head))
-    write_joints(paths["joints.csv"], people.poses)
-    write_pose(paths["pose.npz"], people.states)
-    if not ready:
-        write_detections(args.out / "detections.csv", table)
-    write_run(paths["run.toml"], args.method, parameters, args.seed, **source, problems=list(dict.fromkeys(problems)))
-    (args.out / JOURNAL).unlink(missing_ok=True)
-    print(f"person 0: {fitted.sum()} of {len(frames)} frames, {len(table.frames) / len(frames):.0f} detections a frame")
-    print(f"wrote {paths['joints.csv']}")
-    print_problems(problems)
-    return 0
+
+def read_markers(args: argparse.Namespace, recording) -> Markers:
+    """Where the options, or the recording's folder, have markers."""
+    return Markers(recording, *_source(args, recording), args.markers)
 
 
 def _source(args: argparse.Namespace, recording) -> tuple[Path, bool]:

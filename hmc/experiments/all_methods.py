@@ -27,7 +27,7 @@ from hmc.pose.methods.scalable import method_preset
 from hmc.pose.methods.smd import smd_preset
 from hmc.pose.methods.smd_sequence import SmdTask, pose_by_descent
 from hmc.pose.sequence import PosedPeople, pose_recording
-from hmc.pose.steps.preset import PosePreset, pose_preset
+from hmc.pose.steps.presets import PosePreset, pose_preset
 from hmc.voxels.hulls import HullStep
 
 __all__ = ["EXPERIMENT", "METHODS", "effort"]

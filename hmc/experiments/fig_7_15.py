@@ -21,7 +21,7 @@ from hmc.experiments.pose_runs import estimates, first_truth
 from hmc.landmarks import landmark_index
 from hmc.metrics.landmarks import landmark_errors
 from hmc.pose.methods.scalable import method_preset
-from hmc.pose.steps.preset import pose_preset
+from hmc.pose.steps.presets import pose_preset
 
 __all__ = ["EXPERIMENT"]
 

@@ -28,7 +28,7 @@ from hmc.io.masks import MaskStep, kept_masks
 from hmc.io.results import TrackTable
 from hmc.pose.sequence import targets_of
 from hmc.pose.steps.annealed import make_filter, pose_init
-from hmc.pose.steps.preset import PosePreset, pose_preset
+from hmc.pose.steps.presets import PosePreset, pose_preset
 from hmc.pose.steps.scalable import step_of
 from hmc.tracking.resumable import person_grid
 from hmc.voxels.hulls import HullStep, stream_hulls, stream_masks

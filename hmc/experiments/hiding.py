@@ -27,11 +27,11 @@ from hmc.io.masks import kept_masks
 from hmc.io.results import TrackTable
 from hmc.landmarks import LANDMARKS, landmark_index
 from hmc.pose.methods.scalable import method_preset
-from hmc.pose.objectives.restrict import part_mask
 from hmc.pose.sequence import targets_of
 from hmc.pose.steps.annealed import make_filter, score_maps
 from hmc.pose.steps.hidden.shown import limb_signs, place_flesh
-from hmc.pose.steps.preset import pose_preset
+from hmc.pose.steps.presets import pose_preset
+from hmc.pose.steps.restrict import part_mask
 from hmc.tracking.resumable import person_grid
 from hmc.voxels.hulls import HullStep, stream_hulls
 

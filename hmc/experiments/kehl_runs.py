@@ -31,7 +31,7 @@ from hmc.pose.steps.descent.levenberg import LmSettings
 from hmc.pose.steps.descent.tracker import SmdPreset, track_step
 from hmc.pose.views.hull_target import HullTarget, make_target
 from hmc.pose.views.rays import with_rays
-from hmc.pose.views.skin import Observed, observe_voxels
+from hmc.pose.views.skin import Skin, observe_voxels
 from hmc.search.meta_descent import SmdSettings
 from hmc.tracking.resumable import person_grid
 from hmc.voxels.hulls import FrontendSettings, stream_hulls
@@ -85,7 +85,7 @@ def cell_grid(
     ]
 
 
-def observations(recording: Recording, frames: int = 0) -> Iterator[tuple[int, Observed | None, HullTarget | None]]:
+def observations(recording: Recording, frames: int = 0) -> Iterator[tuple[int, Skin | None, HullTarget | None]]:
     """What is seen of the one person of a recording, frame by frame, in the forms that the tracker and the fit of the body take.
 
     Parameters
@@ -151,7 +151,7 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
     }  # fmt: skip
 
 
-def _picture(recording: Recording, seen: Observed | None, points: np.ndarray, index: int) -> dict:
+def _picture(recording: Recording, seen: Skin | None, points: np.ndarray, index: int) -> dict:
     """The largest crop of a frame, and where the landmarks fall in it."""
     crops = [] if seen is None else [(k, crop) for k, crop in enumerate(seen.crops) if crop is not None]
     if not crops:

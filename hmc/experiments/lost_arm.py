@@ -24,7 +24,7 @@ from hmc.io.masks import MaskStep, keep_masks, kept_masks
 from hmc.io.results import PoseTable
 from hmc.landmarks import landmark_index
 from hmc.pose.sequence import pose_recording
-from hmc.pose.steps.preset import pose_preset
+from hmc.pose.steps.presets import pose_preset
 
 __all__ = ["EXPERIMENT", "taken_back", "without_arm"]
 

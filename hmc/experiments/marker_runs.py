@@ -23,9 +23,9 @@ from hmc.io.detections import DetectionTable
 from hmc.io.recording import Recording
 from hmc.io.results import PoseTable
 from hmc.pose.methods.marker_apf import pose_from_markers, seen_in_frame
-from hmc.pose.objectives.epipolar import marker_views
 from hmc.pose.steps.annealed import pose_init
 from hmc.pose.steps.marker_filter import MarkerPreset, make_marker_filter, marker_preset, marker_step
+from hmc.pose.views.markers import marker_views
 from hmc.synthetic.marker_detector import SyntheticDetector
 
 __all__ = ["FAMILY", "QUICK_FRAMES", "cell"]

@@ -19,7 +19,7 @@ from hmc.io.recording import Recording, open_recording
 from hmc.io.results import TrackTable, read_tracks, write_tracks
 from hmc.pose.person import FollowSettings
 from hmc.pose.sequence import pose_recording
-from hmc.pose.steps.preset import PosePreset, pose_preset
+from hmc.pose.steps.presets import PosePreset, pose_preset
 from hmc.pose.steps.refine import RefineSettings
 from hmc.tracking.resumable import track_recording
 from hmc.voxels.hulls import FrontendSettings, HullStep

@@ -23,7 +23,7 @@ from hmc.experiments.pose_runs import estimates
 from hmc.metrics.landmarks import landmark_errors
 from hmc.pose.person import FollowSettings
 from hmc.pose.smoothing import smooth_landmarks
-from hmc.pose.steps.preset import PosePreset, pose_preset
+from hmc.pose.steps.presets import PosePreset, pose_preset
 from hmc.voxels.hulls import HullStep
 
 __all__ = ["EXPERIMENT", "hidden", "jitter_mm"]

@@ -25,7 +25,7 @@ from hmc.metrics.persons import match_persons
 from hmc.pose.methods.marker_apf import pose_from_markers
 from hmc.pose.sequence import pose_recording
 from hmc.pose.steps.marker_filter import marker_preset
-from hmc.pose.steps.preset import pose_preset
+from hmc.pose.steps.presets import pose_preset
 from hmc.synthetic.marker_detector import SyntheticDetector, detect_synthetic, seen_by_ideal_detector
 from hmc.tracking.resumable import track_recording
 

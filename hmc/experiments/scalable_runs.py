@@ -28,7 +28,7 @@ from hmc.io.recording import Recording
 from hmc.io.results import PoseTable, TrackTable
 from hmc.pose.methods.scalable import method_preset
 from hmc.pose.sequence import pose_recording
-from hmc.pose.steps.preset import PosePreset, pose_preset
+from hmc.pose.steps.presets import PosePreset, pose_preset
 from hmc.search.structural import StructuralSettings
 
 __all__ = [

@@ -15,17 +15,22 @@ from hmc.body.exchange import swapped_pose
 from hmc.body.kinematics import landmarks
 from hmc.body.limbs import LIMBS
 from hmc.body.model import BodyModel
-from hmc.pose.objectives.residuals import residual_values
-from hmc.pose.steps.annealed import PoseFilter
+from hmc.pose.method import Alternatives, Stepped, Subject
+from hmc.pose.objectives.objective import cost_at
+from hmc.pose.steps.polish import PolishSettings, fine_objective
 from hmc.pose.steps.refine import refine
-from hmc.pose.views.hull_target import HullTarget
-from hmc.pose.views.rays import points_to_explain
+from hmc.pose.views.person_view import PersonView
 
-__all__ = ["LegChoice", "LegSettings", "choose_legs", "leg_choice", "leg_points"]
+__all__ = ["LegSettings", "TellLegs", "choose_legs", "leg_alternatives", "limb_points", "no_alternatives"]
 
 #: Exchanged legs are refined until a step gains less than this share: half of what they count more than they cost (`LegSettings.doubt`).
 TOLERANCE = 0.01
 _LEGS = np.concatenate([LIMBS[leg].landmarks for leg in ("l_leg", "r_leg")])
+_LIMBS = np.concatenate([limb.landmarks for limb in LIMBS.values()])
+
+
+#: Legs can be told apart where none of these is missing.
+LEG_DOFS = np.concatenate([LIMBS[leg].dofs for leg in ("r_leg", "l_leg")])
 
 
 @dataclass(frozen=True)
@@ -44,6 +49,8 @@ class LegSettings:
         A greater jump costs no more than this one, so that a frame that went wrong does not decide alone.
     reach_s : float
         Velocities are taken over this time before and after, seconds.
+    arms_too : bool
+        Arms are told apart as well.
     """
 
     lag_s: float = 1.0
@@ -51,56 +58,63 @@ class LegSettings:
     jump_weight: float = 2e-5
     largest_jump_m_s: float = 2.8
     reach_s: float = 0.2
+    arms_too: bool = False
 
     def reach(self, fps: float) -> int:
         """`reach_s` in frames."""
         return max(1, round(self.reach_s * fps))
 
 
-@dataclass(frozen=True)
-class LegChoice:
-    """The poses of one frame, between which the frames around it decide.
-
-    Parameters
-    ----------
-    states : ndarray, shape (m, 27)
-        As followed, and with exchanged legs; of markers, other exchanges too.
-    costs : ndarray, shape (m,)
-        Square metres, from the same points; zero in a frame that tells nothing.
-    """
-
-    states: np.ndarray
-    costs: np.ndarray
+def limb_points(body: BodyModel, states: np.ndarray, settings: LegSettings) -> np.ndarray:
+    """Points by whose motion limbs are told apart, world, metres: states (n, 27) to points (n, k, 3)."""
+    return landmarks(body, states)[:, _LIMBS if settings.arms_too else _LEGS]
 
 
-def leg_points(body: BodyModel, states: np.ndarray) -> np.ndarray:
-    """Knees and ankles, world, metres: states of shape (n, 27) to points of shape (n, 4, 3)."""
-    return landmarks(body, states)[:, _LEGS]
-
-
-def leg_choice(rng: np.random.Generator, filt: PoseFilter, state: np.ndarray, target: HullTarget | None) -> LegChoice:
+def leg_alternatives(
+    rng: np.random.Generator, subject: Subject, state: np.ndarray, view: PersonView, polish: PolishSettings
+) -> Alternatives:
     """A pose and the one with exchanged legs.
 
     Parameters
     ----------
     rng : numpy.random.Generator
-    filt : PoseFilter
-        Of a preset with `refine`.
+    subject : Subject
     state : ndarray, shape (27,)
-    target : HullTarget or None
-        None in a frame that has no hull, or whose pose was not fitted: there is nothing to choose then.
+    view : PersonView
+        With hulls.
+    polish : PolishSettings
+        How the exchanged legs are refined.
     """
-    body, samples, preset = filt.body, filt.samples, filt.preset
-    if target is None or preset.refine is None:
-        states, costs = np.stack([state, state]), np.zeros(2)
-    else:
-        points = points_to_explain(rng, target, preset.fine_hull_points, preset.symmetric.ray_share)
-        start = swapped_pose(body, state, "legs")
-        rough = replace(preset.refine, tolerance=TOLERANCE)
-        exchanged, info = refine(body, samples, start, target, points, preset.symmetric, rough)
-        values = residual_values(body, samples, state, target, points, preset.symmetric)
-        states, costs = np.stack([state, exchanged]), np.array([float(values @ values), info.cost])
-    return LegChoice(states, costs)
+    if view.target is None:
+        return no_alternatives(state)
+    objective = fine_objective(rng, subject, view.target, polish)
+    start = swapped_pose(subject.body, state, "legs")
+    exchanged, info = refine(objective, start, replace(polish.refine, tolerance=TOLERANCE))
+    return Alternatives(np.stack([state, exchanged]), np.array([cost_at(objective, state), info.cost]))
+
+
+def no_alternatives(state: np.ndarray, n: int = 2) -> Alternatives:
+    """The same pose (27,) again, for a frame that tells nothing of the legs."""
+    return Alternatives(np.repeat(state[None], n, axis=0), np.zeros(n))
+
+
+@dataclass(frozen=True)
+class TellLegs:
+    """What offers the pose with exchanged legs beside that of any step: a `hmc.pose.method.Choose`.
+
+    Parameters
+    ----------
+    polish : PolishSettings
+        How the exchanged legs are refined.
+    """
+
+    polish: PolishSettings
+
+    def __call__(self, rng: np.random.Generator, stepped: Stepped, view: PersonView) -> Alternatives:
+        """The pose and the one with exchanged legs; twice the pose in a frame without a fit, or where a leg is missing."""
+        tracked, info = stepped
+        tells = info.status == "fitted" and (info.missing is None or not info.missing[LEG_DOFS].any())
+        return leg_alternatives(rng, tracked.subject, tracked.state, view, self.polish) if tells else no_alternatives(tracked.state)
 
 
 def choose_legs(frames: np.ndarray, costs: np.ndarray, legs: np.ndarray, fps: float, settings: LegSettings) -> np.ndarray:

@@ -1,54 +1,27 @@
 """One person from the first sight to the last: watched, started, followed, and the legs told apart a little later.
 
-A step takes what is known of a person and one frame's hulls and returns what is known then, with the rows of the frames that are
-decided, if any. Whatever a step needs from earlier frames is in its state, and the random numbers of a frame depend on the seed, the person
-and the frame alone, so a run can go on from the rows that it left (`taken_up`).
+A step takes what is known of a person and one frame's view and returns what is known then, with the rows of the frames that are decided, if
+any. Whatever a step needs from earlier frames is in its state, and the random numbers of a frame depend on the seed, the person and the
+frame alone, so a run can go on from the rows that it left (`taken_up`). It is the same for all methods.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from hmc.body.joints import DOF_NAMES
 from hmc.body.model import BodyModel
-from hmc.pose.legs import LegChoice, LegSettings, choose_legs, leg_choice, leg_points
-from hmc.pose.recovery import LossSettings, loss_init, loss_step, recalled, remembered
-from hmc.pose.starts.window import StartSettings, start_person
-from hmc.pose.steps.annealed import PoseFilter, PoseInfo, PoseState, make_filter
-from hmc.pose.steps.limb_search import LIMBS
-from hmc.pose.steps.preset import PosePreset
-from hmc.pose.steps.scalable import step_of
-from hmc.pose.views.hull_target import HullTarget
+from hmc.pose.legs import choose_legs, limb_points, no_alternatives
+from hmc.pose.method import Alternatives, Capture, PoseMethod, StepInfo, Subject, Tracked, begin_tracking
+from hmc.pose.starts.window import walk
+from hmc.pose.views.person_view import PersonView
 
-__all__ = ["Decided", "FollowSettings", "PersonState", "PersonTask", "PoseTask", "person_step", "taken_up"]
+__all__ = ["Decided", "PersonState", "PersonTrack", "PoseTask", "person_step", "taken_up"]
 
 NO_START = "no hull to start from"
-#: Legs can be told apart where none of these is missing.
-LEG_DOFS = np.concatenate([LIMBS["r_leg"], LIMBS["l_leg"]])
-
-
-@dataclass(frozen=True)
-class FollowSettings:
-    """How people are followed, beside what the preset says of each frame.
-
-    Parameters
-    ----------
-    window_s : float
-        How long a person is watched before the body and the first pose are decided, seconds.
-    start : StartSettings
-    legs : LegSettings or None
-        None: the legs stay as the filter has them. Presets without `refine` leave them too.
-    loss : LossSettings or None
-        How a pose that got lost as a whole is noticed and found anew; None: it is not, nor by presets without `refine`.
-    """
-
-    window_s: float = 1.5
-    start: StartSettings = field(default_factory=StartSettings)
-    legs: LegSettings | None = field(default_factory=LegSettings)
-    loss: LossSettings | None = field(default_factory=LossSettings)
 
 
 @dataclass(frozen=True)
@@ -57,46 +30,36 @@ class PoseTask:
 
     Parameters
     ----------
-    preset : PosePreset
-    settings : FollowSettings
-    fps : float
-    room : ndarray, shape (2, 3)
-    voxel_size_m : float
+    method : PoseMethod
+    capture : Capture
     seed : int
     height_m : float or None
         None: estimated for each person.
     """
 
-    preset: PosePreset
-    settings: FollowSettings
-    fps: float
-    room: np.ndarray
-    voxel_size_m: float
+    method: PoseMethod
+    capture: Capture
     seed: int = 0
     height_m: float | None = None
 
     @property
     def window(self) -> int:
         """Frames for which a person is watched: as many as there are in that time, and three at least."""
-        return max(3, round(self.settings.window_s * self.fps))
+        return max(3, round(self.method.window_s * self.capture.fps))
 
     @property
-    def legs(self) -> LegSettings | None:
-        """How legs are told apart, where they are."""
-        return self.settings.legs if self.preset.refine is not None else None
+    def lag(self) -> int:
+        """Frames after which a frame is decided; 0: at once."""
+        legs = self.method.legs
+        return 0 if legs is None else max(1, round(legs.lag_s * self.capture.fps))
 
-    @property
-    def loss(self) -> LossSettings | None:
-        """How a lost pose is found anew, where it is."""
-        return self.settings.loss if self.preset.refine is not None else None
-
-    def rng(self, person: int, frame: int, *purpose: int) -> np.random.Generator:
-        """The random numbers of a person's frame, others for every purpose."""
-        return np.random.default_rng([self.seed, person, frame, *purpose])
+    def rng(self, person: int, frame: int) -> np.random.Generator:
+        """The random numbers of a person's frame."""
+        return np.random.default_rng([self.seed, person, frame])
 
 
 @dataclass(frozen=True)
-class PersonTask:
+class PersonTrack:
     """A person's track.
 
     Parameters
@@ -122,9 +85,9 @@ class Followed:
     """A frame that is followed and not decided yet."""
 
     frame: int
-    pose: PoseState
-    info: PoseInfo
-    choice: LegChoice
+    tracked: Tracked
+    info: StepInfo
+    alternatives: Alternatives
 
 
 @dataclass(frozen=True)
@@ -137,26 +100,20 @@ class Decided:
     frames : tuple of int
     states : ndarray, shape (n, 27)
         NaN where there was nothing to start from.
-    costs : tuple of float
-        As `PoseInfo.cost`.
-    status : tuple of str
-        As `PoseInfo.status`.
-    pose : PoseState or None
-        From where the filter goes on; None where it has not started.
+    infos : tuple of StepInfo
+        One a frame; of the journal's rows only what it keeps.
+    tracked : Tracked or None
+        From where the method goes on; None where it has not started.
     body : BodyModel or None
         The person's.
-    missing : ndarray of bool, shape (n, 27), or None
-        Angles of limbs that the data does not show; None: of none.
     """
 
     person: int
     frames: tuple[int, ...]
     states: np.ndarray
-    costs: tuple[float, ...]
-    status: tuple[str, ...]
-    pose: PoseState | None = None
+    infos: tuple[StepInfo, ...]
+    tracked: Tracked | None = None
     body: BodyModel | None = None
-    missing: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -165,12 +122,12 @@ class PersonState:
 
     Parameters
     ----------
-    filter : PoseFilter or None
+    subject : Subject or None
         None while the person is watched.
-    pose : PoseState or None
+    tracked : Tracked or None
         Of the last frame that was followed.
-    watched : tuple of (int, HullTarget or None)
-        Frames and hulls of the window that is not over. The only hulls that are kept.
+    watched : tuple of PersonView
+        The window that is not over. The only views that are kept.
     followed : tuple of Followed
         Frames that are not decided.
     context : tuple of (int, ndarray of shape (27,))
@@ -179,28 +136,24 @@ class PersonState:
         The last decided frame; -1: none is.
     """
 
-    filter: PoseFilter | None = None
-    pose: PoseState | None = None
-    watched: tuple[tuple[int, HullTarget | None], ...] = ()
+    subject: Subject | None = None
+    tracked: Tracked | None = None
+    watched: tuple[PersonView, ...] = ()
     followed: tuple[Followed, ...] = ()
     context: tuple[tuple[int, np.ndarray], ...] = ()
     done_to: int = -1
 
 
-def person_step(
-    task: PoseTask, person: PersonTask, state: PersonState, frame: int, target: HullTarget | None
-) -> tuple[PersonState, list[Decided]]:
-    """One frame of a person.
+def person_step(task: PoseTask, person: PersonTrack, state: PersonState, view: PersonView) -> tuple[PersonState, list[Decided]]:
+    """What is known after one more frame of a person, and what is decided by it.
 
     Parameters
     ----------
     task : PoseTask
-    person : PersonTask
+    person : PersonTrack
     state : PersonState
-    frame : int
-        The next of the person's frames.
-    target : HullTarget or None
-        None where there is no hull of the person in this frame.
+    view : PersonView
+        Of the next of the person's frames.
 
     Returns
     -------
@@ -208,124 +161,94 @@ def person_step(
     decided : list of Decided
         In order.
     """
-    is_last = frame == int(person.frames[-1])
-    if state.filter is None or state.pose is None:
-        state = replace(state, watched=(*state.watched, (frame, target)))
+    is_last = view.frame == int(person.frames[-1])
+    if state.tracked is None:
+        state = replace(state, watched=(*state.watched, view))
         if len(state.watched) < task.window and not is_last:
             return state, []
         started = _start(task, person, state)
         if started is None:
             # Nothing to start from yet: these frames stay without a pose, and the next window is tried.
-            frames = tuple(number for number, _ in state.watched)
-            n = len(frames)
-            nothing = Decided(person.number, frames, np.full((n, len(DOF_NAMES)), np.nan), (np.nan,) * n, (NO_START,) * n)
-            return replace(state, watched=(), done_to=frame), [nothing]
+            frames = tuple(one.frame for one in state.watched)
+            nothing = Decided(person.number, frames, np.full((len(frames), len(DOF_NAMES)), np.nan), (StepInfo(NO_START),) * len(frames))
+            return replace(state, watched=(), done_to=view.frame), [nothing]
         state = started
     else:
-        rng = task.rng(person.number, frame)
-        pose, info = step_of(task.preset)(rng, state.filter, state.pose, target)
-        pose, info = _found_again(task, person, state.filter, state.pose, frame, pose, info, target)
-        state = replace(state, pose=pose, followed=(*state.followed, _followed(task, rng, state.filter, frame, pose, info, target)))
+        rng = task.rng(person.number, view.frame)
+        stepped = task.method.step(rng, state.tracked, view)
+        if task.method.recover is not None:
+            stepped = task.method.recover(rng, state.tracked, stepped, view)
+        state = replace(state, tracked=stepped[0], followed=(*state.followed, _followed(task, rng, *stepped, view)))
     return _decide(task, person, state, is_last)
 
 
-def _start(task: PoseTask, person: PersonTask, state: PersonState) -> PersonState | None:
+def _start(task: PoseTask, person: PersonTrack, state: PersonState) -> PersonState | None:
     """The window is over: body and poses of its frames, none of them decided."""
-    frames, targets = [frame for frame, _ in state.watched], [target for _, target in state.watched]
-    started = start_person(
-        lambda k: task.rng(person.number, frames[k]),
-        task.preset,
-        task.fps,
-        targets,
-        task.height_m,
-        person.velocity(frames),
-        task.room,
-        task.settings.start,
-    )
+    views, method = state.watched, task.method
+
+    def frame_rng(k: int) -> np.random.Generator:
+        return task.rng(person.number, views[k].frame)
+
+    started = method.start(frame_rng, views, task.capture, task.height_m)
     if started is None:
         return None
-    poses = started.states
-    if task.loss is not None:
-        usual = remembered(loss_init(np.array([info.cost for info in started.infos]), task.loss))
-        poses = [replace(pose, memory={**pose.memory, **usual}) for pose in poses]
-    followed = tuple(
-        _followed(task, task.rng(person.number, frame), started.filter, frame, pose, info, target)
-        for frame, target, pose, info in zip(frames, targets, poses, started.infos, strict=True)
-    )
-    return replace(state, filter=started.filter, pose=poses[-1], watched=(), followed=followed)
+    subject = method.equip(started.subject.body, task.capture)
+    path = walk(frame_rng, method.step, subject, begin_tracking(subject, started.state, memory=started.memory), started.anchor, views)
+    if method.recover is not None:
+        usual = method.recover.first(np.array([info.cost for _, info in path]))
+        path = [(replace(tracked, memory={**tracked.memory, **usual}), info) for tracked, info in path]
+    followed = tuple(_followed(task, frame_rng(k), *path[k], view) for k, view in enumerate(views))
+    return replace(state, subject=subject, tracked=path[-1][0], watched=(), followed=followed)
 
 
-def _found_again(
-    task: PoseTask,
-    person: PersonTask,
-    filt: PoseFilter,
-    before: PoseState,
-    frame: int,
-    pose: PoseState,
-    info: PoseInfo,
-    target: HullTarget | None,
-) -> tuple[PoseState, PoseInfo]:
-    """The pose and its account, replaced where the pose was lost; what is known of that goes on in its memory."""
-    if task.loss is None:
-        return pose, info
-    rng, velocity = task.rng(person.number, frame, 1), person.velocity(frame)
-    known = recalled(before.memory)
-    pose, info, known = loss_step(rng, filt, task.fps, pose, info, target, velocity, known, task.loss, task.settings.start)
-    return replace(pose, memory={**pose.memory, **remembered(known)}), info
+def _followed(task: PoseTask, rng: np.random.Generator, tracked: Tracked, info: StepInfo, view: PersonView) -> Followed:
+    choose = task.method.choose
+    found = info.alternatives if choose is None else choose(rng, (tracked, info), view)
+    return Followed(view.frame, tracked, info, found or Alternatives(tracked.state[None], np.array([info.cost])))
 
 
-def _followed(
-    task: PoseTask, rng: np.random.Generator, filt: PoseFilter, frame: int, pose: PoseState, info: PoseInfo, target: HullTarget | None
-) -> Followed:
-    if task.legs is None:
-        return Followed(frame, pose, info, LegChoice(pose.state[None], np.array([info.cost])))
-    tells = info.status == "fitted" and (info.missing is None or not info.missing[LEG_DOFS].any())
-    choice = leg_choice(rng, filt, pose.state, target if tells else None)
-    return Followed(frame, pose, info, choice)
-
-
-def _decide(task: PoseTask, person: PersonTask, state: PersonState, is_last: bool) -> tuple[PersonState, list[Decided]]:
+def _decide(task: PoseTask, person: PersonTrack, state: PersonState, is_last: bool) -> tuple[PersonState, list[Decided]]:
     """Decide what has waited for its legs long enough; everything in the person's last frame."""
-    lag = 0 if task.legs is None else max(1, round(task.legs.lag_s * task.fps))
+    lag = task.lag
     # The window's frames were followed from its middle on; a run goes on from frames that were followed one after the other.
     enough = 2 * lag if state.context else task.window + lag
-    if state.filter is None or (lag and len(state.followed) < enough and not is_last):
+    if state.subject is None or (lag and len(state.followed) < enough and not is_last):
         return state, []
-    body, rows, context = state.filter.body, state.followed, state.context
-    picks = np.zeros(len(rows), int)
-    if task.legs is not None:
-        frames = np.array([frame for frame, _ in context] + [row.frame for row in rows])
-        choices = [LegChoice(np.stack([known, known]), np.zeros(2)) for _, known in context] + [row.choice for row in rows]
-        costs, legs = np.array([one.costs for one in choices]), np.array([leg_points(body, one.states) for one in choices])
-        picks = choose_legs(frames, costs, legs, task.fps, task.legs)[len(context) :]
-    rows = rows if is_last else rows[: len(rows) - lag]
-    chosen = [(row, row.choice, pick) for row, pick in zip(rows, picks, strict=False)]
+    picks = _picks(task, state)
+    rows = state.followed if is_last else state.followed[: len(state.followed) - lag]
+    chosen = [(row, int(pick)) for row, pick in zip(rows, picks, strict=False)]
     decided = Decided(
         person.number,
         tuple(row.frame for row in rows),
-        np.array([choice.states[pick] for _, choice, pick in chosen]),
-        tuple(float(choice.costs[pick]) if pick else row.info.cost for row, choice, pick in chosen),
-        tuple(row.info.status for row in rows),
-        rows[-1].pose,
-        body,
-        _missing(rows),
+        np.array([row.alternatives.states[pick] for row, pick in chosen]),
+        tuple(replace(row.info, cost=float(row.alternatives.costs[pick])) if pick else row.info for row, pick in chosen),
+        rows[-1].tracked,
+        state.subject.body,
     )
-    state = replace(state, followed=state.followed[len(rows) :], context=_context(task, context, decided), done_to=rows[-1].frame)
+    state = replace(state, followed=state.followed[len(rows) :], context=_context(task, state.context, decided), done_to=rows[-1].frame)
     return state, [decided]
 
 
-def _missing(rows: tuple[Followed, ...]) -> np.ndarray | None:
-    """Of every row, which angles are missing; None where none is in any."""
-    nothing = np.zeros(len(DOF_NAMES), bool)
-    missing = np.array([nothing if row.info.missing is None else row.info.missing for row in rows])
-    return missing if missing.any() else None
+def _picks(task: PoseTask, state: PersonState) -> np.ndarray:
+    """Which of the alternatives of every frame that is not decided the motion bears out; the first, where there are none."""
+    rows, legs = state.followed, task.method.legs
+    if legs is None or state.subject is None:
+        return np.zeros(len(rows), int)
+    n = max(len(row.alternatives.costs) for row in rows)
+    # A frame that tells nothing has the same pose in all ways.
+    given = [row.alternatives if len(row.alternatives.costs) == n else no_alternatives(row.tracked.state, n) for row in rows]
+    given = [no_alternatives(known, n) for _, known in state.context] + given
+    frames = np.array([frame for frame, _ in state.context] + [row.frame for row in rows])
+    costs, points = np.array([one.costs for one in given]), np.array([limb_points(state.subject.body, one.states, legs) for one in given])
+    return choose_legs(frames, costs, points, task.capture.fps, legs)[len(state.context) :]
 
 
 def _context(task: PoseTask, context: tuple[tuple[int, np.ndarray], ...], decided: Decided) -> tuple[tuple[int, np.ndarray], ...]:
     """The last decided frames, as many as the velocity of the legs is taken from."""
-    if task.legs is None:
+    legs = task.method.legs
+    if legs is None:
         return ()
-    return (*context, *zip(decided.frames, decided.states, strict=True))[-1 - task.legs.reach(task.fps) :]
+    return (*context, *zip(decided.frames, decided.states, strict=True))[-1 - legs.reach(task.capture.fps) :]
 
 
 def taken_up(task: PoseTask, state: PersonState, decided: Decided) -> PersonState:
@@ -339,7 +262,7 @@ def taken_up(task: PoseTask, state: PersonState, decided: Decided) -> PersonStat
     decided : Decided
     """
     done_to = decided.frames[-1]
-    if decided.body is None or decided.pose is None:
+    if decided.body is None:
         return replace(state, done_to=done_to)
-    filt = state.filter or make_filter(decided.body, task.preset, task.fps, task.voxel_size_m, task.room)
-    return PersonState(filt, decided.pose, context=_context(task, state.context, decided), done_to=done_to)
+    tracked = decided.tracked
+    return PersonState(tracked and tracked.subject, tracked, context=_context(task, state.context, decided), done_to=done_to)

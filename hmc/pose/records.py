@@ -1,143 +1,131 @@
-"""Decided rows as records of a journal, and back; particles in files beside it."""
+"""Decided rows as records of a journal, and back; what a method remembers of a person in files beside it. The same for all methods."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from hmc.body.joints import DOF_NAMES, canton_limits, default_limits
-from hmc.body.model import BodyModel
+from hmc.body.joints import DOF_NAMES
 from hmc.body.proportions import make_body
 from hmc.io.files import atomic_write
 from hmc.io.journal import append_journal, open_journal
-from hmc.pose.person import Decided
-from hmc.pose.steps.annealed import PoseState, pose_init
-from hmc.pose.steps.preset import PosePreset
-from hmc.search.filters import ParticleState
+from hmc.pose.method import StepInfo, Tracked, begin_tracking
+from hmc.pose.person import Decided, PoseTask
 
-__all__ = ["body_of", "from_record", "keep_decided", "keep_particles", "kept_decided", "kept_particles", "to_record"]
+__all__ = ["from_record", "keep_decided", "kept_decided", "to_record"]
 
-#: Before the names of the memory's arrays in a file of particles.
+#: Before the names of the memory's arrays in a file.
 _MEMORY = "memory_"
 
 
-def body_of(dimensions: dict[str, float], preset: PosePreset) -> BodyModel:
-    """The body of these dimensions with the preset's joint limits."""
-    return make_body(dimensions, canton_limits() if preset.body == "canton" else default_limits())
-
-
-def keep_decided(journal: str | Path | None, preset: PosePreset, decided: Decided, before: int) -> None:
-    """Add rows to a run's journal, with what the filter goes on from beside it.
+def keep_decided(journal: str | Path | None, decided: Decided, before: int) -> None:
+    """Add rows to a run's journal, with what the method goes on from beside it.
 
     Parameters
     ----------
     journal : path or None
         None: nothing is kept.
-    preset : PosePreset
-        Particles are kept where it goes on from them.
     decided : Decided
     before : int
         The last frame of the person that was decided before these rows; -1: there was none.
     """
     if journal is None:
         return
-    if decided.pose is not None and (preset.refine is None or decided.pose.memory):
-        keep_particles(journal, decided.person, decided.frames[-1], before, decided.pose)
+    if decided.tracked is not None and decided.tracked.memory:
+        _keep_memory(journal, decided, before)
     append_journal(journal, to_record(decided))
 
 
-def kept_decided(journal: str | Path | None, key: str, preset: PosePreset) -> Iterator[Decided]:
-    """The rows that a stopped run left, in order; the last ones of each person with what the filter goes on from.
+def kept_decided(journal: str | Path | None, key: str, task: PoseTask) -> Iterator[Decided]:
+    """The rows that a stopped run left, in order; the last ones of each person with what the method goes on from.
 
     Parameters
     ----------
     journal, key
         As for `hmc.io.journal.open_journal`.
-    preset : PosePreset
+    task : PoseTask
         As they were kept with.
     """
     records = open_journal(journal, key)
     last = {record["person"]: k for k, record in enumerate(records)}
     for k, record in enumerate(records):
-        kept = None
-        if journal is not None and last[record["person"]] == k:
-            kept = kept_particles(journal, record["person"], record["frames"][-1])
-        yield from_record(record, preset, *(kept or ()))
+        decided = from_record(record, task)
+        if last[record["person"]] == k and decided.body is not None and journal is not None:
+            subject = task.method.equip(decided.body, task.capture)
+            memory = _kept_memory(journal, record["person"], record["frames"][-1])
+            pose, velocity = np.array(record["pose"], float), np.array(record["velocity"], float)
+            decided = replace(decided, tracked=begin_tracking(subject, pose, velocity, memory))
+        yield decided
 
 
 def to_record(decided: Decided) -> dict[str, Any]:
-    """Plain values; the particles are not among them (`keep_particles`)."""
+    """Plain values; the memory is not among them."""
+    infos = decided.infos
     record: dict[str, Any] = {
         "person": decided.person,
         "frames": list(decided.frames),
         "states": [None if np.isnan(state).any() else state for state in decided.states],
-        "costs": [cost if np.isfinite(cost) else None for cost in decided.costs],
-        "status": list(decided.status),
+        "costs": [info.cost if np.isfinite(info.cost) else None for info in infos],
+        "status": [info.status for info in infos],
     }
-    if decided.pose is not None and decided.body is not None:
-        if decided.missing is not None:
-            record["missing"] = [np.flatnonzero(row).tolist() for row in decided.missing]
-        record |= {"pose": decided.pose.state, "velocity": decided.pose.velocity, "body": decided.body.dimensions}
+    if any(info.missing is not None for info in infos):
+        record["missing"] = [[] if info.missing is None else np.flatnonzero(info.missing).tolist() for info in infos]
+    if any(info.details for info in infos):
+        record["details"] = [dict(info.details) for info in infos]
+    if decided.tracked is not None and decided.body is not None:
+        record |= {"pose": decided.tracked.state, "velocity": decided.tracked.velocity, "body": decided.body.dimensions}
     return record
 
 
-def from_record(
-    record: dict[str, Any],
-    preset: PosePreset,
-    particles: ParticleState | None = None,
-    memory: dict[str, np.ndarray] | None = None,
-) -> Decided:
-    """What `to_record` made into a record, with these particles and this memory of the filter's."""
-    started = "body" in record
-    missing = None
-    if "missing" in record:
-        missing = np.zeros((len(record["frames"]), len(DOF_NAMES)), bool)
-        for row, dofs in zip(missing, record["missing"], strict=True):
-            row[dofs] = True
-    return Decided(
-        record["person"],
-        tuple(record["frames"]),
-        np.array([np.full(len(DOF_NAMES), np.nan) if state is None else state for state in record["states"]], float),
-        tuple(np.nan if cost is None else cost for cost in record["costs"]),
-        tuple(record["status"]),
-        pose_init(np.array(record["pose"]), np.array(record["velocity"]), particles, memory) if started else None,
-        body_of(record["body"], preset) if started else None,
-        missing,
+def from_record(record: dict[str, Any], task: PoseTask) -> Decided:
+    """What `to_record` made into a record, without what the method goes on from."""
+    n = len(record["frames"])
+    missing: list[np.ndarray | None] = [None] * n
+    for k, dofs in enumerate(record.get("missing", ())):
+        missing[k] = np.isin(np.arange(len(DOF_NAMES)), dofs) if dofs else None
+    details = record.get("details", [{}] * n)
+    infos = tuple(
+        StepInfo(status, np.nan if cost is None else cost, missing=lost, details=told)
+        for status, cost, lost, told in zip(record["status"], record["costs"], missing, details, strict=True)
     )
+    states = np.array([np.full(len(DOF_NAMES), np.nan) if state is None else state for state in record["states"]], float)
+    body = make_body(record["body"], task.method.limits) if "body" in record else None
+    return Decided(record["person"], tuple(record["frames"]), states, infos, None, body)
 
 
-def keep_particles(journal: str | Path, person: int, frame: int, before: int, pose: PoseState) -> None:
-    """Keep a person's particles and the filter's memory beside the journal, to be called before the frame's record is added.
+def _keep_memory(journal: str | Path, decided: Decided, before: int) -> None:
+    """Keep a person's memory beside the journal, to be called before the frame's record is added.
 
     There are two files a person, and that of the frame `before`, which the last record is of, is left alone: it is needed should
     the run stop between the two writes.
     """
-    first, second = _particle_files(journal, person)
+    first, second = _memory_files(journal, decided.person)
+    tracked: Tracked | None = decided.tracked
+    arrays: dict[str, Any] = {f"{_MEMORY}{name}": values for name, values in (tracked.memory if tracked else {}).items()}
     with atomic_write(second if _frame_of(first) == before else first, "wb") as out:
-        arrays: dict[str, Any] = {f"{_MEMORY}{name}": values for name, values in pose.memory.items()}
-        np.savez(out, frame=frame, particles=pose.particles.particles, log_weights=pose.particles.log_weights, **arrays)
+        np.savez(out, frame=decided.frames[-1], **arrays)
 
 
-def kept_particles(journal: str | Path, person: int, frame: int) -> tuple[ParticleState, dict[str, np.ndarray]] | None:
-    """The particles and the memory kept for this frame, if any."""
-    for file in _particle_files(journal, person):
+def _kept_memory(journal: str | Path, person: int, frame: int) -> dict[str, np.ndarray]:
+    """The memory kept for this frame; empty where there was none."""
+    for file in _memory_files(journal, person):
         if _frame_of(file) == frame:
             with np.load(file, allow_pickle=False) as data:
-                memory = {name.removeprefix(_MEMORY): data[name] for name in data.files if name.startswith(_MEMORY)}
-                return ParticleState(data["particles"], data["log_weights"]), memory
-    return None
+                return {name.removeprefix(_MEMORY): data[name] for name in data.files if name.startswith(_MEMORY)}
+    return {}
 
 
-def _particle_files(journal: str | Path, person: int) -> list[Path]:
+def _memory_files(journal: str | Path, person: int) -> list[Path]:
     path = Path(journal)
     return [path.with_name(f"{path.name}.{person}.{turn}.npz") for turn in (0, 1)]
 
 
 def _frame_of(file: Path) -> int | None:
-    """Frame of a file of particles, None where there is no file."""
+    """Frame of a file of a memory, None where there is no file."""
     if not file.exists():
         return None
     with np.load(file, allow_pickle=False) as data:

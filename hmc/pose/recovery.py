@@ -12,23 +12,24 @@ faces backwards. Two signs tell, and neither alone changes anything:
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import astuple, dataclass, replace
+from dataclasses import astuple, dataclass, field, replace
 
 import numpy as np
 
 from hmc.body.exchange import swapped_pose
-from hmc.pose.objectives.residuals import residual_values
-from hmc.pose.starts.spectral import spectral_poses
-from hmc.pose.starts.templates import first_poses
-from hmc.pose.starts.window import StartSettings, walk_factor
-from hmc.pose.steps.annealed import PoseFilter, PoseInfo, PoseState, pose_init
-from hmc.pose.steps.limb_search import LIMBS, search_limbs
+from hmc.pose.method import StepInfo, Stepped, Tracked, other_rng
+from hmc.pose.objectives.objective import cost_at
+from hmc.pose.starts.window import StartSettings, candidates, search_all, walk_factor
+from hmc.pose.steps.polish import fine_objective
+from hmc.pose.steps.presets import PosePreset
 from hmc.pose.steps.refine import refine
 from hmc.pose.views.hull_target import HullTarget
-from hmc.pose.views.rays import points_to_explain
+from hmc.pose.views.person_view import PersonView
 
-__all__ = ["LossSettings", "LossState", "loss_init", "loss_step", "recalled", "remembered"]
+__all__ = ["LossSettings", "LossState", "Recovery", "loss_init", "recalled"]
 
+#: Of the random numbers (`hmc.pose.method.other_rng`).
+PURPOSE = 1
 #: Of the entry in a pose's memory.
 _NAME = "loss"
 
@@ -101,115 +102,104 @@ def loss_init(costs: np.ndarray, settings: LossSettings) -> LossState:
     return LossState(float(np.log(np.median(costs))) if len(costs) else np.nan, wait_s=settings.patience_s)
 
 
-def remembered(state: LossState) -> dict[str, np.ndarray]:
-    """The state as an entry of a pose's memory (`hmc.pose.steps.annealed.PoseState`)."""
+def _entry(state: LossState) -> dict[str, np.ndarray]:
+    """The state as an entry of a pose's memory."""
     return {_NAME: np.array(astuple(state))}
 
 
 def recalled(memory: Mapping[str, np.ndarray]) -> LossState:
-    """The state from a pose's memory; a fresh one where there is none."""
+    """The state from a pose's memory (`hmc.pose.method.Tracked`); a fresh one where there is none."""
     return LossState(*memory[_NAME].tolist()) if _NAME in memory else LossState()
 
 
-def loss_step(
-    rng: np.random.Generator,
-    filt: PoseFilter,
-    fps: float,
-    pose: PoseState,
-    info: PoseInfo,
-    target: HullTarget | None,
-    velocity: np.ndarray,
-    state: LossState,
-    settings: LossSettings,
-    start: StartSettings,
-) -> tuple[PoseState, PoseInfo, LossState]:
-    """Judge one frame's pose, and replace it if it is lost.
+@dataclass(frozen=True)
+class Recovery:
+    """Recovery from a lost pose, for any method whose frames have hulls: a `hmc.pose.method.Recover`.
 
     Parameters
     ----------
-    rng : numpy.random.Generator
-        Its own, so that a pose that is never lost is the same with and without.
-    filt : PoseFilter
-        Of a preset with `refine`.
-    fps : float
-    pose, info
-        As from `hmc.pose.steps.annealed.pose_step`.
-    target : HullTarget or None
-        Of the same frame.
-    velocity : ndarray, shape (3,)
-        Of the person's track, metres a second.
-    state : LossState
+    preset : PosePreset
+        Candidates and refinement of fresh starts.
     settings : LossSettings
     start : StartSettings
         What walking backwards costs.
-
-    Returns
-    -------
-    pose : PoseState
-    info : PoseInfo
-    state : LossState
     """
-    if target is None or info.status != "fitted" or not info.cost > 0:
-        return pose, info, state
-    dt, level = 1 / fps, float(np.log(info.cost))
-    if state.wait_s == 0:
-        state = replace(state, wait_s=settings.patience_s)
-    if np.isnan(state.usual):
-        state = replace(state, usual=level)
-    state = replace(state, since_turn_s=state.since_turn_s + dt)
-    if level > state.usual + np.log(settings.ratio):
-        state = replace(state, bad_s=state.bad_s + dt)
-        if state.bad_s < state.wait_s - dt / 2:
-            return pose, info, state
-        found = _fresh_start(rng, filt, pose.state, target, settings)
-        if found is None:
-            return pose, info, replace(state, bad_s=0.0, wait_s=2 * state.wait_s)
-        return (
-            replace(pose_init(found[0]), memory=pose.memory),
-            replace(info, cost=found[1]),
-            replace(state, bad_s=0.0, wait_s=settings.patience_s, turned=0.0),
-        )
-    usual = state.usual + (level - state.usual) * min(1.0, dt / settings.memory_s)
-    state = replace(state, usual=usual, bad_s=0.0, wait_s=settings.patience_s)
-    if state.since_turn_s < (settings.suspicion_s if state.turned else settings.turn_every_s) - dt / 2:
-        return pose, info, state
-    (as_it_is, cost), (turned, turned_cost) = _both_ways(rng, filt, pose.state, target)
-    factors = walk_factor(np.array([as_it_is[3], turned[3]]), velocity, start)
-    evidence = np.log(cost * factors[0]) - np.log(turned_cost * factors[1]) - settings.turn_drift
-    state = replace(state, since_turn_s=0.0, turned=max(0.0, state.turned + float(evidence)))
-    if state.turned < settings.turn_limit:
-        return pose, info, state
-    return replace(pose_init(turned), memory=pose.memory), replace(info, cost=turned_cost), replace(state, turned=0.0)
+
+    preset: PosePreset
+    settings: LossSettings = field(default_factory=LossSettings)
+    start: StartSettings = field(default_factory=StartSettings)
+
+    def first(self, costs: np.ndarray) -> dict[str, np.ndarray]:
+        """Entries of the memory after a person's first frames, of these costs, shape (n,); NaN where there is none."""
+        return _entry(loss_init(costs, self.settings))
+
+    def __call__(self, rng: np.random.Generator, before: Tracked, stepped: Stepped, view: PersonView) -> Stepped:
+        """The step's pose, or a fresh one where it was lost; what is known of that goes on in its memory.
+
+        Parameters
+        ----------
+        rng : numpy.random.Generator
+            Of the step; other numbers of the same frame are drawn, so that a pose that is never lost is the same with and without.
+        before : Tracked
+            Before the step.
+        stepped : (Tracked, StepInfo)
+            After it.
+        view : PersonView
+        """
+        tracked, info, state = self._judged(other_rng(rng, PURPOSE), *stepped, view, recalled(before.memory))
+        return replace(tracked, memory={**tracked.memory, **_entry(state)}), info
+
+    def _judged(self, rng, tracked: Tracked, info: StepInfo, view: PersonView, state: LossState) -> tuple[Tracked, StepInfo, LossState]:
+        settings = self.settings
+        if view.target is None or info.status != "fitted" or not info.cost > 0:
+            return tracked, info, state
+        dt, level = 1 / tracked.subject.capture.fps, float(np.log(info.cost))
+        if state.wait_s == 0:
+            state = replace(state, wait_s=settings.patience_s)
+        if np.isnan(state.usual):
+            state = replace(state, usual=level)
+        state = replace(state, since_turn_s=state.since_turn_s + dt)
+        if level > state.usual + np.log(settings.ratio):
+            state = replace(state, bad_s=state.bad_s + dt)
+            if state.bad_s < state.wait_s - dt / 2:
+                return tracked, info, state
+            found = self._fresh_start(rng, tracked, view.target)
+            if found is None:
+                return tracked, info, replace(state, bad_s=0.0, wait_s=2 * state.wait_s)
+            return (*_placed(tracked, info, *found), replace(state, bad_s=0.0, wait_s=settings.patience_s, turned=0.0))
+        usual = state.usual + (level - state.usual) * min(1.0, dt / settings.memory_s)
+        state = replace(state, usual=usual, bad_s=0.0, wait_s=settings.patience_s)
+        if state.since_turn_s < (settings.suspicion_s if state.turned else settings.turn_every_s) - dt / 2:
+            return tracked, info, state
+        (as_it_is, cost), (turned, turned_cost) = self._both_ways(rng, tracked, view.target)
+        factors = walk_factor(np.array([as_it_is[3], turned[3]]), view.velocity, self.start)
+        evidence = np.log(cost * factors[0]) - np.log(turned_cost * factors[1]) - settings.turn_drift
+        state = replace(state, since_turn_s=0.0, turned=max(0.0, state.turned + float(evidence)))
+        if state.turned < settings.turn_limit:
+            return tracked, info, state
+        return (*_placed(tracked, info, turned, turned_cost), replace(state, turned=0.0))
+
+    def _fresh_start(self, rng: np.random.Generator, tracked: Tracked, target: HullTarget) -> tuple[np.ndarray, float] | None:
+        """The best pose that a start from this frame's hulls finds, and its cost, if that is far below the present one's."""
+        polish = self.preset.polish
+        states, _ = candidates(rng, tracked.subject, target, self.preset)
+        objective = fine_objective(rng, tracked.subject, target, polish)
+        trials = [refine(objective, one, polish.refine) for one in states]
+        best, cost = min(((one, info.cost_after) for one, info in trials), key=lambda pair: pair[1])
+        return (best, cost) if cost < self.settings.gain * cost_at(objective, tracked.state) else None
+
+    def _both_ways(self, rng: np.random.Generator, tracked: Tracked, target: HullTarget) -> list[tuple[np.ndarray, float]]:
+        """The pose and the one turned about, both refined to the same points, with their costs.
+
+        Arms and legs of a body that has been followed the wrong way round have gone astray too: those of the turned one are looked for.
+        """
+        polish, now = self.preset.polish, tracked.state
+        objective = fine_objective(rng, tracked.subject, target, polish)
+        as_it_is, _ = refine(objective, now, polish.refine)
+        turned, _ = refine(objective, swapped_pose(tracked.subject.body, now, "all"), polish.refine)
+        return [(as_it_is, cost_at(objective, as_it_is)), search_all(rng, objective, turned, polish)]
 
 
-def _fresh_start(rng, filt, now, target, settings) -> tuple[np.ndarray, float] | None:
-    """The best pose that a start from this frame's hulls finds, and its cost, if that is far below the present one's."""
-    preset = filt.preset
-    floor_z = 0.0 if target.floor_z is None else target.floor_z
-    find = spectral_poses if preset.start == "spectral" else first_poses
-    states, _ = find(rng, filt.body, filt.samples, target, preset.symmetric, floor_z)
-    points = points_to_explain(rng, target, preset.fine_hull_points, preset.symmetric.ray_share)
-    trials = [refine(filt.body, filt.samples, one, target, points, preset.symmetric, preset.refine) for one in states]
-    best, cost = min(((one, info.cost_after) for one, info in trials), key=lambda pair: pair[1])
-    values = residual_values(filt.body, filt.samples, now, target, points, preset.symmetric)
-    return (best, cost) if cost < settings.gain * float(values @ values) else None
-
-
-def _both_ways(rng, filt, now, target) -> list[tuple[np.ndarray, float]]:
-    """The pose and the one turned about, both refined to the same points, with their costs.
-
-    Arms and legs of a body that has been followed the wrong way round have gone astray too: those of the turned one are looked for.
-    """
-    preset = filt.preset
-    points = points_to_explain(rng, target, preset.fine_hull_points, preset.symmetric.ray_share)
-    both = []
-    for start, search in ((now, None), (swapped_pose(filt.body, now, "all"), preset.search)):
-        state, _ = refine(filt.body, filt.samples, start, target, points, preset.symmetric, preset.refine)
-        values = residual_values(filt.body, filt.samples, state, target, points, preset.symmetric)
-        cost = float(values @ values)
-        if search is not None:
-            state, cost, _ = search_limbs(
-                rng, filt.body, filt.samples, state, cost, list(LIMBS), target, points, preset.symmetric, preset.refine, search
-            )
-        both.append((state, cost))
-    return both
+def _placed(tracked: Tracked, info: StepInfo, state: np.ndarray, cost: float) -> Stepped:
+    """A person put into another pose, at rest."""
+    return replace(tracked, state=state, velocity=np.zeros_like(state)), replace(info, cost=cost)

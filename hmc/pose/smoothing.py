@@ -13,10 +13,10 @@ import numpy as np
 from scipy.signal import savgol_filter
 
 from hmc.body.inverse import fit_landmarks
+from hmc.body.joints import JointLimits
 from hmc.body.kinematics import landmarks
-from hmc.pose.records import body_of
-from hmc.pose.sequence import PosedPeople
-from hmc.pose.steps.preset import PosePreset
+from hmc.body.proportions import make_body
+from hmc.pose.follow import PosedPeople
 
 __all__ = ["smooth_landmarks", "smooth_people"]
 
@@ -53,14 +53,14 @@ def smooth_landmarks(frames: np.ndarray, positions: np.ndarray, fps: float, wind
     return out
 
 
-def smooth_people(people: PosedPeople, preset: PosePreset, fps: float, window_s: float) -> PosedPeople:
+def smooth_people(people: PosedPeople, limits: JointLimits, fps: float, window_s: float) -> PosedPeople:
     """Everybody's poses, smoothed.
 
     Parameters
     ----------
     people : PosedPeople
-    preset : PosePreset
-        With which they were estimated: it says which joint limits hold.
+    limits : JointLimits
+        Of the bodies with which they were estimated (`hmc.pose.method.PoseMethod.limits`).
     fps : float
         Frames a second.
     window_s : float
@@ -73,7 +73,7 @@ def smooth_people(people: PosedPeople, preset: PosePreset, fps: float, window_s:
     """
     states, positions = people.states.states.copy(), people.poses.positions.copy()
     for person, dimensions in people.states.bodies.items():
-        body = body_of({name: float(value) for name, value in dimensions.items()}, preset)
+        body = make_body({name: float(value) for name, value in dimensions.items()}, limits)
         rows = np.flatnonzero(people.poses.persons == person)
         wanted = smooth_landmarks(people.poses.frames[rows], positions[rows], fps, window_s)
         changed = np.flatnonzero((wanted != positions[rows]).any(axis=(1, 2)) & np.isfinite(wanted).all(axis=(1, 2)))

@@ -7,9 +7,8 @@ from posed import body_of
 
 from hmc.body.cone_maps import cone_maps, cones_near, spread
 from hmc.body.cones import cone_distance
-from hmc.body.kinematics import segment_transforms
+from hmc.body.kinematics import place_segments, segment_transforms
 from hmc.body.model import neutral_state
-from hmc.body.placing import place_segments
 from hmc.pose.objectives.symmetric import body_distance
 
 BODY, _ = body_of()

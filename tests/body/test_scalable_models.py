@@ -14,7 +14,7 @@ from hmc.body.model_file import read_hierarchy
 from hmc.body.scalable_models import MODEL_1, MODEL_2, UNITIVE, UNITIVE_PIECES, Inclusive, Model, Union, Unitive
 from hmc.errors import InputError
 from hmc.pose.methods.scalable import method_preset
-from hmc.pose.steps.preset import PRESETS
+from hmc.pose.steps.presets import PRESETS
 
 TRUNK = Model("trunk", ("root_tx", "root_rz"), ("torso",))
 ARM = Model("arm", ("r_elbow_z",), ("r_forearm",))

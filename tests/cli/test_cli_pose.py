@@ -14,7 +14,7 @@ from hmc.pose import person, sequence
 from hmc.pose.legs import LegSettings
 from hmc.pose.person import FollowSettings
 from hmc.pose.starts.window import StartSettings
-from hmc.pose.steps import preset as presets
+from hmc.pose.steps import presets
 from hmc.search.filters import AnnealedSettings
 from hmc.voxels import hulls as frontend
 

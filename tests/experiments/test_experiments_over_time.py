@@ -10,7 +10,7 @@ from hmc.experiments import Plan, over_time
 from hmc.experiments.engine.experiment import Cell
 from hmc.experiments.engine.style import house_style
 from hmc.experiments.over_time import DEFAULT, GONE_S, NO_RECOVERY, WAYS, hidden, jitter_mm
-from hmc.pose.steps.preset import pose_preset
+from hmc.pose.steps.presets import pose_preset
 from hmc.voxels.hulls import HullStep
 
 FPS, N = 20.0, 90

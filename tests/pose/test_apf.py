@@ -13,7 +13,7 @@ from hmc.body.kinematics import landmarks
 from hmc.body.proportions import canton_body
 from hmc.errors import InputError
 from hmc.pose.steps.annealed import make_filter, pose_init, pose_step, starting_particles
-from hmc.pose.steps.preset import PRESETS, drift, pose_preset
+from hmc.pose.steps.presets import PRESETS, drift, pose_preset
 from hmc.search.filters import AnnealedSettings, particle_init
 
 # Little work a frame, and weights of the tests' own; everything else as in the presets.

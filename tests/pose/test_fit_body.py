@@ -10,7 +10,8 @@ from hmc.body.flesh import surface_coordinates
 from hmc.body.kinematics import landmarks
 from hmc.body.proportions import default_body
 from hmc.pose.objectives.symmetric import body_points
-from hmc.pose.starts.fit_body import FitBodySettings, fit_body
+from hmc.body.dimensions import FitBodySettings
+from hmc.pose.starts.fit_body import fit_body
 from hmc.pose.steps.refine import RefineSettings, refine
 
 FRAMES = (0, 1, 3, 4, 6, 7)

@@ -15,7 +15,7 @@ from hmc.body.proportions import default_body
 from hmc.landmarks import landmark_index
 from hmc.pose.legs import LegSettings, choose_legs, leg_choice, leg_points
 from hmc.pose.steps.annealed import make_filter
-from hmc.pose.steps.preset import PRESETS
+from hmc.pose.steps.presets import PRESETS
 from hmc.pose.steps.refine import refine
 
 FPS = 15.0

@@ -21,13 +21,13 @@ from hmc.errors import InputError
 from hmc.landmarks import landmark_index
 from hmc.pose.methods.scalable import method_preset
 from hmc.pose.objectives.four_scores import make_score_table, scores
-from hmc.pose.objectives.restrict import ScoreData, SymmetricData, coarser_table, nearest_part, part_body, part_mask, restrict_table
+from hmc.pose.steps.restrict import ScoreData, SymmetricData, coarser_table, nearest_part, part_body, part_mask, restrict_table
 from hmc.pose.objectives.symmetric import body_distance, symmetric_cost
 from hmc.pose.steps.annealed import make_filter, pose_init, score_maps
 from hmc.pose.steps.hidden.limbs import LimbMemory, LimbSettings, limb_spread_deg, look_again
 from hmc.pose.steps.hidden.scouts import scout
 from hmc.pose.steps.hidden.shown import in_doubt, limb_signs, place_flesh
-from hmc.pose.steps.preset import PRESETS
+from hmc.pose.steps.presets import PRESETS
 from hmc.pose.steps.scalable import scalable_step, suited
 from hmc.pose.views.hull_target import make_target
 from hmc.voxels.grid import VoxelGrid

@@ -14,7 +14,7 @@ from hmc.pose.recovery import LossSettings, LossState, loss_init, loss_step
 from hmc.pose.starts.window import StartSettings
 from hmc.pose.steps.annealed import make_filter, pose_init, pose_step
 from hmc.pose.steps.limb_search import SearchSettings
-from hmc.pose.steps.preset import PRESETS
+from hmc.pose.steps.presets import PRESETS
 from hmc.search.filters import AnnealedSettings
 
 LEAN = replace(

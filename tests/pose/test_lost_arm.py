@@ -18,7 +18,7 @@ from hmc.experiments.engine.style import house_style
 from hmc.experiments.lost_arm import BACK_M, STAYS, taken_back, without_arm
 from hmc.landmarks import landmark_index
 from hmc.pose.steps.annealed import make_filter, pose_init, pose_step
-from hmc.pose.steps.preset import PRESETS
+from hmc.pose.steps.presets import PRESETS
 from hmc.pose.views.hull_target import make_target
 from hmc.pose.views.rays import with_rays
 from hmc.search.filters import AnnealedSettings

@@ -20,14 +20,15 @@ from hmc.io.detections import DetectionTable, read_detections, write_detections
 from hmc.landmarks import LANDMARKS
 from hmc.pose.methods import marker_apf as sequence
 from hmc.pose.methods.marker_apf import pose_from_markers
-from hmc.pose.objectives.epipolar import MarkerLikelihood, marker_cost, marker_views, observe_markers, project_markers
+from hmc.pose.objectives.epipolar import MarkerLikelihood, marker_cost, project_markers
 from hmc.pose.objectives.marker_points import find_points, triangulate
 from hmc.pose.objectives.nearest_detections import nearest_detections
 from hmc.pose.steps.annealed import pose_init
 from hmc.pose.steps.marker_filter import MarkerPreset, make_marker_filter, marker_preset, marker_step
 from hmc.pose.steps.marker_limbs import explain_all, refine_to_points
 from hmc.pose.steps.marker_search import left_over, search_near, start_poses
-from hmc.pose.steps.preset import drift
+from hmc.pose.steps.presets import drift
+from hmc.pose.views.markers import marker_views, observe_markers
 from hmc.search import AnnealedSettings, truncated_normal
 from hmc.synthetic.marker_detector import SyntheticDetector, detect_synthetic, marker_visibility, seen_by_ideal_detector
 

@@ -8,9 +8,8 @@ import pytest
 from hmc.body.cones import cone_distance
 from hmc.body.flesh import flesh_points, place_points
 from hmc.body.joints import dof_index
-from hmc.body.kinematics import segment_transforms
+from hmc.body.kinematics import place_segments, segment_transforms
 from hmc.body.model import PARTS, neutral_state
-from hmc.body.placing import place_segments
 from hmc.body.proportions import canton_body, default_body
 from hmc.pose.objectives.overlap import make_overlap_table, quick_overlap
 from hmc.pose.objectives.overlap_exact import exact_overlap

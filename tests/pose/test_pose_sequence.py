@@ -22,7 +22,7 @@ from hmc.pose.person import FollowSettings
 from hmc.pose.sequence import pose_recording as pose_whole_recording
 from hmc.pose.starts.window import StartSettings
 from hmc.pose.steps.limb_search import SearchSettings
-from hmc.pose.steps.preset import PRESETS
+from hmc.pose.steps.presets import PRESETS
 from hmc.search.filters import AnnealedSettings
 
 TINY = Path(__file__).resolve().parents[2] / "data" / "synthetic" / "tiny"

@@ -11,7 +11,7 @@ from hmc.io.journal import append_journal, open_journal
 from hmc.pose.person import Decided
 from hmc.pose.records import from_record, keep_particles, kept_particles, to_record
 from hmc.pose.steps.annealed import PoseState, pose_init
-from hmc.pose.steps.preset import PRESETS
+from hmc.pose.steps.presets import PRESETS
 from hmc.search.filters import ParticleState
 
 

@@ -34,7 +34,7 @@ from hmc.pose.starts.da_vinci import find_da_vinci
 from hmc.pose.starts.spectral import spectral_poses
 from hmc.pose.steps.descent.levenberg import robust_residuals
 from hmc.pose.steps.descent.tracker import evaluation, make_scene, make_tracker, track_init, track_step
-from hmc.pose.views.skin import Crop, Observed, crop_images
+from hmc.pose.views.skin import Crop, Skin, crop_images
 from hmc.search.meta_descent import Evaluation, SmdSettings, converged, curvature_axes, smd_init, smd_run, smd_step
 
 PLACES = [(3.0, 0.2, 1.6), (-0.4, 3.0, 1.5), (-2.8, -1.0, 1.4), (0.4, -2.9, 1.7)]
@@ -410,7 +410,7 @@ def seen_of(tracker, state):
     points = placed(tracker, state)
     images = images_of(tracker, state)
     views = stack_views(CAMERAS)
-    return Observed(points, None, views, crop_images(views, images, points))
+    return Skin(points, None, views, crop_images(views, images, points))
 
 
 @pytest.mark.parametrize("optimiser", ["smd", "deterministic", "lm"])

@@ -15,7 +15,7 @@ from hmc.io.results import PoseStates, PoseTable
 from hmc.landmarks import landmark_index
 from hmc.pose.sequence import PosedPeople
 from hmc.pose.smoothing import smooth_landmarks, smooth_people
-from hmc.pose.steps.preset import PRESETS
+from hmc.pose.steps.presets import PRESETS
 
 FPS = 30.0
 

@@ -13,7 +13,7 @@ from hmc.landmarks import LANDMARKS
 from hmc.pose.spectral.reading import read_body
 from hmc.pose.starts.spectral import body_state, spectral_poses, strict_voxels
 from hmc.pose.steps.annealed import make_filter, pose_init, pose_step
-from hmc.pose.steps.preset import pose_preset
+from hmc.pose.steps.presets import pose_preset
 
 
 def test_a_body_takes_up_the_landmarks_of_another():

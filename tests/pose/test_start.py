@@ -12,7 +12,7 @@ from hmc.body.kinematics import landmarks
 from hmc.pose.starts.window import StartSettings, estimate_height, follow, possible_heights, start_person
 from hmc.pose.steps.annealed import make_filter
 from hmc.pose.steps.limb_search import SearchSettings
-from hmc.pose.steps.preset import PRESETS
+from hmc.pose.steps.presets import PRESETS
 from hmc.search.filters import AnnealedSettings
 
 FEW = AnnealedSettings(layers=2, particles=50, survival_rate=0.1, spread=0.5)

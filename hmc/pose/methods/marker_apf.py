@@ -1,34 +1,26 @@
-"""One person's poses from a table of marker detections, frame by frame."""
+"""The annealed particle filter on markers: detections in all views, of one person. Canton (2009), sections 6.4 and 6.6."""
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hmc.body.joints import DOF_NAMES
-from hmc.body.kinematics import landmarks
+from hmc.body.joints import canton_limits, default_limits
 from hmc.body.marker_places import fit_tips, with_skin_markers
 from hmc.body.model import BodyModel
 from hmc.body.proportions import canton_body, default_body
-from hmc.camera.epipolar import undistorted_pixels
-from hmc.camera.model import Rig
 from hmc.errors import InputError
-from hmc.io.detections import DetectionTable
-from hmc.io.results import PoseStates, PoseTable
-from hmc.pose.legs import LegChoice, LegSettings, choose_legs
-from hmc.pose.objectives.epipolar import SeenMarkers, marker_views, observe_markers
+from hmc.pose.legs import LegSettings
+from hmc.pose.method import Capture, FrameRng, PoseMethod, Started, Stepped, Tracked, begin_tracking, make_subject, other_rng
 from hmc.pose.objectives.marker_points import find_points
-from hmc.pose.sequence import PosedPeople
-from hmc.pose.steps.annealed import PoseState, pose_init
-from hmc.pose.steps.marker_filter import MarkerFilter, MarkerInfo, MarkerPreset, make_marker_filter, marker_step
-from hmc.pose.steps.marker_limbs import LIMBS
+from hmc.pose.steps.marker_filter import TIPS, MarkerPreset, marker_frame, on_markers, with_tips
 from hmc.pose.steps.marker_search import LEAST_POINTS, left_over, start_poses
+from hmc.pose.views.markers import SeenMarkers
+from hmc.pose.views.person_view import PersonView
 
-__all__ = ["pose_from_markers", "seen_in_frame"]
+__all__ = ["MarkerRecovery", "MarkerStart", "marker_method"]
 
 #: The pose is begun in the best of this many frames, evenly spread over this time from the first in which enough points were found.
 START_FRAMES, START_S = 4, 0.5
@@ -41,195 +33,161 @@ HEIGHTS_M = (1.55, 1.65, 1.75, 1.85, 1.95)
 #: After this many frames without a pose it is begun anew.
 LOST_FRAMES = 10
 #: So many points that several views agree on, away from the person, are somebody else's.
-SOMEBODY_ELSE = 8
+ANOTHER_PERSON = 8
 #: Where markers are worn is learnt from at most this many frames.
 LEARN_FRAMES = 60
+#: How long the person is watched first, seconds.
+WINDOW_S = 2.0
+#: Of the random numbers: of a first pose, of the frames that prove it, and of those from which places are learnt.
+STARTING, PROVING, LEARNING = 3, 2, 4
 #: Every way counts as what it costs: in which one a frame's filter ended says nothing.
-TELLING_APART = LegSettings(doubt=0.0, jump_weight=5e-5)
+TELLING_APART = LegSettings(doubt=0.0, jump_weight=5e-5, arms_too=True)
+_LOST = "lost"
 
 
-def seen_in_frame(rig: Rig, views, detections: Sequence[np.ndarray], gate_px: float) -> SeenMarkers:
-    """One frame's detections, pixels as the images have them, ready for the likelihood.
-
-    Parameters
-    ----------
-    rig : Rig
-    views : MarkerViews
-        From `hmc.pose.objectives.epipolar.marker_views`.
-    detections : sequence of ndarray, shape (n, 2)
-        One array a camera.
-    gate_px : float
-    """
-    return observe_markers(views, [undistorted_pixels(camera, uv) for camera, uv in zip(rig, detections, strict=True)], gate_px)
-
-
-def pose_from_markers(
-    rig: Rig,
-    table: DetectionTable,
-    frames: Sequence[int],
-    fps: float,
-    preset: MarkerPreset,
-    seed: int = 0,
-    *,
-    height_m: float | None = None,
-    skin: bool = True,
-    room: np.ndarray | None = None,
-    progress: Callable[[Iterable[Any], int], Iterable[Any]] | None = None,
-) -> PosedPeople:
-    """Estimate the poses of one person who wears markers.
+@dataclass(frozen=True)
+class MarkerStart:
+    """The first pose from markers alone, and where they are worn.
 
     Parameters
     ----------
-    rig : Rig
-    table : DetectionTable
-    frames : sequence of int
-        Absolute frame numbers, rising.
-    fps : float
     preset : MarkerPreset
-    seed : int
-        The same seed gives the same result.
-    height_m : float, optional
-        Stature; the best of several where left out.
     skin : bool
         Markers are worn on the skin, and where exactly is learnt from the first frames if the preset refines; otherwise they are the
         joint centres themselves.
-    room : ndarray, shape (2, 3), optional
-        Where the person may be, metres.
-    progress : callable, optional
-        ``progress(frames, total)`` passes the frames on and may show how far they are.
-
-    Returns
-    -------
-    PosedPeople
-        Person 0, with the costs of Eq. 6.9; NaN in frames without a pose.
-
-    Raises
-    ------
-    InputError
-        When there is nowhere in these frames a pose to begin with, or more than one person wears markers.
     """
-    views = marker_views(rig)
-    by_frame = {frame: table.in_frame(frame, rig.names) for frame in frames}
 
-    def seen(frame: int) -> SeenMarkers:
-        return seen_in_frame(rig, views, by_frame[frame], preset.likelihood.gate_px)
+    preset: MarkerPreset
+    skin: bool = True
 
-    anchor, body, markers, state = _begin(seed, seen, frames, fps, preset, height_m, skin, room)
-    if skin and preset.refine:
-        states, points = [], []
-        pose, filt = pose_init(state), make_marker_filter(markers, preset, fps)
-        for frame in frames[anchor : anchor + LEARN_FRAMES]:
-            pose, info = marker_step(_rng(seed, frame, 0), filt, pose, seen(frame))
-            states.append(pose.state)
-            points.append(info.points)
-        markers = fit_tips(body, markers, np.array(states), np.array(points))
+    def __call__(self, frame_rng: FrameRng, views: Sequence[PersonView], capture: Capture, height_m: float | None = None) -> Started | None:
+        """The body, the pose and the places of the markers; None where no frame has enough points that views agree on.
 
-    filt = make_marker_filter(markers, preset, fps)
-    order = [*range(anchor, len(frames)), *range(anchor - 1, -1, -1)]
-    found: dict[int, tuple[PoseState, MarkerInfo]] = {}
-    pose, lost = pose_init(state), 0
-    for k in progress(order, len(order)) if progress else order:
-        if k == anchor - 1:
-            pose, lost = pose_init(found[anchor][0].state), 0
-        one = seen(frames[k])
-        pose, lost = _begun_anew(_rng(seed, frames[k], 3), filt, pose, lost, one, room)
-        pose, info = marker_step(_rng(seed, frames[k], 1), filt, pose, one)
-        lost = 0 if info.status == "fitted" else lost + 1
-        found[k] = pose, info
-    return _people(frames, body, _limbs_told_apart(frames, fps, markers, found))
+        Raises
+        ------
+        InputError
+            When more than one person wears markers.
+        """
+        seen = [view.markers for view in views]
+        begun = self._begin(frame_rng, seen, capture, height_m)
+        if begun is None:
+            return None
+        anchor, tracked = begun
+        if self.skin and self.preset.refine:
+            tracked = self._learnt(frame_rng, seen, anchor, tracked)
+        return Started(tracked.subject, anchor, tracked.state, tracked.memory)
 
+    def _begin(self, frame_rng, seen: Sequence[SeenMarkers | None], capture: Capture, height_m: float | None) -> tuple[int, Tracked] | None:
+        """The frame in which the first pose fits best, and the pose."""
+        heights = HEIGHTS_M if height_m is None else (height_m,)
+        best, least, others, tried, spacing = None, np.inf, 0, 0, max(1, round(START_S * capture.fps / START_FRAMES))
+        k = 0
+        while k < len(seen) and tried < START_FRAMES:
+            points, agreeing = _points(seen[k], capture)
+            if len(points) < LEAST_POINTS:
+                k += 1
+                continue
+            for height in heights:
+                body = self._body(height)
+                markers = with_skin_markers(body) if self.skin else body
+                starts = start_poses(other_rng(frame_rng(k), STARTING), markers, points, agreeing)
+                if starts and starts[0][1] < least:
+                    least = starts[0][1]
+                    best = k, body, markers, [state for state, cost in starts[:TRIALS] if cost <= RIVAL_COST * least]
+                    others = left_over(markers, starts[0][0], points, agreeing)
+            tried += 1
+            k += spacing
+        if best is None:
+            return None
+        if others >= ANOTHER_PERSON:
+            raise InputError(
+                f"more than one person seems to wear markers: {others} points that several views agree on are away "
+                "from the person that was found; this method follows one: give the detections of one person"
+            )
+        k, body, markers, states = best
+        subject = make_subject(body, capture)
+        trials = [begin_tracking(subject, state, memory={TIPS: markers.tips}) for state in states]
+        return k, self._proved(frame_rng, seen, k, trials)
 
-def _rng(seed: int, frame: int, stage: int) -> np.random.Generator:
-    return np.random.default_rng([seed, int(frame), stage])
+    def _body(self, height_m: float) -> BodyModel:
+        return canton_body(height_m) if self.preset.body == "canton" else default_body(height_m)
 
+    def _proved(self, frame_rng, seen, first: int, trials: list[Tracked]) -> Tracked:
+        """Of several first poses the one that the next frames bear out: a body the wrong way round fits one frame, but not a motion."""
+        if len(trials) == 1:
+            return trials[0]
+        costs = []
+        for trial in trials:
+            now, total = trial, []
+            for k in range(first, min(first + TRIAL_FRAMES, len(seen))):
+                if seen[k] is not None:
+                    now, info = marker_frame(other_rng(frame_rng(k), PROVING), now, seen[k], self.preset)
+                    total.append(1.0 if np.isnan(info.cost) else info.cost)
+            costs.append(np.mean(total))
+        return trials[int(np.argmin(costs))]
 
-def _body(preset: MarkerPreset, height_m: float) -> BodyModel:
-    return canton_body(height_m) if preset.body == "canton" else default_body(height_m)
-
-
-def _begin(seed, seen, frames, fps, preset, height_m, skin, room) -> tuple[int, BodyModel, BodyModel, np.ndarray]:
-    """The frame in which the first pose fits best, the body without and with markers, and the pose."""
-    heights = HEIGHTS_M if height_m is None else (height_m,)
-    best, least, others, tried, spacing = None, np.inf, 0, 0, max(1, round(START_S * fps / START_FRAMES))
-    k = 0
-    while k < len(frames) and tried < START_FRAMES:
-        points, agreeing = find_points(seen(frames[k]), room)
-        if len(points) < LEAST_POINTS:
-            k += 1
-            continue
-        for height in heights:
-            body = _body(preset, height)
-            markers = with_skin_markers(body) if skin else body
-            starts = start_poses(_rng(seed, frames[k], 3), markers, points, agreeing)
-            if starts and starts[0][1] < least:
-                least = starts[0][1]
-                worth_trying = [state for state, cost in starts[:TRIALS] if cost <= RIVAL_COST * least]
-                best = k, body, markers, worth_trying
-                others = left_over(markers, starts[0][0], points, agreeing)
-        tried += 1
-        k += spacing
-    if best is None:
-        raise InputError(
-            f"in no frame do {LEAST_POINTS} markers or more appear in enough views at places that agree; "
-            "check the detections and the calibration"
-        )
-    if others >= SOMEBODY_ELSE:
-        raise InputError(
-            f"more than one person seems to wear markers: in frame {frames[best[0]]}, {others} points that several views agree on are away "
-            "from the person that was found; this method follows one: give the detections of one person"
-        )
-    k, body, markers, states = best
-    return k, body, markers, _proved(seen, frames[k : k + TRIAL_FRAMES], make_marker_filter(markers, preset, fps), states)
-
-
-def _proved(seen, frames: Sequence[int], filt: MarkerFilter, states: list[np.ndarray]) -> np.ndarray:
-    """Of several first poses the one that the next frames bear out: a body the wrong way round fits one frame, but not a motion."""
-    if len(states) == 1:
-        return states[0]
-    costs = []
-    for state in states:
-        pose, total = pose_init(state), []
-        for frame in frames:
-            pose, info = marker_step(_rng(0, frame, 2), filt, pose, seen(frame))
-            total.append(1.0 if np.isnan(info.cost) else info.cost)
-        costs.append(np.mean(total))
-    return states[int(np.argmin(costs))]
+    def _learnt(self, frame_rng, seen, anchor: int, tracked: Tracked) -> Tracked:
+        """The same with the markers where the first frames show that they are worn."""
+        states, points, now = [], [], tracked
+        for k in range(anchor, min(anchor + LEARN_FRAMES, len(seen))):
+            if seen[k] is not None:
+                now, info = marker_frame(other_rng(frame_rng(k), LEARNING), now, seen[k], self.preset)
+                states.append(now.state)
+                points.append(info.points)
+        markers = fit_tips(tracked.subject.body, with_tips(tracked), np.array(states), np.array(points))
+        return replace(tracked, memory={**tracked.memory, TIPS: markers.tips})
 
 
-def _begun_anew(rng, filt: MarkerFilter, pose: PoseState, lost: int, seen: SeenMarkers, room) -> tuple[PoseState, int]:
-    if lost < LOST_FRAMES:
-        return pose, lost
-    starts = start_poses(rng, filt.body, *find_points(seen, room))
-    return (pose_init(starts[0][0]), 0) if starts else (pose, lost)
+def _points(seen: SeenMarkers | None, capture: Capture) -> tuple[np.ndarray, np.ndarray]:
+    """Points that several views agree on, and how many do."""
+    return (np.zeros((0, 3)), np.zeros(0, int)) if seen is None else find_points(seen, capture.room)
 
 
-def _limbs_told_apart(
-    frames: Sequence[int], fps: float, body: BodyModel, found: dict[int, tuple[PoseState, MarkerInfo]]
-) -> dict[int, tuple[PoseState, MarkerInfo]]:
-    """The same poses with limbs as the whole motion has them, where every frame offers several ways."""
-    choices = [found[k][1].choice for k in range(len(frames))]
-    ways = max((len(one.costs) for one in choices if one is not None), default=1)
-    # A frame that tells nothing has the same pose in all ways.
-    same = [LegChoice(np.repeat(found[k][0].state[None], ways, axis=0), np.zeros(ways)) for k in range(len(frames))]
-    known = [other if one is None or len(one.costs) < ways else one for one, other in zip(choices, same, strict=True)]
-    points = np.array([landmarks(body, one.states)[:, LIMBS] for one in known])
-    picks = choose_legs(np.array(frames), np.array([one.costs for one in known]), points, fps, TELLING_APART)
-    return {k: (replace(found[k][0], state=known[k].states[pick]), found[k][1]) for k, pick in enumerate(picks)}
+@dataclass(frozen=True)
+class MarkerRecovery:
+    """A pose that has been without markers for some frames is begun anew."""
+
+    def first(self, costs: np.ndarray) -> dict[str, np.ndarray]:
+        """Nothing is lost."""
+        return {_LOST: np.zeros(1)}
+
+    def __call__(self, rng: np.random.Generator, before: Tracked, stepped: Stepped, view: PersonView) -> Stepped:
+        """The step's pose, or a first one of this frame, from which the next goes on."""
+        tracked, info = stepped
+        lost = 0.0 if info.status == "fitted" else float(before.memory.get(_LOST, np.zeros(1))[0]) + 1
+        if lost >= LOST_FRAMES:
+            tracked, lost = _begun_anew(rng, tracked, view, lost)
+        return replace(tracked, memory={**tracked.memory, _LOST: np.array([lost])}), info
 
 
-def _people(frames: Sequence[int], body: BodyModel, found: dict[int, tuple[PoseState, MarkerInfo]]) -> PosedPeople:
-    states = np.array([found[k][0].state for k in range(len(frames))])
-    status = [found[k][1].status for k in range(len(frames))]
-    fitted = np.array([one == "fitted" for one in status])
-    positions = np.where(fitted[:, None, None], landmarks(body, states), np.nan)
-    numbers, persons = np.array(frames, int), np.zeros(len(frames), int)
-    notes = [
-        f"{n} frame{'s' if n > 1 else ''} without a pose: {why}"
-        for why, n in sorted(Counter(one for one in status if one != "fitted").items())
-    ]
-    return PosedPeople(
-        PoseTable(numbers, persons, positions),
-        PoseStates(numbers, persons, states, DOF_NAMES, {0: body.dimensions}),
-        np.where(fitted, [found[k][1].cost for k in range(len(frames))], np.nan),
-        tuple(notes),
+def _begun_anew(rng: np.random.Generator, tracked: Tracked, view: PersonView, lost: float) -> tuple[Tracked, float]:
+    points, views = _points(view.markers, tracked.subject.capture)
+    starts = start_poses(other_rng(rng, STARTING), with_tips(tracked), points, views)
+    if not starts:
+        return tracked, lost
+    tips = {name: values for name, values in tracked.memory.items() if name == TIPS}
+    return begin_tracking(tracked.subject, starts[0][0], memory=tips), 0.0
+
+
+def marker_method(preset: MarkerPreset, skin: bool = True) -> PoseMethod:
+    """The method of a preset.
+
+    Parameters
+    ----------
+    preset : MarkerPreset
+    skin : bool
+        As for `MarkerStart`.
+    """
+    return PoseMethod(
+        "marker-apf",
+        preset.source,
+        start=MarkerStart(preset, skin),
+        step=on_markers(preset),
+        needs=frozenset({"detections"}),
+        recover=MarkerRecovery(),
+        legs=TELLING_APART if preset.search else None,
+        limits=canton_limits() if preset.body == "canton" else default_limits(),
+        window_s=WINDOW_S,
+        gate_px=preset.likelihood.gate_px,
+        settings=preset,
     )

@@ -9,7 +9,7 @@ from hmc.body.model_file import read_hierarchy
 from hmc.body.scalable_models import MODEL_1, MODEL_2, UNITIVE_PIECES, Inclusive, Unitive
 from hmc.errors import InputError
 from hmc.pose.steps.hidden.limbs import LimbSettings
-from hmc.pose.steps.preset import PosePreset
+from hmc.pose.steps.presets import PosePreset
 
 __all__ = ["SCALABLE_METHODS", "method_preset"]
 

@@ -1,13 +1,33 @@
-"""Named parameters of the multi-cue descent."""
+"""Multi-cue descent: Kehl and Van Gool's tracker, and the same in the house's company. Kehl (2006)."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+
 from hmc.errors import InputError
+from hmc.pose.legs import LegSettings, TellLegs
+from hmc.pose.method import Capture, FrameRng, PoseMethod, Start, Started, make_subject, other_rng
 from hmc.pose.objectives.multicue import CueSettings
+from hmc.pose.recovery import Recovery
+from hmc.pose.starts.da_vinci import find_da_vinci
+from hmc.pose.starts.settle import FirstPose, begin
+from hmc.pose.starts.window import WindowStart
+from hmc.pose.steps.descent.step import descended, solid_subject, with_colors
 from hmc.pose.steps.descent.tracker import SmdPreset
+from hmc.pose.steps.polish import polished
+from hmc.pose.steps.presets import PosePreset, pose_preset
+from hmc.pose.steps.proposal import as_proposed
+from hmc.pose.views.person_view import PersonView
 from hmc.search.meta_descent import SmdSettings
 
-__all__ = ["SMD_PRESETS", "smd_preset"]
+__all__ = ["SMD_PRESETS", "DaVinciStart", "smd_method", "smd_preset"]
+
+#: Of the random numbers with which a first pose settles.
+SETTLING = 1
+NEEDS = frozenset({"hulls", "skin"})
+
 
 #: `kehl2006` has the paper's cues, counts and tolerances (section 7); `default` adds voxels that look for the body, and descends along
 #: axes taken from the curvature, which needs fewer iterations.
@@ -33,3 +53,64 @@ def smd_preset(name: str) -> SmdPreset:
     if name not in SMD_PRESETS:
         raise InputError(f"--preset {name}: of the method smd there are {', '.join(SMD_PRESETS)}")
     return SMD_PRESETS[name]
+
+
+@dataclass(frozen=True)
+class DaVinciStart:
+    """The paper's start: the first frame of the window in which somebody stands as da Vinci's man does (section 6.3).
+
+    Parameters
+    ----------
+    preset : SmdPreset
+    otherwise : Start
+        Where nobody does.
+    """
+
+    preset: SmdPreset
+    otherwise: Start = field(default_factory=lambda: WindowStart(replace(pose_preset("default"), start="spectral")))
+
+    def __call__(self, frame_rng: FrameRng, views: Sequence[PersonView], capture: Capture, height_m: float | None = None) -> Started | None:
+        """The body and the first pose; without da Vinci's, the waist of what is found is taken into the trunk, as the body has none."""
+        for k, view in enumerate(views):
+            spread = None if view.skin is None else find_da_vinci(view.skin.points, capture.voxel_size_m, capture.floor_z, height_m)
+            if spread is None:
+                continue
+            first = FirstPose(k, spread.body, spread.state)
+            seen, targets = [one.skin for one in views], [one.target for one in views]
+            tracker, settled = begin(other_rng(frame_rng(k), SETTLING), self.preset, first, seen, targets, height_m is not None)
+            return Started(make_subject(tracker.body.skeleton, capture), k, settled.state, with_colors(settled.colors))
+        started = self.otherwise(frame_rng, views, capture, height_m)
+        if started is None:
+            return None
+        state = started.state.copy()
+        state[3] += 0.5 * state[8]  # half of the waist's twist: hips and shoulders are off by as much
+        state[6:9] = 0.0
+        return replace(started, state=state)
+
+
+def smd_method(preset: SmdPreset, house: PosePreset | None = None) -> PoseMethod:
+    """The descent as the paper has it, or with the house's start, refinement, search, recovery and legs.
+
+    Parameters
+    ----------
+    preset : SmdPreset
+    house : PosePreset, optional
+        Whose start and refinement are used; the paper's method alone where left out.
+    """
+    equip = partial(solid_subject, preset=preset)
+    if house is None:
+        return PoseMethod(
+            "smd", "Kehl and Van Gool (2006)", DaVinciStart(preset), as_proposed(descended()), NEEDS, equip, settings={"descent": preset}
+        )
+    return PoseMethod(
+        "smd",
+        "Kehl and Van Gool (2006), section 6; start, refinement, search and recovery are the house's",
+        start=WindowStart(house),
+        step=polished(descended(), house.polish),
+        needs=NEEDS,
+        equip=equip,
+        recover=Recovery(house),
+        choose=TellLegs(house.polish),
+        legs=LegSettings(),
+        settings={"descent": preset, "house": house},
+    )

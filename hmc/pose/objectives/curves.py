@@ -17,7 +17,7 @@ from hmc.pose.spectral.volume import BodyVolume
 
 __all__ = [
     "MODEL_PARTS",
-    "Observed",
+    "SampledCurves",
     "best_assignments",
     "curves_near",
     "curves_of",
@@ -37,7 +37,7 @@ LEAST_SHARE = 0.3
 
 
 @dataclass(frozen=True)
-class Observed:
+class SampledCurves:
     """Curves to which a model is fitted.
 
     Parameters
@@ -63,13 +63,13 @@ class Observed:
     choices: np.ndarray
     volume: BodyVolume | None = None
 
-    def only(self, names: tuple[str, ...]) -> Observed:
+    def only(self, names: tuple[str, ...]) -> SampledCurves:
         """Some of the curves, without the voxels: those are of the whole body."""
         rows = [k for k, name in enumerate(self.names) if name in names]
         kept = np.flatnonzero(np.isin(self.pairs[:, 0], rows))
         pairs = np.stack([np.searchsorted(rows, self.pairs[kept, 0]), self.pairs[kept, 1]], axis=1)
         choices = np.unique(np.searchsorted(kept, self.choices[:, rows]), axis=0)
-        return Observed(tuple(self.names[k] for k in rows), self.nodes[rows], pairs, self.blends[kept], choices)
+        return SampledCurves(tuple(self.names[k] for k in rows), self.nodes[rows], pairs, self.blends[kept], choices)
 
     def parts_of(self, choice: int) -> dict[str, str]:
         """The part of the model that each curve is in an assignment."""
@@ -83,7 +83,7 @@ def observe_curves(
     named: bool = True,
     from_tip: bool = True,
     volume: BodyVolume | None = None,
-) -> Observed:
+) -> SampledCurves:
     """Sample the curves, and say which nodes of the model theirs correspond to.
 
     Parameters
@@ -117,7 +117,7 @@ def observe_curves(
             joint = joints[pairs[q, 1]]
             lower, upper = np.clip((at - joint) / (1 - joint), 0, 1), np.clip(at / joint, 0, 1)
             blends[q] = np.stack([1 - upper, upper - lower, lower], axis=1)
-    return Observed(names, nodes, pairs, blends, best_assignments(pairs, allowed), volume)
+    return SampledCurves(names, nodes, pairs, blends, best_assignments(pairs, allowed), volume)
 
 
 def curves_of(reading: BodyReading) -> dict[str, np.ndarray]:
@@ -178,7 +178,7 @@ def best_assignments(pairs: np.ndarray, allowed: tuple[tuple[int, ...], ...]) ->
     return np.array(found, int).reshape(-1, len(allowed))
 
 
-def pair_errors(chains: np.ndarray, observed: Observed) -> np.ndarray:
+def pair_errors(chains: np.ndarray, observed: SampledCurves) -> np.ndarray:
     """Eq. 3-27 for every pair, divided by the number of nodes: mean distance of corresponding nodes, metres, shape (n, q).
 
     A curve's nodes correspond in the order in which the sum is smaller; those of limbs are known to begin at the trunk.
@@ -187,7 +187,7 @@ def pair_errors(chains: np.ndarray, observed: Observed) -> np.ndarray:
     ----------
     chains : ndarray, shape (n, 6, 3, 3)
         As from `hmc.body.spin_skeleton.part_chains`.
-    observed : Observed
+    observed : SampledCurves
     """
     points = observed.blends @ chains[:, observed.pairs[:, 1]]
     nodes = observed.nodes[observed.pairs[:, 0]]
@@ -196,14 +196,14 @@ def pair_errors(chains: np.ndarray, observed: Observed) -> np.ndarray:
     return np.minimum(same, turned)
 
 
-def skeleton_error(model: SkeletonModel, states: np.ndarray, observed: Observed) -> tuple[np.ndarray, np.ndarray]:
+def skeleton_error(model: SkeletonModel, states: np.ndarray, observed: SampledCurves) -> tuple[np.ndarray, np.ndarray]:
     """Error of states under the best one-to-one assignment.
 
     Parameters
     ----------
     model : SkeletonModel
     states : ndarray, shape (n, 23)
-    observed : Observed
+    observed : SampledCurves
 
     Returns
     -------
@@ -215,7 +215,7 @@ def skeleton_error(model: SkeletonModel, states: np.ndarray, observed: Observed)
     return error_of_chains(part_chains(*segment_ends(model, states)), observed)
 
 
-def error_of_chains(chains: np.ndarray, observed: Observed, bound_m: float | None = None) -> tuple[np.ndarray, np.ndarray]:
+def error_of_chains(chains: np.ndarray, observed: SampledCurves, bound_m: float | None = None) -> tuple[np.ndarray, np.ndarray]:
     """`skeleton_error` of chains (n, 6, 3, 3), and where given no curve's error counts as more than a bound, metres.
 
     So a curve that is of no part draws nothing far.

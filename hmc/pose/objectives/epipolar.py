@@ -5,22 +5,18 @@ The epipolar distance of every two detections of two views is computed once a fr
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from hmc.camera.epipolar import fundamental_matrices, symmetric_epipolar_distance
-from hmc.camera.model import Rig
 from hmc.errors import InputError
 from hmc.pose.objectives.nearest_detections import nearest_detections
+from hmc.pose.views.markers import FARTHEST_PX, MarkerViews, SeenMarkers
 
-__all__ = ["MarkerLikelihood", "MarkerViews", "SeenMarkers", "marker_cost", "marker_views", "observe_markers", "project_markers"]
+__all__ = ["MarkerLikelihood", "marker_cost", "project_markers"]
 
 #: What is nearer to a camera than this has no image, metres.
 NEAR_M = 0.05
-#: Epipolar distances above this are all alike, pixels; their squares must not overflow.
-FARTHEST_PX = 1e4
 
 
 @dataclass(frozen=True)
@@ -50,88 +46,6 @@ class MarkerLikelihood:
     def __post_init__(self) -> None:
         if not self.gate_px > 0 or not self.sigma > 0 or not 0 <= self.reprojection <= 1:
             raise InputError(f"`gate_px` and `sigma` must be above 0 and `reprojection` in [0, 1]; got {self}")
-
-
-@dataclass(frozen=True)
-class MarkerViews:
-    """What the likelihood needs of the rig; the same in all frames.
-
-    Parameters
-    ----------
-    projections : ndarray, shape (n_views, 3, 4)
-        World to undistorted pixels, homogeneous.
-    fundamentals : ndarray, shape (n_views, n_views, 3, 3)
-    """
-
-    projections: np.ndarray
-    fundamentals: np.ndarray
-
-
-@dataclass(frozen=True)
-class SeenMarkers:
-    """The detections of one frame in all views, in the form that is looked up.
-
-    Parameters
-    ----------
-    views : MarkerViews
-    detections : tuple of ndarray, shape (n, 2)
-        Undistorted pixels, one array a view.
-    gate_px : float
-    stride : int
-        Places a view has for detections; the last one always stands for none.
-    uv : ndarray of float32, shape (2, n_views, stride)
-        Detections; infinite after a view's last one.
-    pairs : ndarray of float32, shape (n_pairs, stride, stride)
-        Squared symmetric epipolar distances between the detections of views i < j, pairs in the order of ``np.triu_indices``; 0 with none.
-    """
-
-    views: MarkerViews
-    detections: tuple[np.ndarray, ...]
-    gate_px: float
-    stride: int
-    uv: np.ndarray
-    pairs: np.ndarray
-
-
-def marker_views(rig: Rig) -> MarkerViews:
-    """Projections and fundamental matrices of a rig.
-
-    Raises
-    ------
-    InputError
-        When the rig has fewer than two cameras.
-    """
-    if len(rig) < 2:
-        raise InputError("markers need two cameras at least: one view does not tell how far away they are")
-    lenses = np.array([camera.matrix for camera in rig])
-    outside = np.array([np.column_stack([camera.rotation, camera.translation]) for camera in rig])
-    return MarkerViews(lenses @ outside, fundamental_matrices(rig))
-
-
-def observe_markers(views: MarkerViews, detections: Sequence[np.ndarray], gate_px: float) -> SeenMarkers:
-    """Prepare one frame's detections for the likelihood.
-
-    Parameters
-    ----------
-    views : MarkerViews
-    detections : sequence of ndarray, shape (n, 2)
-        Undistorted pixels (`hmc.camera.epipolar.undistorted_pixels`), one array a view; an empty one where nothing was seen.
-    gate_px : float
-
-    Returns
-    -------
-    SeenMarkers
-    """
-    detections = tuple(np.asarray(points, float).reshape(-1, 2) for points in detections)
-    stride = max(len(points) for points in detections) + 1
-    uv = np.full((len(detections), stride, 2), np.nan)
-    for view, points in enumerate(detections):
-        uv[view, : len(points)] = points
-    i, j = np.triu_indices(len(detections), 1)
-    squared = symmetric_epipolar_distance(views.fundamentals[i, j][:, None, None], uv[i][:, :, None], uv[j][:, None, :]) ** 2
-    pairs = np.where(np.isnan(squared), 0, np.minimum(squared, FARTHEST_PX**2)).astype(np.float32)
-    flat = np.where(np.isnan(uv), np.inf, uv).transpose(2, 0, 1).astype(np.float32)
-    return SeenMarkers(views, detections, gate_px, stride, flat, pairs)
 
 
 def project_markers(views: MarkerViews, points: np.ndarray) -> np.ndarray:

@@ -20,9 +20,8 @@ from scipy import ndimage
 
 from hmc.body.flesh import FleshTable
 from hmc.body.joints import SEGMENTS
-from hmc.body.kinematics import segment_transforms
+from hmc.body.kinematics import place_segments, segment_transforms
 from hmc.body.model import PARTS, BodyModel
-from hmc.body.placing import place_segments
 from hmc.pose.objectives.overlap import OverlapTable, make_overlap_table, quick_overlap
 from hmc.pose.objectives.overlap_exact import exact_overlap
 from hmc.voxels.grid import VoxelGrid

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hmc.camera.epipolar import symmetric_epipolar_distance
-from hmc.pose.objectives.epipolar import SeenMarkers
+from hmc.pose.views.markers import SeenMarkers
 
 __all__ = ["find_points", "least_views", "matched_points", "triangulate"]
 

@@ -75,7 +75,7 @@ def quick_overlap(table: OverlapTable, placed: np.ndarray) -> np.ndarray:
     ----------
     table : OverlapTable
     placed : ndarray of float32, shape (11, 3, 4, n)
-        From `hmc.body.placing.place_segments`.
+        From `hmc.body.kinematics.place_segments`.
 
     Returns
     -------

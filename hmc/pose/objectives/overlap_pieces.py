@@ -202,7 +202,7 @@ def place_pieces(pieces: Pieces, placed: np.ndarray) -> np.ndarray:
     ----------
     pieces : Pieces
     placed : ndarray of float32, shape (11, 3, 4, n)
-        From `hmc.body.placing.place_segments`.
+        From `hmc.body.kinematics.place_segments`.
 
     Returns
     -------

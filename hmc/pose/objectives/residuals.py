@@ -9,21 +9,25 @@ the flesh as round and straight near each point.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hmc.body.cone_maps import ConeMaps, cone_maps
+from hmc.body.cones import places_and_directions
 from hmc.body.floor import above_floor, lowest_support
 from hmc.body.joints import N_DOF
 from hmc.body.kinematics import dof_masks, joint_twists
-from hmc.body.model import BodyModel
 from hmc.body.nearest_cone import Candidates, Nearest, candidates, nearest_cones, towards
 from hmc.body.penetration import penetration_rows
 from hmc.body.prior import POSTURE, posture_spread
-from hmc.pose.objectives.symmetric import BodyPoints, SymmetricSettings
-from hmc.pose.views.hull_target import HullTarget, distance_gradient
+from hmc.pose.objectives.objective import Objective, Unexplained
+from hmc.pose.views.hull_target import distance_gradient
 
-__all__ = ["Distances", "distances", "pulls", "residual_rows", "residual_values"]
+if TYPE_CHECKING:
+    from hmc.pose.objectives.symmetric import Symmetric
+
+__all__ = ["Distances", "distances", "residual_rows"]
 
 #: Which degrees of freedom move each segment, and last the world.
 _MASKS = np.concatenate([dof_masks().astype(float), np.zeros((1, N_DOF))])
@@ -59,6 +63,8 @@ class Distances:
         As from `lowest_support`; empty where there is no floor.
     spread : ndarray, shape (27,)
         Of the posture (`posture_spread`), radians.
+    objective : Symmetric
+        Of which these are the distances.
     """
 
     residuals: np.ndarray
@@ -78,34 +84,42 @@ class Distances:
     other: np.ndarray
     floor: tuple[np.ndarray, np.ndarray, np.ndarray]
     spread: np.ndarray
+    objective: Symmetric
+
+    @property
+    def near(self) -> Candidates:
+        """What speeds up the next call."""
+        return self.pairs
+
+    @property
+    def unexplained(self) -> Unexplained:
+        """Body outside of the hulls, and hull points and rays that no part of the body explains."""
+        places, _ = places_and_directions(self.objective.asked)
+        return Unexplained(self.outside, self.objective.points.surface.part, places, self.nearest.distance)
+
+    def pulls(self) -> tuple[np.ndarray, np.ndarray]:
+        """Which residuals change with the state, ndarray of int, shape (m,), and how, shape (m, 27)."""
+        return _pulls(self)
 
 
-def distances(
-    body: BodyModel,
-    samples: BodyPoints,
-    state: np.ndarray,
-    target: HullTarget,
-    hull_points: np.ndarray,
-    settings: SymmetricSettings,
-    before: Candidates | None = None,
-) -> Distances:
+def distances(objective: Symmetric, state: np.ndarray, before: Candidates | None = None) -> Distances:
     """The distances of one state.
 
     Parameters
     ----------
-    body, samples, target, hull_points, settings
-        As for `hmc.pose.objectives.symmetric.symmetric_cost`.
+    objective : Symmetric
     state : ndarray, shape (27,)
     before : Candidates, optional
         Of a pose near this one.
     """
+    body, samples, target, settings = objective.body, objective.points, objective.target, objective.settings
     axes, centres, rotations, positions = joint_twists(body, state)
     maps = cone_maps(body.cones, np.concatenate([rotations, positions[..., None]], axis=-1)[..., None])
     carrier = samples.surface.segment
     points = np.einsum("nij,nj->ni", rotations.take(carrier, axis=0), samples.surface.points)
     points += positions.take(carrier, axis=0)
     outside, slope = distance_gradient(target, points)
-    pairs = candidates(body.cones, maps, hull_points, settings.cap_m, before)
+    pairs = candidates(body.cones, maps, objective.asked, settings.cap_m, before)
     nearest = nearest_cones(body.cones, maps, pairs)
     depth, outward, axis_points, segment, other = penetration_rows(body, samples.axes, rotations, positions, maps)
     gap, floor = np.zeros(0), (np.zeros(0), np.zeros((0, 3)), np.zeros(0, int))
@@ -124,24 +138,12 @@ def distances(
     ]
     return Distances(
         np.concatenate(residuals), weights, axes, centres, maps, pairs, points, slope, outside, nearest, depth, outward, axis_points,
-        segment, other, floor, spread,
+        segment, other, floor, spread, objective,
     )  # fmt: skip
 
 
-def pulls(body: BodyModel, samples: BodyPoints, found: Distances, settings: SymmetricSettings) -> tuple[np.ndarray, np.ndarray]:
-    """Which residuals change with the state, and how.
-
-    Parameters
-    ----------
-    body, samples, settings
-        Those of the distances.
-    found : Distances
-
-    Returns
-    -------
-    rows : ndarray of int, shape (m,)
-    jacobian : ndarray, shape (m, 27)
-    """
+def _pulls(found: Distances) -> tuple[np.ndarray, np.ndarray]:
+    body, samples, settings = found.objective.body, found.objective.points, found.objective.settings
     n_outside, n_explain = len(found.outside), len(found.nearest.distance)
     out = np.flatnonzero((found.outside > 0) & (found.outside < settings.cap_m))
     pulled = found.nearest.distance[found.nearest.pulls]
@@ -181,20 +183,12 @@ def pulls(body: BodyModel, samples: BodyPoints, found: Distances, settings: Symm
     return np.concatenate([*rows, len(found.residuals) - N_DOF + np.arange(N_DOF)]), jacobian
 
 
-def residual_rows(
-    body: BodyModel,
-    samples: BodyPoints,
-    state: np.ndarray,
-    target: HullTarget,
-    hull_points: np.ndarray,
-    settings: SymmetricSettings,
-) -> tuple[np.ndarray, np.ndarray]:
-    """The symmetric cost at one state as weighted residuals, and how they change with the state.
+def residual_rows(objective: Objective, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """An objective at one state as weighted residuals, and how all of them change with the state.
 
     Parameters
     ----------
-    body, samples, target, hull_points, settings
-        As for `hmc.pose.objectives.symmetric.symmetric_cost`.
+    objective : Objective
     state : ndarray, shape (27,)
 
     Returns
@@ -204,23 +198,11 @@ def residual_rows(
     jacobian : ndarray, shape (n_residuals, 27)
         Zero where a distance is zero or beyond the cap.
     """
-    found = distances(body, samples, state, target, hull_points, settings)
-    pulled, rows = pulls(body, samples, found, settings)
+    found = objective.linearise(state)
+    pulled, rows = found.pulls()
     jacobian = np.zeros((len(found.residuals), N_DOF))
     jacobian[pulled] = rows
     return found.residuals, jacobian
-
-
-def residual_values(
-    body: BodyModel,
-    samples: BodyPoints,
-    state: np.ndarray,
-    target: HullTarget,
-    hull_points: np.ndarray,
-    settings: SymmetricSettings,
-) -> np.ndarray:
-    """The residuals of `residual_rows` alone, at less of the work."""
-    return distances(body, samples, state, target, hull_points, settings).residuals
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ strict hull (every camera agrees). The tolerant hull (one camera may miss) is wh
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -15,21 +15,22 @@ from hmc.body.cone_maps import ConeMaps, cone_maps, cones_near
 from hmc.body.cones import cone_shapes, places_and_directions, slide_to_axis, squared_distance
 from hmc.body.flesh import SurfaceSamples, surface_samples
 from hmc.body.floor import floor_gap
+from hmc.body.kinematics import place_segments
 from hmc.body.model import PART_OF_DOF, PART_OF_SEGMENT, PARTS, BodyModel, Cones
+from hmc.body.nearest_cone import Candidates
 from hmc.body.penetration import AxisPoints, axis_points, depths_placed
-from hmc.body.placing import place_segments
 from hmc.body.prior import POSTURE, posture_spread
 from hmc.errors import InputError
-from hmc.pose.views.hull_target import HullTarget, distance_at
+from hmc.pose.objectives.residuals import Distances, distances
+from hmc.pose.views.hull_target import HullTarget, distance_at, sample_points
 
 __all__ = [
     "BodyPoints",
+    "Symmetric",
     "SymmetricSettings",
     "body_distance",
     "body_points",
     "outside_distance",
-    "symmetric_cost",
-    "symmetric_cost_by_part",
     "thinned",
 ]
 
@@ -204,97 +205,108 @@ def _to_body(
     return np.sqrt(out, out=out)
 
 
-def symmetric_cost(
-    body: BodyModel,
-    points: BodyPoints,
-    states: np.ndarray,
-    target: HullTarget,
-    hull_points: np.ndarray,
-    settings: SymmetricSettings,
-) -> np.ndarray:
-    """Mean squared distance of body from hulls, of silhouettes and hull from the body, depth of its parts in one another, and posture.
+@dataclass(frozen=True)
+class Symmetric:
+    """The symmetric cost of poses in one frame: an objective (`hmc.pose.objectives.objective.Objective`).
 
     Parameters
     ----------
     body : BodyModel
     points : BodyPoints
-    states : ndarray, shape (n, 27)
+        Of the body.
     target : HullTarget
-    hull_points : ndarray, shape (k, 3) or (k, 6)
+    asked : ndarray, shape (k, 3) or (k, 6)
         What has to be explained (`hmc.pose.views.rays.points_to_explain`).
     settings : SymmetricSettings
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        Square metres.
+    asked_part : ndarray of int, shape (k,), optional
+        The part that is asked to explain each of `asked`; without it costs cannot be told by part.
     """
-    outside, unexplained, _, depth, gap, posture = _terms(body, points, states, target, hull_points, settings)
-    return (
-        gap
-        + np.einsum("ij,ij->j", outside, outside) / len(outside)
-        + settings.explain_weight / len(hull_points) * np.einsum("ij,ij->j", unexplained, unexplained)
-        + settings.overlap_weight / len(depth) * np.einsum("ij,ij->j", depth, depth)
-        + posture.sum(axis=1)
-    )
 
+    body: BodyModel
+    points: BodyPoints
+    target: HullTarget
+    asked: np.ndarray
+    settings: SymmetricSettings = field(default_factory=SymmetricSettings)
+    asked_part: np.ndarray | None = None
 
-def symmetric_cost_by_part(
-    body: BodyModel,
-    points: BodyPoints,
-    states: np.ndarray,
-    target: HullTarget,
-    hull_points: np.ndarray,
-    hull_part: np.ndarray,
-    settings: SymmetricSettings,
-) -> np.ndarray:
-    """`symmetric_cost`, each part's own share of it.
+    def cost(self, states: np.ndarray) -> np.ndarray:
+        """Mean squared distance of body from hulls, of silhouettes and hull from the body, depth of its parts in one another, and posture.
 
-    Parameters
-    ----------
-    body, points, states, target, hull_points, settings
-        As of `symmetric_cost`.
-    hull_part : ndarray of int, shape (k,)
-        The part that is asked to explain each of `hull_points`.
+        Parameters
+        ----------
+        states : ndarray, shape (n, 27)
 
-    Returns
-    -------
-    ndarray, shape (n, n_parts)
-        Square metres; standing on the floor is the torso's share.
-    """
-    outside, unexplained, asking, depth, gap, posture = _terms(body, points, states, target, hull_points, settings)
-    columns = np.eye(len(PARTS), dtype=outside.dtype)
-    cost = posture @ columns[PART_OF_DOF]
-    for values, part, weight in (
-        (outside, points.surface.part, 1 / len(outside)),
-        (unexplained, hull_part[asking], settings.explain_weight / len(hull_points)),
-        (depth, PART_OF_SEGMENT[points.axes.segment], settings.overlap_weight / len(depth)),
-    ):
-        cost += weight * (values**2).T @ columns[part]
-    cost[:, 0] += gap
-    return cost
+        Returns
+        -------
+        ndarray, shape (n,)
+            Square metres.
+        """
+        settings = self.settings
+        outside, unexplained, _, depth, gap, posture = self._terms(states)
+        return (
+            gap
+            + np.einsum("ij,ij->j", outside, outside) / len(outside)
+            + settings.explain_weight / len(self.asked) * np.einsum("ij,ij->j", unexplained, unexplained)
+            + settings.overlap_weight / len(depth) * np.einsum("ij,ij->j", depth, depth)
+            + posture.sum(axis=1)
+        )
 
+    def by_part(self, states: np.ndarray) -> np.ndarray | None:
+        """`cost`, each part's own share of it.
 
-def _terms(body, points, states, target, hull_points, settings) -> tuple[np.ndarray, ...]:
-    """What the cost is made of.
+        Parameters
+        ----------
+        states : ndarray, shape (n, 27)
 
-    Metres, each of shape (., n): distances of body from hulls; of silhouettes from the body, of places that are not in it in every
-    state, and which these are; depths. Square metres: the cost of hanging in the air, shape (n,), and of each angle, shape (n, 27).
-    """
-    cap = np.float32(settings.cap_m)
-    places, directions = places_and_directions(hull_points)
-    origin = places.mean(axis=0)
-    placed = place_segments(body, states, origin)
-    maps = cone_maps(body.cones, placed)
-    outside = np.minimum(_outside(points.surface, placed, target, origin), cap)
-    near, held = cones_near(body.cones, maps, places - origin, settings.cap_m, directions)
-    asking = np.flatnonzero(~held)
-    unexplained = _to_body(body.cones, maps, (places - origin)[asking], None if directions is None else directions[asking], near[:, asking])
-    unexplained = np.minimum(unexplained, cap)
-    depth = depths_placed(body, points.axes, placed, maps)
-    gap = np.zeros(len(states))
-    if target.floor_z is not None:
-        rotations, positions = np.moveaxis(placed[:, :, :3], -1, 0), np.moveaxis(placed[:, :, 3], -1, 0)
-        gap = floor_gap(body, rotations, positions, target.floor_z - origin[2])
-    posture = settings.posture_weight * ((states - POSTURE[0]) / posture_spread(states)) ** 2
-    return outside, unexplained, asking, depth, settings.floor_weight * gap**2, posture
+        Returns
+        -------
+        ndarray, shape (n, n_parts), or None
+            Square metres; standing on the floor is the torso's share. None without `asked_part`.
+        """
+        if self.asked_part is None:
+            return None
+        settings = self.settings
+        outside, unexplained, asking, depth, gap, posture = self._terms(states)
+        columns = np.eye(len(PARTS), dtype=outside.dtype)
+        cost = posture @ columns[PART_OF_DOF]
+        for values, part, weight in (
+            (outside, self.points.surface.part, 1 / len(outside)),
+            (unexplained, self.asked_part[asking], settings.explain_weight / len(self.asked)),
+            (depth, PART_OF_SEGMENT[self.points.axes.segment], settings.overlap_weight / len(depth)),
+        ):
+            cost += weight * (values**2).T @ columns[part]
+        cost[:, 0] += gap
+        return cost
+
+    def linearise(self, state: np.ndarray, near: Candidates | None = None) -> Distances:
+        """Residuals at one state (27,); `near` are the candidates of a state near it."""
+        return distances(self, state, near)
+
+    def coarser(self, rng: np.random.Generator, n: int) -> Symmetric:
+        """The same with about `n` of what has to be explained."""
+        return replace(self, asked=sample_points(rng, self.asked, n), asked_part=None)
+
+    def _terms(self, states: np.ndarray) -> tuple[np.ndarray, ...]:
+        """What the cost is made of.
+
+        Metres, each of shape (., n): distances of body from hulls; of silhouettes from the body, of places that are not in it in every
+        state, and which these are; depths. Square metres: the cost of hanging in the air, shape (n,), and of each angle, shape (n, 27).
+        """
+        body, settings = self.body, self.settings
+        cap = np.float32(settings.cap_m)
+        places, directions = places_and_directions(self.asked)
+        origin = places.mean(axis=0)
+        placed = place_segments(body, states, origin)
+        maps = cone_maps(body.cones, placed)
+        outside = np.minimum(_outside(self.points.surface, placed, self.target, origin), cap)
+        near, held = cones_near(body.cones, maps, places - origin, settings.cap_m, directions)
+        asking = np.flatnonzero(~held)
+        along = None if directions is None else directions[asking]
+        unexplained = np.minimum(_to_body(body.cones, maps, (places - origin)[asking], along, near[:, asking]), cap)
+        depth = depths_placed(body, self.points.axes, placed, maps)
+        gap = np.zeros(len(states))
+        if self.target.floor_z is not None:
+            rotations, positions = np.moveaxis(placed[:, :, :3], -1, 0), np.moveaxis(placed[:, :, 3], -1, 0)
+            gap = floor_gap(body, rotations, positions, self.target.floor_z - origin[2])
+        posture = settings.posture_weight * ((states - POSTURE[0]) / posture_spread(states)) ** 2
+        return outside, unexplained, asking, depth, settings.floor_weight * gap**2, posture

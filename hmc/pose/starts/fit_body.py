@@ -9,44 +9,20 @@ work grows linearly with the frames.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from hmc.body.dimensions import FITTED, GIRTHS, LENGTHS, FitBodySettings, reshaped
 from hmc.body.joints import N_DOF
 from hmc.body.model import BodyModel
-from hmc.body.proportions import make_body
-from hmc.pose.objectives.residuals import residual_rows, residual_values
-from hmc.pose.objectives.symmetric import SymmetricSettings, body_points
-from hmc.pose.views.hull_target import HullTarget
+from hmc.pose.objectives.residuals import residual_rows
+from hmc.pose.objectives.symmetric import Symmetric, body_points
 from hmc.search.gauss_newton import damped, movable
 
-__all__ = ["FitBodyInfo", "FitBodySettings", "fit_body"]
+__all__ = ["FitBodyInfo", "fit_body"]
 
 Coordinates = tuple[np.ndarray, np.ndarray, np.ndarray]
-
-
-@dataclass(frozen=True)
-class FitBodySettings:
-    """How a body is fitted.
-
-    Parameters
-    ----------
-    iterations : int
-        Gauss-Newton steps.
-    scale_deviation : float
-        Prior deviation of the common scale's logarithm: how far the stature may be off.
-    length_deviation, girth_deviation : float
-        Prior deviations of the logarithms of single lengths and girths, from what they are at the common scale.
-    prior_weight : float
-        Square metres that one prior deviation in one dimension costs.
-    """
-
-    iterations: int = 8
-    scale_deviation: float = 0.04
-    length_deviation: float = 0.07
-    girth_deviation: float = 0.20
-    prior_weight: float = 4e-6
 
 
 @dataclass(frozen=True)
@@ -58,34 +34,19 @@ class FitBodyInfo:
     accepted: bool
 
 
-#: Fitted dimensions. Hand, foot and ankle height only follow the common scale: hulls show them badly.
-_LENGTHS = ("trunk", "head", "shoulder_half_width", "shoulder_drop", "hip_half_width", "upper_arm", "forearm", "thigh", "shank")
-_GIRTHS = ("girth_torso", "girth_depth", "girth_head", "girth_arms", "girth_thighs", "girth_shanks")
-_FITTED = ("height", *_LENGTHS, *_GIRTHS)
-
-
 def fit_body(
-    body: BodyModel,
-    coordinates: Coordinates,
-    states: np.ndarray,
-    targets: Sequence[HullTarget],
-    hull_points: Sequence[np.ndarray],
-    cost_settings: SymmetricSettings,
-    settings: FitBodySettings,
+    objectives: Sequence[Symmetric], states: np.ndarray, coordinates: Coordinates, settings: FitBodySettings
 ) -> tuple[BodyModel, np.ndarray, FitBodyInfo]:
-    """Fit one person's dimensions to several frames.
+    """One person's body with dimensions fitted to several frames.
 
     Parameters
     ----------
-    body : BodyModel
-        Start and centre of the prior.
-    coordinates : tuple of ndarray
-        Where the surface is sampled (`hmc.body.flesh.surface_coordinates`).
+    objectives : sequence of Symmetric
+        One a frame, all of one body: the start and the centre of the prior.
     states : ndarray, shape (n_frames, 27)
         Poses to start from.
-    targets, hull_points : sequence
-        One a frame.
-    cost_settings : SymmetricSettings
+    coordinates : tuple of ndarray
+        Where the surface is sampled (`hmc.body.flesh.surface_coordinates`).
     settings : FitBodySettings
 
     Returns
@@ -94,30 +55,32 @@ def fit_body(
     states : ndarray, shape (n_frames, 27)
     info : FitBodyInfo
     """
+    body = objectives[0].body
     low, high = body.limits.low, body.limits.high
     hold = 4e-6 / np.r_[np.full(3, 0.1), np.full(N_DOF - 3, 0.5)] ** 2
     precision = settings.prior_weight / np.array(
-        [settings.scale_deviation**2] + [settings.length_deviation**2] * len(_LENGTHS) + [settings.girth_deviation**2] * len(_GIRTHS)
+        [settings.scale_deviation**2] + [settings.length_deviation**2] * len(LENGTHS) + [settings.girth_deviation**2] * len(GIRTHS)
     )
     anchors = states = np.clip(states, low, high)
-    shape = np.zeros(len(_FITTED))
+    shape = np.zeros(len(FITTED))
+
+    def with_shape(shape: np.ndarray) -> list[Symmetric]:
+        other = reshaped(body, shape)
+        samples = body_points(other, coordinates)
+        return [replace(one, body=other, points=samples) for one in objectives]
 
     def rows(shape, states):
-        bodies = [_reshaped(body, shape)]
         step = 0.01
-        bodies += [_reshaped(body, shape + step * unit) for unit in np.eye(len(shape))]
-        surfaces = [body_points(one, coordinates) for one in bodies]
+        here, beside = with_shape(shape), [with_shape(shape + step * unit) for unit in np.eye(len(shape))]
         out = []
-        for state, target, points in zip(states, targets, hull_points, strict=True):
-            residual, jacobian = residual_rows(bodies[0], surfaces[0], state, target, points, cost_settings)
-            by_shape = [residual_values(b, s, state, target, points, cost_settings) for b, s in zip(bodies[1:], surfaces[1:], strict=True)]
+        for k, state in enumerate(states):
+            residual, jacobian = residual_rows(here[k], state)
+            by_shape = [other[k].linearise(state).residuals for other in beside]
             out.append((residual, jacobian, (np.array(by_shape).T - residual[:, None]) / step))
         return out
 
     def costs(shape, states):
-        one = _reshaped(body, shape)
-        samples = body_points(one, coordinates)
-        data = [residual_values(one, samples, s, t, p, cost_settings) for s, t, p in zip(states, targets, hull_points, strict=True)]
+        data = [one.linearise(state).residuals for one, state in zip(with_shape(shape), states, strict=True)]
         fit = sum(float(r @ r) for r in data)
         total = fit + float((hold * (states - anchors) ** 2).sum()) + len(states) * float(precision @ shape**2)
         return total, fit / len(states)
@@ -139,20 +102,7 @@ def fit_body(
         damping = max(0.3 * damping, 1e-3)
         if gain < 3e-3:
             break
-    return _reshaped(body, shape), states, FitBodyInfo(before, after, True)
-
-
-def _reshaped(body: BodyModel, shape: np.ndarray) -> BodyModel:
-    factors = dict(zip(_FITTED, np.exp(shape), strict=True))
-    dimensions = {}
-    for name, value in body.dimensions.items():
-        if name.startswith("girth_"):
-            dimensions[name] = value * factors[name]
-        elif name == "height":
-            dimensions[name] = value * factors["height"]
-        else:
-            dimensions[name] = value * factors["height"] * factors.get(name, 1.0)
-    return make_body(dimensions, body.limits)
+    return reshaped(body, shape), states, FitBodyInfo(before, after, True)
 
 
 def _gauss_newton(frames, shape, states, anchors, hold, precision, damping, low, high):

@@ -7,14 +7,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from hmc.body.dimensions import FitBodySettings
 from hmc.body.flesh import surface_coordinates
 from hmc.body.model import BodyModel
-from hmc.pose.starts.fit_body import FitBodySettings, fit_body
+from hmc.pose.method import Capture, make_subject
+from hmc.pose.starts.fit_body import fit_body
 from hmc.pose.steps.descent.tracker import SmdPreset, SmdTracker, TrackState, make_tracker, track_init, track_step
-from hmc.pose.steps.preset import pose_preset
+from hmc.pose.steps.polish import fine_objective
+from hmc.pose.steps.presets import pose_preset
 from hmc.pose.views.hull_target import HullTarget
-from hmc.pose.views.rays import points_to_explain
-from hmc.pose.views.skin import Observed
+from hmc.pose.views.skin import Skin
 
 __all__ = ["FirstPose", "begin", "fitted_body"]
 
@@ -51,7 +53,7 @@ def begin(
     rng: np.random.Generator,
     preset: SmdPreset,
     first: FirstPose,
-    observed: Sequence[Observed | None],
+    observed: Sequence[Skin | None],
     targets: Sequence[HullTarget | None],
     height_known: bool = False,
 ) -> tuple[SmdTracker, TrackState]:
@@ -106,20 +108,18 @@ def fitted_body(
     """
     if len(states) < LEAST_FRAMES:
         return None
-    preset = pose_preset("default")
-    if preset.refine is None or preset.fit_body is None:
+    preset, subject = pose_preset("default"), make_subject(body, Capture())
+    if preset.fit_body is None:
         return None
     picks = np.unique(np.linspace(0, len(states) - 1, FIT_FRAMES).round().astype(int))
-    points = [points_to_explain(rng, targets[k], preset.fine_hull_points, preset.symmetric.ray_share) for k in picks]
+    objectives = [fine_objective(rng, subject, targets[k], preset.polish) for k in picks]
     settings: FitBodySettings = replace(preset.fit_body, scale_deviation=KNOWN_STATURE) if height_known else preset.fit_body
     coordinates = surface_coordinates(body, preset.surface_samples)
-    found, _, info = fit_body(
-        body, coordinates, np.array([states[k] for k in picks]), [targets[k] for k in picks], points, preset.symmetric, settings
-    )
+    found, _, info = fit_body(objectives, np.array([states[k] for k in picks]), coordinates, settings)
     return found if info.cost_after < WORTH_IT * info.cost_before else None
 
 
-def _settled(rng: np.random.Generator, tracker: SmdTracker, state: np.ndarray, observed: Observed | None) -> TrackState:
+def _settled(rng: np.random.Generator, tracker: SmdTracker, state: np.ndarray, observed: Skin | None) -> TrackState:
     now = track_init(state)
     for _ in range(SETTLE):
         now, _ = track_step(rng, tracker, now, observed)

@@ -14,7 +14,8 @@ from hmc.body.inverse import fit_landmarks
 from hmc.body.kinematics import landmarks
 from hmc.body.model import BodyModel, neutral_state
 from hmc.body.spin_skeleton import model_of_height, skeleton_landmarks
-from hmc.pose.objectives.symmetric import BodyPoints, SymmetricSettings, symmetric_cost
+from hmc.pose.method import Subject
+from hmc.pose.objectives.symmetric import Symmetric, SymmetricSettings
 from hmc.pose.spectral.reading import ReadingSettings, read_body
 from hmc.pose.starts.templates import first_poses
 from hmc.pose.steps.refine import RefineSettings, refine
@@ -57,8 +58,7 @@ def body_state(body: BodyModel, points: np.ndarray) -> np.ndarray:
 
 def spectral_poses(
     rng: np.random.Generator,
-    body: BodyModel,
-    samples: BodyPoints,
+    subject: Subject,
     target: HullTarget,
     cost_settings: SymmetricSettings,
     floor_z: float = 0.0,
@@ -69,31 +69,32 @@ def spectral_poses(
     Skeletons fitted to the voxels' curves at several headings, the best of them with sides exchanged and turned about, and typical poses,
     all refined and ranked by the symmetric cost. Arguments and result as for `hmc.pose.starts.templates.first_poses`.
     """
+    body = subject.body
     voxels, points = strict_voxels(target)
     reading = read_body(voxels, points, target.voxel_size_m, body.height_m, ReadingSettings())
     if reading.status != "read":
-        return first_poses(rng, body, samples, target, cost_settings, floor_z, keep=keep)
+        return first_poses(rng, subject, target, cost_settings, floor_z, keep)
     model = model_of_height(body.height_m)
     heading = heading_of(reading.feet)
     trials = []
     for found in start_fits(rng, model, reading, heading, SwarmSettings()):
         trials.append(body_state(body, skeleton_landmarks(model, found.state)))
-    explained = points_to_explain(rng, target, 300, cost_settings.ray_share)
-    refined = [_refined(body, samples, trial, target, explained, cost_settings) for trial in trials]
+    objective = Symmetric(body, subject.points, target, points_to_explain(rng, target, 300, cost_settings.ray_share), cost_settings)
+    refined = [_refined(objective, trial) for trial in trials]
     best = min(refined, key=lambda pair: pair[0])[1]
-    refined += [_refined(body, samples, turned, target, explained, cost_settings) for turned in swapped_poses(body, best)]
-    typical = first_poses(rng, body, samples, target, cost_settings, floor_z, keep=keep)[0]
+    refined += [_refined(objective, turned) for turned in swapped_poses(body, best)]
+    typical = first_poses(rng, subject, target, cost_settings, floor_z, keep)[0]
     states = np.concatenate([[state for _, state in refined], typical])
     # All at the same points of the hull, so that costs can be compared.
-    costs = symmetric_cost(body, samples, states, target, explained, cost_settings)
+    costs = objective.cost(states)
     order = np.argsort(costs)
     order = order[_distinct(landmarks(body, states[order]))][:keep]
     return states[order], costs[order]
 
 
-def _refined(body, samples, state, target, explained, cost_settings) -> tuple[float, np.ndarray]:
+def _refined(objective: Symmetric, state: np.ndarray) -> tuple[float, np.ndarray]:
     """The cost of a pose after steps downhill, and the pose."""
-    state, info = refine(body, samples, state, target, explained, cost_settings, RefineSettings())
+    state, info = refine(objective, state, RefineSettings())
     return info.cost_after, state
 
 

@@ -8,12 +8,15 @@ the best of each heading is refined, and the caller follows the most promising o
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from hmc.body.joints import dof_index
 from hmc.body.kinematics import landmarks
 from hmc.body.model import BodyModel, neutral_state
-from hmc.pose.objectives.symmetric import BodyPoints, SymmetricSettings, symmetric_cost
+from hmc.pose.method import Subject
+from hmc.pose.objectives.symmetric import Symmetric, SymmetricSettings
 from hmc.pose.steps.refine import RefineSettings, refine
 from hmc.pose.views.hull_target import HullTarget
 from hmc.pose.views.rays import points_to_explain
@@ -39,6 +42,10 @@ TEMPLATES: dict[str, tuple[dict[str, float], float]] = {
     "bent down": ({"torso_y": 70, "r_hip_y": -15, "l_hip_y": -15, "r_shoulder_z": 70, "l_shoulder_z": -70}, 0.50),
     "kneeling": ({"r_hip_y": -20, "l_hip_y": -20, "r_knee_y": 100, "l_knee_y": 100}, 0.31),
 }
+
+
+#: Headings tried, evenly spread, and random variants of each template at each heading.
+HEADINGS, VARIANTS = 12, 4
 
 
 def template_states(body: BodyModel, xy: np.ndarray, floor_z: float, headings: np.ndarray) -> np.ndarray:
@@ -72,13 +79,10 @@ def template_states(body: BodyModel, xy: np.ndarray, floor_z: float, headings: n
 
 def first_poses(
     rng: np.random.Generator,
-    body: BodyModel,
-    samples: BodyPoints,
+    subject: Subject,
     target: HullTarget,
     cost_settings: SymmetricSettings,
     floor_z: float = 0.0,
-    n_headings: int = 12,
-    variants: int = 4,
     keep: int = 6,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Candidate poses of a person in one frame, best first.
@@ -86,14 +90,11 @@ def first_poses(
     Parameters
     ----------
     rng : numpy.random.Generator
-    body, samples, target, cost_settings
-        As for `hmc.pose.objectives.symmetric.symmetric_cost`.
+    subject : Subject
+    target : HullTarget
+    cost_settings : SymmetricSettings
     floor_z : float
         Height of the floor, metres.
-    n_headings : int
-        Headings tried, evenly spread.
-    variants : int
-        Random variants of each template at each heading.
     keep : int
         Candidates returned, from different headings.
 
@@ -103,6 +104,7 @@ def first_poses(
     costs : ndarray, shape (keep,)
         Square metres.
     """
+    body, n_headings, variants = subject.body, HEADINGS, VARIANTS
     middle = target.surface.mean(0)
     headings = np.linspace(-np.pi, np.pi, n_headings, endpoint=False)
     states = template_states(body, middle[:2], floor_z, headings)
@@ -113,13 +115,14 @@ def first_poses(
     noise[:, :, 0] = 0.0  # the template itself takes part
     states = np.clip(states + noise, body.limits.low, body.limits.high).reshape(n_headings, n_templates * variants, -1)
     coarse = points_to_explain(rng, target, 150, cost_settings.ray_share)
-    costs = symmetric_cost(body, samples, states.reshape(-1, states.shape[-1]), target, coarse, cost_settings).reshape(n_headings, -1)
-    points = points_to_explain(rng, target, 400, cost_settings.ray_share)
+    rough = Symmetric(body, subject.points, target, coarse, cost_settings)
+    costs = rough.cost(states.reshape(-1, states.shape[-1])).reshape(n_headings, -1)
+    objective = replace(rough, asked=points_to_explain(rng, target, 400, cost_settings.ray_share))
     candidates = []
     settings = RefineSettings(iterations=10)
     for states_there, costs_there in zip(states, costs, strict=True):
         for pick in np.argsort(costs_there)[:2]:
-            state, info = refine(body, samples, states_there[pick], target, points, cost_settings, settings)
+            state, info = refine(objective, states_there[pick], settings)
             candidates.append((info.cost_after, state))
     candidates.sort(key=lambda pair: pair[0])
     chosen: list[tuple[float, np.ndarray]] = []

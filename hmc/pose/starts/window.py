@@ -8,30 +8,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from hmc.body.exchange import swapped_poses
 from hmc.body.flesh import surface_coordinates
 from hmc.body.kinematics import landmarks
+from hmc.body.limbs import LIMBS
 from hmc.body.model import BodyModel, neutral_state
 from hmc.body.proportions import canton_body, default_body
-from hmc.pose.objectives.residuals import residual_values
+from hmc.pose.method import Capture, FrameRng, PoseStep, Started, StepInfo, Subject, Tracked, begin_tracking
+from hmc.pose.objectives.objective import Objective, cost_at
 from hmc.pose.starts.fit_body import FitBodyInfo, fit_body
 from hmc.pose.starts.spectral import spectral_poses
 from hmc.pose.starts.templates import first_poses
-from hmc.pose.steps.annealed import PoseFilter, PoseInfo, PoseState, make_filter, pose_init, pose_step
-from hmc.pose.steps.limb_search import LIMBS, search_limbs
-from hmc.pose.steps.preset import PosePreset
+from hmc.pose.steps.annealed import annealed, annealed_subject
+from hmc.pose.steps.limb_search import search_limbs
+from hmc.pose.steps.polish import PolishSettings, fine_objective, polished
+from hmc.pose.steps.presets import PosePreset
+from hmc.pose.steps.proposal import as_proposed
 from hmc.pose.steps.refine import refine
-from hmc.pose.steps.scalable import step_of
 from hmc.pose.views.hull_target import HullTarget
-from hmc.pose.views.rays import points_to_explain
+from hmc.pose.views.person_view import PersonView
 from hmc.search.filters import AnnealedSettings
 
-__all__ = ["StartSettings", "Started", "estimate_height", "follow", "possible_heights", "start_person", "walk_factor"]
+__all__ = [
+    "StartSettings", "WindowStart", "candidates", "estimate_height", "possible_heights", "quick_step", "search_all", "walk", "walk_factor",
+]  # fmt: skip
 
 #: Fewer frames say too little of a body: what they cannot tell apart, such as fat silhouettes from a tall person, would be fitted.
 LEAST_BODY_FRAMES = 6
@@ -45,8 +50,12 @@ ADULT_M, CHILD_M = 1.45, 0.9
 ADULT_MEAN_M = 1.7
 #: A child is believed where its cost is below this share of an adult's who sits, kneels or bends.
 CHILD_GAIN = 0.9
-#: Random generator of a frame: the same whatever the order in which frames are visited.
-FrameRng = Callable[[int], np.random.Generator]
+#: Deviation of the stature's logarithm where the stature was given.
+KNOWN_STATURE = 0.015
+#: A fitted body is taken where it lowers the cost of frames that it was not fitted to by this factor at least.
+FIT_GAIN = 0.97
+#: With which candidates are followed.
+QUICK = AnnealedSettings(layers=2, particles=60, survival_rate=0.1, spread=0.5)
 
 
 @dataclass(frozen=True)
@@ -75,29 +84,6 @@ class StartSettings:
     walk_speed_m_s: float = 0.5
     walk_penalty: float = 2.0
     body_frames: int = 12
-
-
-@dataclass(frozen=True)
-class Started:
-    """A person's first seconds.
-
-    Parameters
-    ----------
-    filter : PoseFilter
-        With the fitted body.
-    states : list of PoseState
-        One a frame of the window.
-    infos : list of PoseInfo
-    candidates : ndarray, shape (n,)
-        Mean cost of each candidate that was followed, the winner first; square metres.
-    fit : FitBodyInfo or None
-    """
-
-    filter: PoseFilter
-    states: list[PoseState]
-    infos: list[PoseInfo]
-    candidates: np.ndarray
-    fit: FitBodyInfo | None
 
 
 def estimate_height(targets: Sequence[HullTarget | None], floor_z: float = 0.0) -> float:
@@ -141,147 +127,180 @@ def possible_heights(targets: Sequence[HullTarget | None], floor_z: float = 0.0)
     return (ADULT_MEAN_M, top) if top > CHILD_M else (ADULT_MEAN_M,)
 
 
-def start_person(
+@dataclass(frozen=True)
+class WindowStart:
+    """The house's start: candidates from several frames of a window, the most promising followed for a while, and the body fitted.
+
+    Parameters
+    ----------
+    preset : PosePreset
+        Body, candidates (`PosePreset.start`), likelihood and refinement by which they are followed and compared.
+    settings : StartSettings
+    """
+
+    preset: PosePreset
+    settings: StartSettings = field(default_factory=StartSettings)
+
+    def __call__(self, frame_rng: FrameRng, views: Sequence[PersonView], capture: Capture, height_m: float | None = None) -> Started | None:
+        """The body and the first pose of a person.
+
+        Parameters
+        ----------
+        frame_rng : callable
+            Frame of the window to `numpy.random.Generator`.
+        views : sequence of PersonView
+            The window's frames, in order.
+        capture : Capture
+        height_m : float, optional
+            Stature where it is known; else `estimate_height`.
+
+        Returns
+        -------
+        Started or None
+            None where no frame of the window has a hull to start from.
+        """
+        # Of a fast recording, every so many frames decide, as many as of a slow one; then all are followed.
+        stride = max(1, round(capture.fps / DECIDE_FPS))
+        if not _usable(views[::stride]):
+            stride = 1
+        usable = _usable(views[::stride])
+        if not usable:
+            return None
+        window = _Window(lambda k: frame_rng(k * stride), views[::stride], usable, replace(capture, fps=capture.fps / stride))
+        found = self._decide(window, height_m)
+        return replace(found, subject=replace(found.subject, capture=capture), anchor=found.anchor * stride)
+
+    def _decide(self, window: _Window, height_m: float | None) -> Started:
+        """The subject with the person's body, a frame and the pose in it, the candidates' costs and the fit."""
+        preset, capture = self.preset, window.capture
+        heights = (height_m,) if height_m else possible_heights([view.target for view in window.views], capture.floor_z)
+        bodies = [canton_body(height) if preset.body == "canton" else default_body(height) for height in heights]
+        subjects = [annealed_subject(body, capture, preset) for body in bodies]
+        if preset.start == "neutral":
+            started = Started(subjects[0], window.usable[0], _neutral_start(bodies[0], window))
+        else:
+            starts = [_best_hypothesis(one, window, preset, self.settings) for one in subjects]
+            child = int(len(starts) > 1 and starts[1].costs[0] < CHILD_GAIN * starts[0].costs[0])
+            started = starts[child]
+        if preset.fit_body is None:
+            return started
+        # What the body's dimensions are fitted to need not be the last word on the poses.
+        path = walk(window.frame_rng, quick_step(preset), started.subject, started.state, started.anchor, window.views)
+        subject, fit = _fit(started.subject, window, path, self, height_m is not None)
+        return replace(started, subject=subject, state=path[started.anchor][0].state, fit=fit)
+
+
+@dataclass(frozen=True)
+class _Window:
+    """Frames of a window with their random numbers, and which of them show enough of a person to start from."""
+
+    frame_rng: FrameRng
+    views: Sequence[PersonView]
+    usable: list[int]
+    capture: Capture
+
+    @property
+    def velocities(self) -> np.ndarray:
+        """Of the track, shape (n, 3), metres a second."""
+        return np.array([view.velocity for view in self.views])
+
+    def target(self, k: int) -> HullTarget:
+        """Hulls of a frame that has some."""
+        target = self.views[k].target
+        if target is None:
+            raise ValueError(f"frame {k} of the window has no hulls")
+        return target
+
+
+def _usable(views: Sequence[PersonView]) -> list[int]:
+    """Frames with enough of a person to start from."""
+    return [k for k, view in enumerate(views) if view.target is not None and len(view.target.surface) >= LEAST_START_SURFACE]
+
+
+def walk(
     frame_rng: FrameRng,
-    preset: PosePreset,
-    fps: float,
-    targets: Sequence[HullTarget | None],
-    height_m: float | None = None,
-    velocities: np.ndarray | None = None,
-    room: np.ndarray | None = None,
-    settings: StartSettings | None = None,
-) -> Started | None:
-    """Find a person's body and poses in the first seconds.
+    step: PoseStep,
+    subject: Subject,
+    state: np.ndarray | Tracked,
+    anchor: int,
+    views: Sequence[PersonView],
+) -> list[tuple[Tracked, StepInfo]]:
+    """A pose tracked from one frame backwards to the first and forwards to the last.
 
     Parameters
     ----------
     frame_rng : callable
-        Frame of the window to `numpy.random.Generator`.
-    preset : PosePreset
-    fps : float
-    targets : sequence of HullTarget or None
-        The window's frames, in order.
-    height_m : float, optional
-        Stature where it is known; else `estimate_height`.
-    velocities : ndarray, shape (n, 3), optional
-        Of the track, metres a second.
-    room : ndarray, shape (2, 3), optional
-        Limits of the room, metres; its lowest z is the floor, 0 where left out.
-    settings : StartSettings, optional
-
-    Returns
-    -------
-    Started or None
-        None where no frame of the window has a hull to start from.
-    """
-    settings = settings or StartSettings()
-    velocities = np.zeros((len(targets), 3)) if velocities is None else velocities
-    # Of a fast recording, every so many frames decide, as many as of a slow one; then all are followed.
-    stride = max(1, round(fps / DECIDE_FPS))
-    if not _usable(targets[::stride]):
-        stride = 1
-    found = _decide(
-        lambda k: frame_rng(k * stride), preset, fps / stride, targets[::stride], height_m, velocities[::stride], room, settings
-    )
-    if found is None:
-        return None
-    filt, anchor, state, costs, fit = found
-    if stride > 1:
-        filt = replace(filt, drift=make_filter(filt.body, preset, fps).drift)
-    states, infos = follow(frame_rng, filt, state, anchor * stride, targets, step_of(preset))
-    return Started(filt, states, infos, costs, fit)
-
-
-def _usable(targets: Sequence[HullTarget | None]) -> list[int]:
-    """Frames with enough of a person to start from."""
-    return [k for k, target in enumerate(targets) if target is not None and len(target.surface) >= LEAST_START_SURFACE]
-
-
-def _decide(frame_rng, preset, fps, targets, height_m, velocities, room, settings):
-    """The filter with the person's body, a frame and the pose in it, the candidates' costs and the fit; None without any hull."""
-    usable = _usable(targets)
-    if not usable:
-        return None
-    floor_z = 0.0 if room is None else float(room[0, 2])
-    heights = (height_m,) if height_m else possible_heights(targets, floor_z)
-    bodies = [canton_body(height) if preset.body == "canton" else default_body(height) for height in heights]
-    earliest = targets[usable[0]]
-    filters = [make_filter(body, preset, fps, earliest.voxel_size_m, room) for body in bodies]
-    if preset.start == "neutral":
-        filt, anchor, costs = filters[0], usable[0], np.array([np.nan])
-        state = _neutral_start(bodies[0], earliest, velocities[: max(2, int(0.5 * fps))].mean(0), floor_z)
-    else:
-        starts = [_best_hypothesis(frame_rng, one, fps, targets, usable, velocities, floor_z, settings) for one in filters]
-        child = int(len(starts) > 1 and starts[1][2][0] < CHILD_GAIN * starts[0][2][0])
-        filt, (anchor, state, costs) = filters[child], starts[child]
-    fit = None
-    if preset.fit_body is not None:
-        # What the body's dimensions are fitted to need not be the last word on the poses.
-        states, infos = follow(frame_rng, _quick(filt), state, anchor, targets)
-        filt, fit = _fit(frame_rng, filt, fps, targets, states, infos, settings, height_m is not None)
-        state = states[anchor].state
-    return filt, anchor, state, costs, fit
-
-
-def follow(
-    frame_rng: FrameRng, filt: PoseFilter, state: np.ndarray, anchor: int, targets: Sequence[HullTarget | None], step=pose_step
-) -> tuple[list[PoseState], list[PoseInfo]]:
-    """Track from one frame backwards to the first and forwards to the last.
-
-    Parameters
-    ----------
-    frame_rng, filt, targets
-        As for `start_person`.
-    state : ndarray, shape (27,)
+    step : callable
+        `PoseStep`.
+    subject : Subject
+    state : ndarray, shape (27,), or Tracked
         Pose in the frame `anchor`.
     anchor : int
-    step : callable
-        As `hmc.pose.steps.annealed.pose_step`.
+    views : sequence of PersonView
 
     Returns
     -------
-    states, infos : list
+    list of (Tracked, StepInfo)
         One a frame.
     """
-    n = len(targets)
-    found: dict[int, tuple[PoseState, PoseInfo]] = {}
-    found[anchor] = step(frame_rng(anchor), filt, pose_init(state), targets[anchor])
+    n = len(views)
+    start = state if isinstance(state, Tracked) else begin_tracking(subject, state)
+    found = {anchor: step(frame_rng(anchor), start, views[anchor])}
     for order in (range(anchor + 1, n), range(anchor - 1, -1, -1)):
-        current = replace(found[anchor][0], velocity=np.zeros_like(state))
+        current = replace(found[anchor][0], velocity=np.zeros_like(start.state))
         for k in order:
-            found[k] = step(frame_rng(k), filt, current, targets[k])
+            found[k] = step(frame_rng(k), current, views[k])
             current = found[k][0]
     # Backwards, the velocity is that of time reversed; only the last frame's is used again, and that one is forward.
-    return [found[k][0] for k in range(n)], [found[k][1] for k in range(n)]
+    return [found[k] for k in range(n)]
 
 
-def _neutral_start(body: BodyModel, target: HullTarget, velocity: np.ndarray, floor_z: float) -> np.ndarray:
+def quick_step(preset: PosePreset) -> PoseStep:
+    """The plain annealed step of a preset with a fraction of the work a frame, and without search."""
+    quick = replace(preset, annealed=QUICK, search=None)
+    return as_proposed(annealed(quick)) if quick.refine is None else polished(annealed(quick), quick.polish)
+
+
+def _neutral_start(body: BodyModel, window: _Window) -> np.ndarray:
     """Canton (2009), section 6.3.3: root under the centroid, heading of the walk, all else neutral."""
+    velocity = window.velocities[: max(2, int(0.5 * window.capture.fps))].mean(0)
     state = neutral_state("down", body.limits)
     legs = body.dimensions["thigh"] + body.dimensions["shank"] + body.dimensions["ankle_height"]
-    state[:3] = (*target.surface.mean(0)[:2], floor_z + legs)
+    state[:3] = (*window.target(window.usable[0]).surface.mean(0)[:2], window.capture.floor_z + legs)
     state[3] = np.arctan2(velocity[1], velocity[0])
     return state
 
 
-def _best_hypothesis(frame_rng, filt, fps, targets, usable, velocities, floor_z, settings):
+def candidates(rng: np.random.Generator, subject: Subject, target: HullTarget, preset: PosePreset) -> tuple[np.ndarray, np.ndarray]:
+    """Candidate poses of one frame, best first, and their costs: from typical poses, or from the skeleton in the voxels too.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    subject : Subject
+    target : HullTarget
+    preset : PosePreset
+    """
+    find = spectral_poses if preset.start == "spectral" else first_poses
+    return find(rng, subject, target, preset.symmetric, subject.capture.floor_z)
+
+
+def _best_hypothesis(subject: Subject, window: _Window, preset: PosePreset, settings: StartSettings) -> Started:
     """The frame and pose to start from, and the mean costs of all that were followed."""
-    preset, body, samples = filt.preset, filt.body, filt.samples
+    usable, velocities, body = window.usable, window.velocities, subject.body
     anchors = sorted({usable[round(q * (len(usable) - 1))] for q in np.linspace(0.1, 0.9, settings.anchors)})
     pool = []
     for anchor in anchors:
-        rng = frame_rng(anchor)
-        find = spectral_poses if preset.start == "spectral" else first_poses
-        states, costs = find(rng, body, samples, targets[anchor], preset.symmetric, floor_z)
+        states, costs = candidates(window.frame_rng(anchor), subject, window.target(anchor), preset)
         costs = costs * walk_factor(states[:, 3], velocities[anchor], settings)
         pool += [(cost, anchor, state) for cost, state in zip(costs, states, strict=True)]
     pool.sort(key=lambda entry: entry[0])
     # All candidates are compared in the frame that was easiest to explain.
     anchor = pool[0][1]
-    points = points_to_explain(frame_rng(anchor), targets[anchor], preset.fine_hull_points, preset.symmetric.ray_share)
+    objective = fine_objective(window.frame_rng(anchor), subject, window.target(anchor), preset.polish)
     here = [state for _, where, state in pool if where == anchor]
     trials = [*here, *swapped_poses(body, here[0]), *swapped_poses(body, here[min(1, len(here) - 1)])]
-    refined = [refine(body, samples, trial, targets[anchor], points, preset.symmetric, preset.refine) for trial in trials]
+    refined = [refine(objective, trial, preset.polish.refine) for trial in trials]
     refined.sort(key=lambda pair: pair[1].cost_after * walk_factor(pair[0][3], velocities[anchor], settings))
     chosen: list[np.ndarray] = []
     for state, _ in refined:
@@ -290,33 +309,39 @@ def _best_hypothesis(frame_rng, filt, fps, targets, usable, velocities, floor_z,
         if len(chosen) == settings.candidates:
             break
     if preset.search is not None:
-        chosen = [_search_all(frame_rng(anchor), filt, state, targets[anchor], points) for state in chosen]
-    reach = max(2, round(settings.follow_s * fps))
-    first, last = max(0, anchor - reach), min(len(targets), anchor + reach + 1)
+        chosen = [search_all(window.frame_rng(anchor), objective, state, preset.polish)[0] for state in chosen]
+    scores = _followed_costs(subject, window, preset, settings, anchor, chosen)
+    order = np.argsort(scores)
+    return Started(subject, anchor, chosen[order[0]], costs=np.array(scores)[order])
+
+
+def _followed_costs(subject, window, preset, settings, anchor, chosen) -> list[float]:
+    """Mean cost of every candidate over the frames around that in which they were found."""
+    reach = max(2, round(settings.follow_s * window.capture.fps))
+    first, last = max(0, anchor - reach), min(len(window.views), anchor + reach + 1)
     scores = []
     for state in chosen:
-        path, infos = follow(lambda k: frame_rng(first + k), _quick(filt), state, anchor - first, targets[first:last])
-        followed = np.array([info.cost for info in infos])
-        headings = np.array([one.state[3] for one in path])
-        scores.append(np.nanmean(followed * walk_factor(headings, velocities[first:last], settings)))
-    order = np.argsort(scores)
-    return anchor, chosen[order[0]], np.array(scores)[order]
+        path = walk(lambda k: window.frame_rng(first + k), quick_step(preset), subject, state, anchor - first, window.views[first:last])
+        followed = np.array([info.cost for _, info in path])
+        headings = np.array([one.state[3] for one, _ in path])
+        scores.append(np.nanmean(followed * walk_factor(headings, window.velocities[first:last], settings)))
+    return scores
 
 
-def _quick(filt: PoseFilter) -> PoseFilter:
-    """The same filter with a fraction of the work a frame."""
-    annealed = AnnealedSettings(layers=2, particles=60, survival_rate=0.1, spread=0.5)
-    return replace(filt, preset=replace(filt.preset, annealed=annealed, search=None))
+def search_all(rng: np.random.Generator, objective: Objective, state: np.ndarray, settings: PolishSettings) -> tuple[np.ndarray, float]:
+    """A pose with each limb where it explains the hulls best, and its cost; as it is where nothing is to be searched.
 
-
-def _search_all(rng, filt, state, target, points):
-    """A candidate with each limb where it explains the hulls best."""
-    preset = filt.preset
-    values = residual_values(filt.body, filt.samples, state, target, points, preset.symmetric)
-    cost = float(values @ values)
-    return search_limbs(
-        rng, filt.body, filt.samples, state, cost, list(LIMBS), target, points, preset.symmetric, preset.refine, preset.search
-    )[0]
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    objective : Objective
+    state : ndarray, shape (27,)
+    settings : PolishSettings
+    """
+    cost = cost_at(objective, state)
+    if settings.search is None:
+        return state, cost
+    return search_limbs(rng, objective, (state, cost), list(LIMBS), settings.refine, settings.search)[:2]
 
 
 def walk_factor(headings: np.ndarray, velocities: np.ndarray, settings: StartSettings) -> np.ndarray:
@@ -340,35 +365,32 @@ def walk_factor(headings: np.ndarray, velocities: np.ndarray, settings: StartSet
     return np.where(speed > settings.walk_speed_m_s, 1 + settings.walk_penalty * (1 - forwards) / 2, 1.0)
 
 
-def _fit(frame_rng, filt, fps, targets, states, infos, settings, height_known):
-    """The body fitted to some frames of the window, if the others agree."""
-    preset = filt.preset
-    good = [k for k, info in enumerate(infos) if np.isfinite(info.cost)]
-    if len(good) < LEAST_BODY_FRAMES:
-        return filt, None
+def _fit(
+    subject: Subject, window: _Window, path: Sequence[tuple[Tracked, StepInfo]], start: WindowStart, height_known: bool
+) -> tuple[Subject, FitBodyInfo | None]:
+    """The subject with a body fitted to some frames of the window, if the others agree."""
+    preset, settings = start.preset, start.settings
+    costs = np.array([info.cost for _, info in path])
+    good = np.flatnonzero(np.isfinite(costs)).tolist()
+    if len(good) < LEAST_BODY_FRAMES or preset.fit_body is None:
+        return subject, None
     # Frames in which the pose is in doubt teach nothing of the body: leave the worst third out.
-    limit = np.quantile([infos[k].cost for k in good], 0.67)
-    good = [k for k in good if infos[k].cost <= limit]
+    limit = np.quantile(costs[good], 0.67)
+    good = [k for k in good if costs[k] <= limit]
     held_out, rest = good[1::3], [k for k in good if k not in good[1::3]]
     picks = sorted({rest[round(q * (len(rest) - 1))] for q in np.linspace(0, 1, settings.body_frames)})
     held_out = held_out[:: max(1, len(held_out) // 8)]
-    points = {
-        k: points_to_explain(frame_rng(k), targets[k], preset.fine_hull_points, preset.symmetric.ray_share) for k in {*picks, *held_out}
-    }
-    fit_settings = replace(preset.fit_body, scale_deviation=0.015) if height_known else preset.fit_body
-    body, _, info = fit_body(
-        filt.body,
-        surface_coordinates(filt.body, preset.surface_samples),
-        np.array([states[k].state for k in picks]),
-        [targets[k] for k in picks],
-        [points[k] for k in picks],
-        preset.symmetric,
-        fit_settings,
+    objectives = {k: fine_objective(window.frame_rng(k), subject, window.target(k), preset.polish) for k in {*picks, *held_out}}
+    fit_settings = replace(preset.fit_body, scale_deviation=KNOWN_STATURE) if height_known else preset.fit_body
+    coordinates = surface_coordinates(subject.body, preset.surface_samples)
+    body, _, info = fit_body([objectives[k] for k in picks], np.array([path[k][0].state for k in picks]), coordinates, fit_settings)
+    fitted = annealed_subject(body, subject.capture, preset)
+    before, after = (
+        [
+            refine(replace(objectives[k], body=one.body, points=one.points), path[k][0].state, preset.polish.refine)[1].cost_after
+            for k in held_out
+        ]
+        for one in (subject, fitted)
     )
-    fitted = make_filter(body, preset, fps, targets[picks[0]].voxel_size_m, filt.room)
-    costs = [
-        [refine(f.body, f.samples, states[k].state, targets[k], points[k], preset.symmetric, preset.refine)[1].cost_after for k in held_out]
-        for f in (filt, fitted)
-    ]
-    accepted = np.mean(costs[1]) < 0.97 * np.mean(costs[0])
-    return (fitted if accepted else filt), replace(info, accepted=bool(accepted))
+    accepted = bool(np.mean(after) < FIT_GAIN * np.mean(before))
+    return (fitted if accepted else subject), replace(info, accepted=accepted)

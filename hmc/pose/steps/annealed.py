@@ -1,297 +1,115 @@
-"""The annealed particle filter on one person's body: a step takes a state and a frame's hulls and returns a state.
-
-Source: Canton (2009), sections 3.2 and 6.5; the symmetric cost, the local refinement and the limb search are ours
-(`hmc.pose.objectives.symmetric`, `refine`, `limb_search`).
-"""
+"""The annealed particle filter on one person's body: what it proposes in a frame. Canton (2009), sections 3.2 and 6.5."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 
 from hmc.body.flesh import flesh_points, surface_coordinates
 from hmc.body.model import BodyModel
-from hmc.pose.objectives.four_scores import (
-    ScoreMaps,
-    ScoreTable,
-    ScoreVariances,
-    log_likelihood_factorised,
-    log_likelihood_global,
-    make_score_table,
-    observe,
-    scores,
-)
-from hmc.pose.objectives.symmetric import BodyPoints, body_points, symmetric_cost, thinned
-from hmc.pose.steps.limb_search import lost_limbs, search_limbs
-from hmc.pose.steps.preset import PosePreset, drift
-from hmc.pose.steps.refine import refine_all
-from hmc.pose.views.hull_target import HullTarget
+from hmc.pose.method import Capture, Subject, Tracked, particles_of, with_particles
+from hmc.pose.objectives.four_scores import make_score_table
+from hmc.pose.objectives.symmetric import body_points, thinned
+from hmc.pose.steps.presets import PosePreset, drift
+from hmc.pose.steps.proposal import Proposal, Propose
+from hmc.pose.steps.restrict import ScoreData, SymmetricData, nearest_part, score_maps
+from hmc.pose.views.person_view import PersonView
 from hmc.pose.views.rays import points_to_explain
-from hmc.search.filters import AnnealedInfo, ParticleState, annealed_step, particle_init
-from hmc.voxels.grid import VoxelGrid
+from hmc.search.filters import ParticleState, annealed_step, particle_init
 
-#: Fewer surface voxels than this are noise, not a person.
-LEAST_SURFACE = 20
+__all__ = ["annealed", "annealed_subject", "first_spread", "frame_data", "starting_particles"]
 
-__all__ = [
-    "PoseFilter",
-    "PoseInfo",
-    "PoseState",
-    "make_filter",
-    "polish",
-    "pose_init",
-    "pose_step",
-    "score_maps",
-    "starting_particles",
-    "unseen",
-]  # fmt: skip
+#: What an experiment puts in place of P0, under this name among a subject's extras: ndarray, shape (27,).
+DRIFT = "drift"
 
 
-@dataclass(frozen=True)
-class PoseFilter:
-    """What stays the same from frame to frame: the person's body and the settings.
+def annealed_subject(body: BodyModel, capture: Capture, preset: PosePreset) -> Subject:
+    """What an annealed filter makes of a body: points of its surface and, where the four scores are used, a table of its flesh.
 
     Parameters
     ----------
     body : BodyModel
-    samples : BodyPoints
-        At which the symmetric cost is taken.
+    capture : Capture
     preset : PosePreset
-    drift : ndarray, shape (27,)
-        P0, metres and radians.
-    table : ScoreTable or None
-        The body's flesh, where the four scores are used, be it by scouts for missing limbs alone.
-    room : ndarray, shape (2, 3), or None
-        Where a body may be, metres; for the score Out.
-    """
-
-    body: BodyModel
-    samples: BodyPoints
-    preset: PosePreset
-    drift: np.ndarray
-    table: ScoreTable | None = None
-    room: np.ndarray | None = None
-
-
-@dataclass(frozen=True)
-class PoseState:
-    """One person's pose and the particles around it.
-
-    Parameters
-    ----------
-    state : ndarray, shape (27,)
-        The estimate.
-    velocity : ndarray, shape (27,)
-        Change of the estimate in the last frame; zero at the start.
-    particles : ParticleState
-    memory : mapping of str to ndarray
-        What else a method keeps from frame to frame (`hmc.pose.steps.scalable`).
-    """
-
-    state: np.ndarray
-    velocity: np.ndarray
-    particles: ParticleState
-    memory: Mapping[str, np.ndarray] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class PoseInfo:
-    """What happened in one step.
-
-    Parameters
-    ----------
-    cost : float
-        Of the estimate, square metres; NaN without a fit, and where the four scores are used: there is a likelihood then
-        (`AnnealedInfo.best_log_likelihood`) and no cost.
-    searched : tuple of str
-        Limbs that were looked for.
-    evaluations : int
-        Of the cost or likelihood, in all.
-    annealed : AnnealedInfo or None
-        None in a frame without hull.
-    status : str
-        ``"fitted"``, or why not.
-    missing : ndarray of bool, shape (27,), or None
-        Angles of limbs that the data does not show; None: of none.
-    levels : ndarray, shape (n_models, 27), or None
-        The estimates of a hierarchy's models, NaN where a model lacks the angle.
-    """
-
-    cost: float
-    searched: tuple[str, ...]
-    evaluations: int
-    annealed: AnnealedInfo | None
-    status: str
-    missing: np.ndarray | None = None
-    levels: np.ndarray | None = None
-
-
-def make_filter(body: BodyModel, preset: PosePreset, fps: float, voxel_size_m: float = 0.03, room: np.ndarray | None = None) -> PoseFilter:
-    """Prepare the filter for one person.
-
-    Parameters
-    ----------
-    body : BodyModel
-    preset : PosePreset
-    fps : float
-        Frames a second of the recording.
-    voxel_size_m : float
-        Of the hulls: the spacing of the flesh where the four scores are used.
-    room : ndarray, shape (2, 3), optional
-        Limits of the room, metres.
     """
     samples = body_points(body, surface_coordinates(body, preset.surface_samples))
     needs_flesh = preset.likelihood != "symmetric" or preset.limbs is not None
-    table = make_score_table(body, flesh_points(body, preset.density * voxel_size_m)) if needs_flesh else None
-    return PoseFilter(body, samples, preset, preset.drift_scale * drift(fps), table, room)
+    table = make_score_table(body, flesh_points(body, preset.density * capture.voxel_size_m)) if needs_flesh else None
+    return Subject(body, capture, samples, table)
 
 
-def pose_init(
-    state: np.ndarray,
-    velocity: np.ndarray | None = None,
-    particles: ParticleState | None = None,
-    memory: Mapping[str, np.ndarray] | None = None,
-) -> PoseState:
-    """A filter's state on one pose.
+def annealed(preset: PosePreset) -> Propose:
+    """Annealed layers over the whole body by a preset's likelihood, schedule and drift.
 
     Parameters
     ----------
-    state : ndarray, shape (27,)
-    velocity : ndarray, shape (27,), optional
-        Zero where left out.
-    particles : ParticleState, optional
-        All on `state` where left out.
-    memory : mapping, optional
-        As in `PoseState`.
+    preset : PosePreset
+
+    Returns
+    -------
+    callable
+        `Propose`; it leaves its particles in the memory.
     """
-    state = np.asarray(state, float)
-    velocity = np.zeros_like(state) if velocity is None else np.asarray(velocity, float)
-    return PoseState(state, velocity, particles or particle_init(state[None]), memory or {})
+
+    def propose(rng: np.random.Generator, tracked: Tracked, view: PersonView) -> Proposal:
+        subject = tracked.subject
+        data = frame_data(rng, tracked, view, preset)
+        if isinstance(data, SymmetricData):
+            # Particles only have to find the way to the minimum; the refinement, with all points, goes to its bottom.
+            subject = replace(subject, points=thinned(subject.points, preset.coarse_samples))
+        likelihood, limits = data.likelihood(subject, np.ones_like(subject.parts)), subject.body.limits
+        sd = first_spread(tracked, preset)
+        starts = starting_particles(tracked, preset)
+        particles, info = annealed_step(rng, starts, likelihood, sd, limits.low, limits.high, preset.annealed)
+        cost = -info.best_log_likelihood if preset.likelihood == "symmetric" else np.nan
+        return Proposal(info.estimate, info.best, cost, info.evaluations, with_particles(particles), annealed=info)
+
+    return propose
 
 
-def pose_step(rng: np.random.Generator, filt: PoseFilter, state: PoseState, target: HullTarget | None) -> tuple[PoseState, PoseInfo]:
-    """One frame: annealed layers, then, where the preset has them, refinement and search for lost limbs.
+def first_spread(tracked: Tracked, preset: PosePreset) -> np.ndarray:
+    """Deviations of the first layer, shape (27,): P0, and 0 for angles of limbs that are not there."""
+    subject = tracked.subject
+    own = subject.extras.get(DRIFT)
+    sd = preset.drift_scale * (drift(subject.capture.fps) if own is None else own)
+    return np.where(subject.free, sd, 0.0)
+
+
+def frame_data(
+    rng: np.random.Generator, tracked: Tracked, view: PersonView, preset: PosePreset, by_part: bool = False
+) -> SymmetricData | ScoreData:
+    """A frame as a preset's likelihood reads it.
 
     Parameters
     ----------
     rng : numpy.random.Generator
-    filt : PoseFilter
-    state : PoseState
-    target : HullTarget or None
-        None where the person has no hull in this frame: the pose stays.
-
-    Returns
-    -------
-    state : PoseState
-    info : PoseInfo
+    tracked : Tracked
+    view : PersonView
+        With hulls.
+    preset : PosePreset
+    by_part : bool
+        Whether single parts are asked about.
     """
-    if target is None or len(target.surface) < LEAST_SURFACE:
-        return unseen(state)
-    preset = filt.preset
-    low, high = filt.body.limits.low, filt.body.limits.high
-    symmetric = preset.likelihood == "symmetric"
-    likelihood = _by_symmetric_cost(rng, filt, target) if symmetric or filt.table is None else _by_scores(filt, filt.table, target)
-    if preset.refine is None:
-        particles, annealed = annealed_step(rng, starting_particles(filt, state), likelihood, filt.drift, low, high, preset.annealed)
-        estimate = annealed.estimate
-        cost = -annealed.best_log_likelihood if symmetric else np.nan
-        info = PoseInfo(cost, (), annealed.evaluations, annealed, "fitted")
-        return PoseState(estimate, estimate - state.state, particles), info
-    particles, annealed = annealed_step(rng, starting_particles(filt, state), likelihood, filt.drift, low, high, preset.annealed)
-    estimate, cost, searched, more = polish(rng, filt, [annealed.best, state.state], state.state, target)
-    info = PoseInfo(cost, tuple(searched), annealed.evaluations + more, annealed, "fitted")
-    return PoseState(estimate, estimate - state.state, particles), info
+    target, subject = view.target, tracked.subject
+    if target is None:
+        raise ValueError("the frame has no hulls of this person")
+    if preset.likelihood != "symmetric":
+        return ScoreData(score_maps(target, subject.capture.room), preset.likelihood == "global")
+    points = points_to_explain(rng, target, preset.hull_points, preset.symmetric.ray_share)
+    part = nearest_part(subject.body, tracked.state, points) if by_part else None
+    return SymmetricData(target, points, preset.symmetric, part)
 
 
-def unseen(state: PoseState) -> tuple[PoseState, PoseInfo]:
-    """A frame without a hull of the person: the pose stays."""
-    return replace(state, velocity=np.zeros_like(state.velocity)), PoseInfo(np.nan, (), 0, None, "no hull of this person in this frame")
-
-
-def starting_particles(filt: PoseFilter, state: PoseState) -> ParticleState:
+def starting_particles(tracked: Tracked, preset: PosePreset) -> ParticleState:
     """Where a frame's particles start, by the preset's `motion`: the last frame's, or, if its estimate was refined, that, which is better.
 
     Source: Canton (2009), section 3.1.2.2.
     """
-    last = state.particles if filt.preset.refine is None else particle_init(state.state[None])
-    if filt.preset.motion == "none":
+    last, limits = particles_of(tracked) if preset.refine is None else particle_init(tracked.state[None]), tracked.subject.body.limits
+    if preset.motion == "none":
         return last
-    moved = np.clip(last.particles + state.velocity, filt.body.limits.low, filt.body.limits.high)
-    if filt.preset.motion == "smooth":
+    moved = np.clip(last.particles + tracked.velocity, limits.low, limits.high)
+    if preset.motion == "smooth":
         return replace(last, particles=moved)
     return ParticleState(np.concatenate([last.particles, moved]), np.tile(last.log_weights, 2))
-
-
-def polish(
-    rng: np.random.Generator, filt: PoseFilter, starts: Sequence[np.ndarray], anchor: np.ndarray, target: HullTarget
-) -> tuple[np.ndarray, float, list[str], int]:
-    """Refine several starts, take the best, look for limbs that the hulls contradict.
-
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-    filt : PoseFilter
-        Of a preset with `refine`.
-    starts : sequence of ndarray, shape (27,)
-    anchor : ndarray, shape (27,)
-        Pose on which what no data speaks of is held.
-    target : HullTarget
-
-    Returns
-    -------
-    state : ndarray, shape (27,)
-    cost : float
-        Square metres.
-    searched : list of str
-    evaluations : int
-    """
-    preset, body, samples = filt.preset, filt.body, filt.samples
-    if preset.refine is None:
-        raise ValueError(f"preset '{preset.name}' has no `refine`")
-    points = points_to_explain(rng, target, preset.fine_hull_points, preset.symmetric.ray_share)
-    # Each to the end: a start that has moved a limb across costs more than one that has lost it until late in the refinement.
-    trials = refine_all(body, samples, starts, target, points, preset.symmetric, preset.refine, anchor=anchor)
-    evaluations = sum(info.evaluations for _, info in trials)
-    estimate, info = min(trials, key=lambda trial: trial[1].cost_after)
-    cost = info.cost
-    searched: list[str] = []
-    if preset.search is not None:
-        searched = lost_limbs(rng, samples, info.outside, info.unexplained, preset.search)
-        estimate, cost, more = search_limbs(
-            rng, body, samples, estimate, cost, searched, target, points, preset.symmetric, preset.refine, preset.search
-        )
-        evaluations += more
-    return estimate, cost, searched, evaluations
-
-
-def _by_symmetric_cost(rng, filt, target):
-    # Particles only have to find the way to the minimum; the refinement, with all points, goes to its bottom.
-    samples = thinned(filt.samples, filt.preset.coarse_samples)
-    points = points_to_explain(rng, target, filt.preset.hull_points, filt.preset.symmetric.ray_share)
-
-    def log_likelihood(states: np.ndarray) -> np.ndarray:
-        return -symmetric_cost(filt.body, samples, states, target, points, filt.preset.symmetric)
-
-    return log_likelihood
-
-
-def _by_scores(filt, table, target):
-    """The four scores against the tolerant hull."""
-    maps = score_maps(target, filt.room)
-    variances = ScoreVariances()
-
-    def log_likelihood(states: np.ndarray) -> np.ndarray:
-        values = scores(table, states, maps)
-        if filt.preset.likelihood == "global":
-            return log_likelihood_global(values, table.counts, variances.whole_body())
-        return log_likelihood_factorised(values, variances.by_part())
-
-    return log_likelihood
-
-
-def score_maps(target: HullTarget, room: np.ndarray | None) -> ScoreMaps:
-    """The tolerant hull as the four scores read it; `room` is that of `PoseFilter`."""
-    grid = VoxelGrid(target.origin - 0.5 * target.voxel_size_m, target.voxel_size_m, target.distance.shape)
-    return observe(target.tolerant, grid, room)

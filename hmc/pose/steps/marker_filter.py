@@ -10,17 +10,20 @@ import numpy as np
 from hmc.body.marker_places import place_tips
 from hmc.body.model import BodyModel
 from hmc.errors import InputError
-from hmc.pose.legs import LegChoice
-from hmc.pose.objectives.epipolar import MarkerLikelihood, SeenMarkers, marker_cost
-from hmc.pose.steps.annealed import PoseState
+from hmc.pose.method import Alternatives, PoseStep, StepInfo, Tracked, particles_of, unseen, with_particles
+from hmc.pose.objectives.epipolar import MarkerLikelihood, marker_cost
 from hmc.pose.steps.marker_limbs import explain_all, refine_to_points
-from hmc.pose.steps.preset import drift
+from hmc.pose.steps.presets import drift
+from hmc.pose.views.markers import SeenMarkers
+from hmc.pose.views.person_view import PersonView
 from hmc.search.filters import AnnealedInfo, AnnealedSettings, annealed_step, particle_init
 
-__all__ = ["MARKER_PRESETS", "MarkerFilter", "MarkerInfo", "MarkerPreset", "make_marker_filter", "marker_preset", "marker_step"]
+__all__ = ["MARKER_PRESETS", "TIPS", "MarkerInfo", "MarkerPreset", "marker_frame", "marker_preset", "on_markers", "with_tips"]
 
 #: With fewer markers than this seen from two sides a frame has no pose.
 LEAST_MARKERS = 5
+#: Where the markers are worn, under this name in a memory: ndarray, shape (15, 3), each in the frame of its segment, metres.
+TIPS = "tips"
 
 
 @dataclass(frozen=True)
@@ -87,24 +90,6 @@ def marker_preset(name: str) -> MarkerPreset:
 
 
 @dataclass(frozen=True)
-class MarkerFilter:
-    """What stays the same from frame to frame.
-
-    Parameters
-    ----------
-    body : BodyModel
-        With its markers as tips.
-    preset : MarkerPreset
-    drift : ndarray, shape (27,)
-        P0, metres and radians.
-    """
-
-    body: BodyModel
-    preset: MarkerPreset
-    drift: np.ndarray
-
-
-@dataclass(frozen=True)
 class MarkerInfo:
     """What happened in one step.
 
@@ -119,7 +104,7 @@ class MarkerInfo:
     annealed : AnnealedInfo or None
     status : str
         ``"fitted"``, or why not.
-    choice : LegChoice or None
+    choice : Alternatives or None
         The pose and others with exchanged limbs; None where none are looked for.
     """
 
@@ -128,54 +113,46 @@ class MarkerInfo:
     points: np.ndarray
     annealed: AnnealedInfo | None
     status: str
-    choice: LegChoice | None = None
+    choice: Alternatives | None = None
 
 
-def make_marker_filter(body: BodyModel, preset: MarkerPreset, fps: float) -> MarkerFilter:
-    """Prepare the filter.
-
-    Parameters
-    ----------
-    body : BodyModel
-        With its markers as tips (`hmc.body.marker_places.with_skin_markers`).
-    preset : MarkerPreset
-    fps : float
-        Frames a second.
-    """
-    return MarkerFilter(body, preset, preset.drift_scale * drift(fps))
+def with_tips(tracked: Tracked) -> BodyModel:
+    """A person's body with its markers as tips: where its memory has them, else at its landmarks."""
+    body = tracked.subject.body
+    return replace(body, tips=tracked.memory[TIPS]) if TIPS in tracked.memory else body
 
 
-def marker_step(rng: np.random.Generator, filt: MarkerFilter, state: PoseState, seen: SeenMarkers) -> tuple[PoseState, MarkerInfo]:
+def marker_frame(rng: np.random.Generator, tracked: Tracked, seen: SeenMarkers, preset: MarkerPreset) -> tuple[Tracked, MarkerInfo]:
     """One frame: annealed layers and, where the preset has it, refinement.
 
     Parameters
     ----------
     rng : numpy.random.Generator
-    filt : MarkerFilter
-    state : PoseState
+    tracked : Tracked
     seen : SeenMarkers
-        From `hmc.pose.objectives.epipolar.observe_markers`, with the preset's gate.
+        With the preset's gate.
+    preset : MarkerPreset
 
     Returns
     -------
-    state : PoseState
+    tracked : Tracked
     info : MarkerInfo
     """
-    body, preset = filt.body, filt.preset
-    low, high = body.limits.low, body.limits.high
+    body, limits = with_tips(tracked), tracked.subject.body.limits
     missing = np.full((len(body.tips), 3), np.nan)
     if sum(len(points) > 0 for points in seen.detections) < 2:
         info = MarkerInfo(np.nan, np.zeros(len(missing), int), missing, None, "markers in fewer than two views")
-        return replace(state, velocity=np.zeros_like(state.velocity)), info
+        return replace(tracked, velocity=np.zeros_like(tracked.velocity)), info
 
     def log_likelihood(states: np.ndarray) -> np.ndarray:
         cost, _ = marker_cost(seen, place_tips(body, states), preset.likelihood)
         return -(cost**2) / (2 * preset.likelihood.sigma**2)
 
-    starts = state.particles
+    starts = particles_of(tracked)
     if preset.refine:
-        starts = particle_init(np.stack([state.state, np.clip(state.state + state.velocity, low, high)]))
-    particles, annealed = annealed_step(rng, starts, log_likelihood, filt.drift, low, high, preset.annealed)
+        starts = particle_init(np.stack([tracked.state, np.clip(tracked.state + tracked.velocity, limits.low, limits.high)]))
+    sd = preset.drift_scale * drift(tracked.subject.capture.fps)
+    particles, annealed = annealed_step(rng, starts, log_likelihood, sd, limits.low, limits.high, preset.annealed)
     estimate, points, choice = annealed.estimate, missing, None
     if preset.refine:
         estimate, points = refine_to_points(body, seen, annealed.best, preset.likelihood.gate_px)
@@ -183,8 +160,28 @@ def marker_step(rng: np.random.Generator, filt: MarkerFilter, state: PoseState, 
         estimate, points, choice = explain_all(rng, body, seen, estimate, points, preset.likelihood.gate_px)
     cost, matched = _cost(body, seen, estimate, preset.likelihood)
     status = "fitted" if (matched >= 2).sum() >= LEAST_MARKERS else "too few markers where the body should have them"
-    info = MarkerInfo(cost, matched, points, annealed, status, choice)
-    return PoseState(estimate, estimate - state.state, particles), info
+    kept = {name: values for name, values in tracked.memory.items() if name == TIPS}
+    after = Tracked(tracked.subject, estimate, estimate - tracked.state, {**kept, **with_particles(particles)})
+    return after, MarkerInfo(cost, matched, points, annealed, status, choice)
+
+
+def on_markers(preset: MarkerPreset) -> PoseStep:
+    """The step on a frame's detections.
+
+    Parameters
+    ----------
+    preset : MarkerPreset
+    """
+
+    def step(rng: np.random.Generator, tracked: Tracked, view: PersonView) -> tuple[Tracked, StepInfo]:
+        if view.markers is None:
+            return unseen(tracked, "no detections in this frame")
+        after, info = marker_frame(rng, tracked, view.markers, preset)
+        evaluations = 0 if info.annealed is None else info.annealed.evaluations
+        cost = info.cost if info.status == "fitted" else np.nan
+        return after, StepInfo(info.status, cost, evaluations, alternatives=info.choice, annealed=info.annealed)
+
+    return step
 
 
 def _cost(body: BodyModel, seen: SeenMarkers, state: np.ndarray, settings: MarkerLikelihood) -> tuple[float, np.ndarray]:

@@ -19,10 +19,10 @@ from hmc.body.kinematics import landmarks
 from hmc.body.limbs import LIMBS as LIMB_TABLE
 from hmc.body.model import BodyModel
 from hmc.body.prior import POSTURE, posture_spread
-from hmc.pose.legs import LegChoice
-from hmc.pose.objectives.epipolar import SeenMarkers
+from hmc.pose.method import Alternatives
 from hmc.pose.objectives.marker_points import find_points, matched_points
 from hmc.pose.steps.marker_search import LEAST_POINTS, lay_body, left_over, point_cost, search_near
+from hmc.pose.views.markers import SeenMarkers
 
 __all__ = ["explain_all", "refine_to_points", "strain"]
 
@@ -50,7 +50,7 @@ POSTURE_WEIGHT = 1e-5
 
 def explain_all(
     rng: np.random.Generator, body: BodyModel, seen: SeenMarkers, state: np.ndarray, points: np.ndarray, gate_px: float
-) -> tuple[np.ndarray, np.ndarray, LegChoice]:
+) -> tuple[np.ndarray, np.ndarray, Alternatives]:
     """The pose that explains all points best, of one, what is found near it, and that with legs or arms exchanged.
 
     Parameters
@@ -70,12 +70,12 @@ def explain_all(
     state : ndarray, shape (27,)
     points : ndarray, shape (15, 3)
         As from `refine_to_points`.
-    choice : LegChoice
+    choice : Alternatives
         The pose before such exchanges and after each of them, and how badly they explain the points, square metres.
     """
     found, views = find_points(seen)
     if len(found) < LEAST_POINTS:
-        return state, points, LegChoice(np.stack([state, state]), np.zeros(2))
+        return state, points, Alternatives(np.stack([state, state]), np.zeros(2))
     cost = strain(body, found, views)
     if np.isnan(points[LIMBS]).any() or left_over(body, state, found, views, LEFT_OVER_M):
         near, better = search_near(rng, body, found, views, state)
@@ -89,7 +89,7 @@ def explain_all(
         states[k], all_points[k] = refine_to_points(body, seen, states[k], gate_px)
         costs[k] = cost(states[k][None])[0]
     best = int(costs.argmin())
-    return states[best], all_points[best], LegChoice(states, costs)
+    return states[best], all_points[best], Alternatives(states, costs)
 
 
 def strain(body: BodyModel, points: np.ndarray, views: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:

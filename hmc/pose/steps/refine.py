@@ -1,19 +1,16 @@
-"""Local least-squares refinement of a pose: Gauss-Newton steps with damping on the symmetric cost's residuals."""
+"""Local least-squares refinement of a pose: Gauss-Newton steps with damping on an objective's residuals."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from hmc.body.joints import N_DOF
 from hmc.body.kinematics import landmarks
-from hmc.body.model import BodyModel
-from hmc.body.nearest_cone import Candidates
-from hmc.pose.objectives.residuals import Distances, distances, pulls
-from hmc.pose.objectives.symmetric import BodyPoints, SymmetricSettings
-from hmc.pose.views.hull_target import HullTarget
+from hmc.pose.objectives.objective import Linearised, Objective, Unexplained
 
 __all__ = ["RefineInfo", "RefineSettings", "refine", "refine_all", "refine_best"]
 
@@ -47,32 +44,25 @@ class RefineInfo:
     cost_before, cost_after : float
         Square metres, the hold included.
     cost : float
-        The symmetric cost alone, afterwards, square metres.
+        The objective alone, afterwards, square metres.
     evaluations : int
-        Of the cost.
-    outside : ndarray, shape (n_surface,)
-        How far the body's points are from the tolerant hull afterwards, metres.
-    unexplained : ndarray, shape (n_hull_points,)
-        How far hull points and rays are from the body afterwards, metres; infinite beyond the cap.
+        Of the objective.
+    unexplained : Unexplained or None
+        Where body and data contradict each other afterwards, if the objective can tell.
     """
 
     cost_before: float
     cost_after: float
     cost: float
     evaluations: int
-    outside: np.ndarray
-    unexplained: np.ndarray
+    unexplained: Unexplained | None
 
 
 @dataclass(frozen=True)
 class _Problem:
-    """What stays the same while a pose descends; as the arguments of `refine`, with the weights of the hold, shape (27,)."""
+    """What stays the same while a pose descends; `free` and the weights of the hold have shape (27,)."""
 
-    body: BodyModel
-    samples: BodyPoints
-    target: HullTarget
-    hull_points: np.ndarray
-    cost_settings: SymmetricSettings
+    objective: Objective
     settings: RefineSettings
     free: np.ndarray
     hold: np.ndarray
@@ -84,7 +74,7 @@ class _Descent:
 
     state: np.ndarray
     anchor: np.ndarray
-    found: Distances
+    found: Linearised
     cost: float
     first: float
     evaluations: int = 1
@@ -94,23 +84,18 @@ class _Descent:
 
 
 def refine(
-    body: BodyModel,
-    samples: BodyPoints,
+    objective: Objective,
     state: np.ndarray,
-    target: HullTarget,
-    hull_points: np.ndarray,
-    cost_settings: SymmetricSettings,
     settings: RefineSettings,
     free: np.ndarray | None = None,
     anchor: np.ndarray | None = None,
     deviation: np.ndarray | None = None,
 ) -> tuple[np.ndarray, RefineInfo]:
-    """Move one pose to the nearest minimum of the symmetric cost.
+    """The pose at the nearest minimum of an objective.
 
     Parameters
     ----------
-    body, samples, target, hull_points, cost_settings
-        As for `hmc.pose.objectives.symmetric.symmetric_cost`.
+    objective : Objective
     state : ndarray, shape (27,)
         Start.
     settings : RefineSettings
@@ -127,27 +112,23 @@ def refine(
         Within the body's joint limits.
     info : RefineInfo
     """
-    problem = _problem(body, samples, target, hull_points, cost_settings, settings, free, deviation)
+    problem = _problem(objective, settings, free, deviation)
     return _outcome(_descend(problem, _begin(problem, state, anchor), settings.iterations))
 
 
 def refine_best(
-    body: BodyModel,
-    samples: BodyPoints,
+    objective: Objective,
     starts: Sequence[np.ndarray],
-    target: HullTarget,
-    hull_points: np.ndarray,
-    cost_settings: SymmetricSettings,
     settings: RefineSettings,
     anchor: np.ndarray | None = None,
     trial_steps: int = 3,
     is_hopeless: Callable[[np.ndarray, float], bool] | None = None,
 ) -> tuple[np.ndarray, RefineInfo]:
-    """Refine several starts by some steps each, and the one that is best then to the end.
+    """Of several starts the one that is best after some steps, refined to the end.
 
     Parameters
     ----------
-    body, samples, target, hull_points, cost_settings, settings
+    objective, settings
         As for `refine`.
     starts : sequence of ndarray, shape (27,)
     anchor : ndarray, shape (27,), optional
@@ -163,10 +144,10 @@ def refine_best(
     info : RefineInfo
         Of the best, with the evaluations of all.
     """
-    problem = _problem(body, samples, target, hull_points, cost_settings, settings)
+    problem = _problem(objective, settings)
     trials: list[_Descent] = []
     for start in starts:
-        begun = _begin(problem, start, anchor, trials[-1].found.pairs if trials else None)
+        begun = _begin(problem, start, anchor, trials[-1].found.near if trials else None)
         trials.append(_descend(problem, begun, trial_steps))
     best = min(trials, key=lambda trial: trial.cost)
     before = sum(trial.evaluations for trial in trials) - best.evaluations
@@ -177,22 +158,18 @@ def refine_best(
 
 
 def refine_all(
-    body: BodyModel,
-    samples: BodyPoints,
+    objective: Objective,
     starts: Sequence[np.ndarray],
-    target: HullTarget,
-    hull_points: np.ndarray,
-    cost_settings: SymmetricSettings,
     settings: RefineSettings,
     anchor: np.ndarray | None = None,
     trial_steps: int = 3,
     same_m: float = 0.03,
 ) -> list[tuple[np.ndarray, RefineInfo]]:
-    """Refine several starts, each to the end unless its first steps bring it to where an earlier one ended: it would end there too.
+    """Several starts, each refined to the end unless its first steps bring it to where an earlier one ended: it would end there too.
 
     Parameters
     ----------
-    body, samples, target, hull_points, cost_settings, settings
+    objective, settings
         As for `refine`.
     starts : sequence of ndarray, shape (27,)
     anchor, trial_steps
@@ -205,53 +182,53 @@ def refine_all(
     list of tuple
         As from `refine`, start by start.
     """
-    problem = _problem(body, samples, target, hull_points, cost_settings, settings)
+    problem = _problem(objective, settings)
     ended: list[_Descent] = []
     places: list[np.ndarray] = []
     for start in starts:
-        trial = _descend(problem, _begin(problem, start, anchor, ended[-1].found.pairs if ended else None), trial_steps)
-        here = landmarks(body, trial.state)
+        trial = _descend(problem, _begin(problem, start, anchor, ended[-1].found.near if ended else None), trial_steps)
+        here = landmarks(objective.body, trial.state)
         if all(np.linalg.norm(here - there, axis=1).max() > same_m for there in places):
             trial = _descend(problem, trial, settings.iterations)
-            here = landmarks(body, trial.state)
+            here = landmarks(objective.body, trial.state)
         ended.append(trial)
         places.append(here)
     return [_outcome(trial) for trial in ended]
 
 
-def _problem(body, samples, target, hull_points, cost_settings, settings, free=None, deviation=None) -> _Problem:
+def _problem(objective: Objective, settings: RefineSettings, free=None, deviation=None) -> _Problem:
     """All angles free, and held by .1 m and .5 rad, where nothing else is said."""
     free = np.ones(N_DOF, bool) if free is None else free
     deviation = np.r_[np.full(3, 0.1), np.full(N_DOF - 3, 0.5)] if deviation is None else deviation
-    return _Problem(body, samples, target, hull_points, cost_settings, settings, free, settings.stay_weight / deviation**2)
+    return _Problem(objective, settings, free, settings.stay_weight / deviation**2)
 
 
 def _outcome(descent: _Descent) -> tuple[np.ndarray, RefineInfo]:
     found = descent.found
     cost = float(found.residuals @ found.residuals)
-    return descent.state, RefineInfo(descent.first, descent.cost, cost, descent.evaluations, found.outside, found.nearest.distance)
+    return descent.state, RefineInfo(descent.first, descent.cost, cost, descent.evaluations, found.unexplained)
 
 
-def _begin(problem: _Problem, state: np.ndarray, anchor: np.ndarray | None, before: Candidates | None = None) -> _Descent:
-    state = np.clip(state, problem.body.limits.low, problem.body.limits.high)
+def _begin(problem: _Problem, state: np.ndarray, anchor: np.ndarray | None, near: Any = None) -> _Descent:
+    state = np.clip(state, problem.objective.body.limits.low, problem.objective.body.limits.high)
     anchor = state if anchor is None else anchor
-    found, cost = _evaluate(problem, state, anchor, before)
+    found, cost = _evaluate(problem, state, anchor, near)
     return _Descent(state, anchor, found, cost, cost)
 
 
-def _evaluate(problem: _Problem, state: np.ndarray, anchor: np.ndarray, before: Candidates | None = None) -> tuple[Distances, float]:
-    found = distances(problem.body, problem.samples, state, problem.target, problem.hull_points, problem.cost_settings, before)
+def _evaluate(problem: _Problem, state: np.ndarray, anchor: np.ndarray, near: Any = None) -> tuple[Linearised, float]:
+    found = problem.objective.linearise(state, near)
     return found, float(found.residuals @ found.residuals + problem.hold @ (state - anchor) ** 2)
 
 
 def _descend(problem: _Problem, descent: _Descent, accepted: int) -> _Descent:
     """Go on until so many steps were accepted, or nothing is to be gained."""
-    low, high, hold = problem.body.limits.low, problem.body.limits.high, problem.hold
+    low, high, hold = problem.objective.body.limits.low, problem.objective.body.limits.high, problem.hold
     improved = True
     while descent.accepted < accepted and not descent.is_done:
         state, found = descent.state, descent.found
         if improved:
-            pulled, jacobian = pulls(problem.body, problem.samples, found, problem.cost_settings)
+            pulled, jacobian = found.pulls()
             gradient = jacobian.T @ found.residuals[pulled] + hold * (state - descent.anchor)
             normal = jacobian.T @ jacobian + np.diag(hold)
             # An angle at its limit that wants further out takes no part in this step.
@@ -265,7 +242,7 @@ def _descend(problem: _Problem, descent: _Descent, accepted: int) -> _Descent:
         if promised < problem.settings.tolerance * descent.cost:
             return replace(descent, is_done=True)
         trial = np.clip(state + np.clip(step, -0.5, 0.5), low, high)
-        trial_found, trial_cost = _evaluate(problem, trial, descent.anchor, found.pairs)
+        trial_found, trial_cost = _evaluate(problem, trial, descent.anchor, found.near)
         improved = trial_cost < descent.cost
         descent = replace(descent, evaluations=descent.evaluations + 1)
         if improved:

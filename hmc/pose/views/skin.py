@@ -8,17 +8,11 @@ import numpy as np
 
 from hmc.camera.model import Rig
 from hmc.camera.stacked import Views, project_in, stack_views
-from hmc.io.recording import Recording
-from hmc.io.results import TrackTable
-from hmc.pose.views.hull_target import sound_hull
-from hmc.tracking.resumable import observe_step
-from hmc.tracking.tracks import person_voxels
 from hmc.voxels.color import color_voxels, visibility
 from hmc.voxels.grid import VoxelGrid
-from hmc.voxels.hulls import HullStep
 from hmc.voxels.surface import surface
 
-__all__ = ["Crop", "Observed", "crop_images", "observe_people", "observe_voxels", "to_yuv"]
+__all__ = ["Crop", "Skin", "crop_images", "observe_voxels", "to_yuv"]
 
 #: Around a person's voxels so much of the image is kept, metres at their depth.
 MARGIN_M = 0.15
@@ -43,7 +37,7 @@ class Crop:
 
 
 @dataclass(frozen=True)
-class Observed:
+class Skin:
     """What is seen of a person in a frame.
 
     Parameters
@@ -69,38 +63,7 @@ def to_yuv(colors: np.ndarray) -> np.ndarray:
     return np.asarray(colors, float) @ _YUV
 
 
-def observe_people(recording: Recording, grid: VoxelGrid, tracks: TrackTable, hull: HullStep) -> dict[int, Observed]:
-    """What is seen of everybody in a frame: the surface of the strict hull's part that is theirs, its colours, and the images around it.
-
-    Where the strict hull has nearly nothing of somebody, the tolerant one stands for it (`hmc.pose.views.hull_target.sound_hull`).
-
-    Parameters
-    ----------
-    recording : Recording
-    grid : VoxelGrid
-    tracks : TrackTable
-    hull : HullStep
-
-    Returns
-    -------
-    dict of int to Observed
-        Whoever has voxels.
-    """
-    rows = np.flatnonzero(tracks.frames == hull.index)
-    observation = observe_step(recording, grid, hull) if len(rows) else None
-    if observation is None:
-        return {}
-    out = {}
-    for number, tolerant in zip(tracks.persons[rows].tolist(), person_voxels(observation, tracks.positions[rows]), strict=True):
-        strict = tolerant[hull.strict[tuple(tolerant.T)]]
-        voxels = sound_hull(strict, tolerant)
-        occupied = hull.strict if voxels is strict else hull.tolerant
-        if len(voxels):
-            out[number] = observe_voxels(grid, recording.rig, occupied, voxels, hull.images, hull.masks)
-    return out
-
-
-def observe_voxels(grid: VoxelGrid, rig: Rig, occupied: np.ndarray, voxels: np.ndarray, images, masks) -> Observed:
+def observe_voxels(grid: VoxelGrid, rig: Rig, occupied: np.ndarray, voxels: np.ndarray, images, masks) -> Skin:
     """What is seen of one person.
 
     Parameters
@@ -120,10 +83,10 @@ def observe_voxels(grid: VoxelGrid, rig: Rig, occupied: np.ndarray, voxels: np.n
     skin = surface(solid) + low
     points = grid.centres(skin)
     if all(image is None for image in images):
-        return Observed(points)
+        return Skin(points)
     colors = to_yuv(color_voxels(grid, rig, images, skin, visibility(occupied, grid, rig, skin, mode="quick"), masks))
     views = stack_views(rig)
-    return Observed(points, colors, views, crop_images(views, images, points))
+    return Skin(points, colors, views, crop_images(views, images, points))
 
 
 def crop_images(views: Views, images, points: np.ndarray) -> tuple[Crop | None, ...]:

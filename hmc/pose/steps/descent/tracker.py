@@ -20,7 +20,7 @@ from hmc.pose.objectives.multicue import CueSettings, Draw, draw_cues, draw_of_g
 from hmc.pose.objectives.surface_cue import VoxelCloud, place, voxel_cloud
 from hmc.pose.steps.descent.levenberg import LmSettings, lm_run
 from hmc.pose.steps.descent.rescue import RescueSettings, propose_limb, unexplained
-from hmc.pose.views.skin import Observed
+from hmc.pose.views.skin import Skin
 from hmc.search.meta_descent import Evaluation, SmdSettings, smd_run
 
 __all__ = [
@@ -130,9 +130,7 @@ def track_init(state: np.ndarray) -> TrackState:
     return TrackState(np.asarray(state, float), np.zeros(len(state)))
 
 
-def track_step(
-    rng: np.random.Generator, tracker: SmdTracker, before: TrackState, observed: Observed | None
-) -> tuple[TrackState, TrackInfo]:
+def track_step(rng: np.random.Generator, tracker: SmdTracker, before: TrackState, observed: Skin | None) -> tuple[TrackState, TrackInfo]:
     """One frame.
 
     Parameters
@@ -140,7 +138,7 @@ def track_step(
     rng : numpy.random.Generator
     tracker : SmdTracker
     before : TrackState
-    observed : Observed or None
+    observed : Skin or None
         None where nothing is seen of the person: the pose stays.
 
     Returns
@@ -153,7 +151,7 @@ def track_step(
     preset, limits = tracker.preset, tracker.body.skeleton.limits
     low, high = limits.low[FREE], limits.high[FREE]
     start = np.clip((before.state + preset.predict * before.velocity)[FREE], low, high)
-    scene = make_scene(tracker, observed, start, before.colors)
+    scene = make_scene(tracker, observed, start, before.colors, before.state)
     parameters, first, _ = optimise(rng, scene, start, [np.arange(len(FREE))])
     parameters, second, value = optimise(rng, scene, parameters, CHAINS, preset.refine_share)
     parameters = _rescued(rng, scene, parameters)
@@ -171,7 +169,7 @@ def _rescued(rng: np.random.Generator, scene: Scene, parameters: np.ndarray) -> 
 
     def lost_at(at: np.ndarray) -> np.ndarray:
         grid = tracker.grid
-        points = place(_posed(tracker, at), grid.points[::3], grid.segment[::3])
+        points = place(_posed(tracker, at, scene.base), grid.points[::3], grid.segment[::3])
         return unexplained(points, scene.cloud, settings.far_m)
 
     lost = lost_at(parameters)
@@ -197,12 +195,15 @@ class Scene:
         None: no edges.
     chosen : ndarray of int
         Views that edges are looked for in.
+    base : ndarray, shape (27,)
+        A pose with the waist as it is held.
     """
 
     tracker: SmdTracker
     cloud: VoxelCloud
     maps: EdgeMaps | None
     chosen: np.ndarray
+    base: np.ndarray = field(default_factory=lambda: np.zeros(N_DOF))
 
     def draw(self, rng: np.random.Generator, trunk: bool) -> Draw:
         """Samples for the whole body, or for the chains."""
@@ -213,34 +214,38 @@ class Scene:
     def match(self, parameters: np.ndarray, drawn: Draw) -> tuple[Matches, np.ndarray]:
         """Matches of drawn samples at some parameters (24,), and their Jacobian."""
         tracker = self.tracker
-        posed = _posed(tracker, parameters)
+        posed = _posed(tracker, parameters, self.base)
         matches = match_cues(tracker.body, tracker.grid, tracker.strips, posed, self.cloud, self.maps, drawn, tracker.preset.cues)
         return matches, jacobian(posed, matches)
 
 
-def make_scene(tracker: SmdTracker, observed: Observed, parameters: np.ndarray, colors: ColorModel | None = None) -> Scene:
+def make_scene(
+    tracker: SmdTracker, observed: Skin, parameters: np.ndarray, colors: ColorModel | None = None, base: np.ndarray | None = None
+) -> Scene:
     """Sort out the voxels' colours, choose the views and find their edges.
 
     Parameters
     ----------
     tracker : SmdTracker
-    observed : Observed
+    observed : Skin
     parameters : ndarray, shape (24,)
         Where the body is expected.
     colors : ColorModel, optional
+    base : ndarray, shape (27,), optional
+        A pose with the waist as it is to be held; straight by default, as in the paper.
     """
-    cues = tracker.preset.cues
+    cues, base = tracker.preset.cues, np.zeros(N_DOF) if base is None else base
     fits = None
     if cues.colors is not None and observed.colors is not None and colors is not None:
         fits = color_fits(colors, observed.colors, cues.colors)
     cloud = voxel_cloud(observed.points, fits)
     usable = np.array([crop is not None for crop in observed.crops], bool)
     if cues.edge_weight == 0 or observed.views is None or not usable.any():
-        return Scene(tracker, cloud, None, np.zeros(0, int))
-    shown = shown_contours(tracker.body, tracker.strips, _posed(tracker, parameters), observed.views)
+        return Scene(tracker, cloud, None, np.zeros(0, int), base)
+    shown = shown_contours(tracker.body, tracker.strips, _posed(tracker, parameters, base), observed.views)
     chosen = best_views(shown, usable, cues.views)
     crops = [crop for k in chosen if (crop := observed.crops[k]) is not None]
-    return Scene(tracker, cloud, edge_maps(observed.views.select(chosen), crops, shown[chosen], cues.edges), chosen)
+    return Scene(tracker, cloud, edge_maps(observed.views.select(chosen), crops, shown[chosen], cues.edges), chosen, base)
 
 
 def optimise(
@@ -307,18 +312,18 @@ def evaluation(matches: Matches, rows: np.ndarray, width: float) -> Evaluation:
     return Evaluation(value, gradient, lambda vector: gauss_newton_product(rows, slopes, vector), curvature)
 
 
-def _new_colors(scene: Scene, observed: Observed, parameters: np.ndarray, colors: ColorModel | None) -> ColorModel | None:
+def _new_colors(scene: Scene, observed: Skin, parameters: np.ndarray, colors: ColorModel | None) -> ColorModel | None:
     """Colours of the patches after a frame."""
     settings, tracker = scene.tracker.preset.cues.colors, scene.tracker
     if settings is None or observed.colors is None:
         return colors
-    posed = _posed(tracker, parameters)
+    posed = _posed(tracker, parameters, scene.base)
     if colors is None:
         return learn_colors(tracker.grid, posed, scene.cloud, observed.colors, settings)
     return update_colors(colors, tracker.grid, posed, scene.cloud, observed.colors, settings)
 
 
-def _posed(tracker: SmdTracker, parameters: np.ndarray) -> Posed:
-    state = np.zeros(N_DOF)
+def _posed(tracker: SmdTracker, parameters: np.ndarray, base: np.ndarray) -> Posed:
+    state = base.copy()
     state[FREE] = parameters
     return pose_body(tracker.body, state)

@@ -13,9 +13,9 @@ import numpy as np
 from hmc.body.joints import dof_index
 from hmc.body.prior import POSTURE
 from hmc.pose.objectives.four_scores import ScoreMaps, ScoreTable, ScoreVariances, log_likelihood_factorised, scores
-from hmc.pose.objectives.restrict import part_mask, restrict_table
 from hmc.pose.steps.hidden.limbs import LimbSettings, limb_spread_deg
 from hmc.pose.steps.hidden.shown import in_doubt, limb_signs, place_flesh
+from hmc.pose.steps.restrict import part_mask, restrict_table
 from hmc.pose.views.hull_target import HullTarget
 from hmc.search.filters import AnnealedSettings, annealed_step, particle_init
 from hmc.search.truncated import truncated_normal

@@ -11,8 +11,8 @@ from hmc.body.flesh import place_points
 from hmc.body.kinematics import segment_transforms
 from hmc.body.nearest_cone import part_distances
 from hmc.pose.objectives.four_scores import ScoreMaps, ScoreTable
-from hmc.pose.objectives.restrict import part_mask
 from hmc.pose.steps.hidden.limbs import LimbSettings
+from hmc.pose.steps.restrict import part_mask
 from hmc.pose.views.hull_target import HullTarget, distance_at
 
 __all__ = ["LimbSigns", "PlacedFlesh", "covered", "in_doubt", "limb_signs", "place_flesh"]

@@ -11,7 +11,7 @@ import numpy as np
 
 from hmc.body.rest import SWARM_DEG
 from hmc.body.spin_skeleton import ANGLE_INDEX, ANGLES, N_PARAMETERS, SkeletonModel, part_chains, segment_ends
-from hmc.pose.objectives.curves import KINDS, Observed, error_of_chains, skeleton_error
+from hmc.pose.objectives.curves import KINDS, SampledCurves, error_of_chains, skeleton_error
 from hmc.pose.objectives.volume import volume_error
 from hmc.search.swarm import PsoSettings, pso_run
 
@@ -134,14 +134,14 @@ def bounds_around(model: SkeletonModel, state: np.ndarray, metres: float, radian
     return low, high
 
 
-def fit_cost(model: SkeletonModel, states: np.ndarray, observed: Observed, prior: Prior | None = None) -> np.ndarray:
+def fit_cost(model: SkeletonModel, states: np.ndarray, observed: SampledCurves, prior: Prior | None = None) -> np.ndarray:
     """What swarms minimise: Eq. 3-27, and with voxels beside the curves also how the skeleton lies in them.
 
     Parameters
     ----------
     model : SkeletonModel
     states : ndarray, shape (n, 23)
-    observed : Observed
+    observed : SampledCurves
     prior : Prior, optional
 
     Returns
@@ -163,7 +163,7 @@ def fit_cost(model: SkeletonModel, states: np.ndarray, observed: Observed, prior
 def fit_hierarchical(
     rng: np.random.Generator,
     model: SkeletonModel,
-    observed: Observed,
+    observed: SampledCurves,
     start: np.ndarray,
     settings: FitSettings | None = None,
     spin_range: float = np.pi,
@@ -175,7 +175,7 @@ def fit_hierarchical(
     ----------
     rng : numpy.random.Generator
     model : SkeletonModel
-    observed : Observed
+    observed : SampledCurves
     start : ndarray, shape (23,)
         About where the torso is; the other angles are what is likely where curves are missing.
     settings : FitSettings, optional
@@ -212,7 +212,7 @@ def fit_hierarchical(
 def fit_around(
     rng: np.random.Generator,
     model: SkeletonModel,
-    observed: Observed,
+    observed: SampledCurves,
     starts: np.ndarray,
     low: np.ndarray,
     high: np.ndarray,
@@ -251,7 +251,12 @@ def _one_part_moved(rng: np.random.Generator, state: np.ndarray, low: np.ndarray
 
 
 def fit_flat(
-    rng: np.random.Generator, model: SkeletonModel, observed: Observed, start: np.ndarray, swarm: PsoSettings, spin_range: float = np.pi
+    rng: np.random.Generator,
+    model: SkeletonModel,
+    observed: SampledCurves,
+    start: np.ndarray,
+    swarm: PsoSettings,
+    spin_range: float = np.pi,
 ) -> Fitted:
     """All 23 parameters at once, for comparison; arguments as for `fit_hierarchical`."""
     low, high = bounds_around(model, start, 0.25, 4 * np.pi)
@@ -261,7 +266,12 @@ def fit_flat(
 
 
 def fine_tune(
-    rng: np.random.Generator, model: SkeletonModel, observed: Observed, state: np.ndarray, settings: FitSettings, prior: Prior | None = None
+    rng: np.random.Generator,
+    model: SkeletonModel,
+    observed: SampledCurves,
+    state: np.ndarray,
+    settings: FitSettings,
+    prior: Prior | None = None,
 ) -> Fitted:
     """Section 3.2.2.4: torso, head, arms and legs one after the other, near where they are."""
     evaluations = 0
@@ -328,7 +338,7 @@ def torso_moves(model: SkeletonModel, state: np.ndarray) -> np.ndarray:
     return np.concatenate([np.eye(7), give.T], axis=1)
 
 
-def _fitted(model: SkeletonModel, observed: Observed, state: np.ndarray, evaluations: int) -> Fitted:
+def _fitted(model: SkeletonModel, observed: SampledCurves, state: np.ndarray, evaluations: int) -> Fitted:
     errors, choice = skeleton_error(model, state[None], observed)
     cost = float(fit_cost(model, state[None], observed)[0])
     return Fitted(state, float(errors[0]), cost, observed.parts_of(int(choice[0])), evaluations)

@@ -12,7 +12,6 @@ import numpy as np
 from hmc.body.spin_skeleton import SkeletonModel
 from hmc.pose.objectives.curves import curves_near, curves_of, observe_curves
 from hmc.pose.spectral.reading import BodyReading
-from hmc.pose.steps.swarm.first import is_upright, pose_near, rest_poses
 from hmc.pose.steps.swarm.fit import (
     FitSettings,
     Fitted,
@@ -25,9 +24,8 @@ from hmc.pose.steps.swarm.fit import (
     rest_state,
 )
 from hmc.pose.steps.swarm.heading import facing_evidence, heading_of, spin_towards
-from hmc.pose.steps.swarm.lost_limbs import free_limbs
 
-__all__ = ["SwarmInfo", "SwarmSettings", "SwarmState", "missed", "start_fits", "swarm_step"]
+__all__ = ["SwarmInfo", "SwarmSettings", "SwarmState", "fit_near", "is_upright", "missed", "start_fits", "swarm_step"]
 
 FAR = "the nearest pose is too far from the curves"
 
@@ -51,12 +49,8 @@ class SwarmSettings:
     doubt_m, doubt_ratio : float
         A start is tried beside the temporal fit when its cost is larger than the first, metres, and than the second times the cost that
         was usual.
-    retry_frames : int
-        A pose whose cost is larger than `doubt_m` is compared with a fresh one as often, whatever is usual.
     margin_m : float
         The start is taken when its cost is smaller by this, metres.
-    margin_share : float
-        And a fresh pose only when its cost is smaller by this share too: of a fat hull every pose costs much, and says little.
     facing_m : float
         By how much facing straight backwards raises an error, metres.
     backwards : float
@@ -65,10 +59,6 @@ class SwarmSettings:
         A curve that is farther than this from every part of the last pose is not taken for one, metres.
     lost_m : float
         A frame whose cost is larger has no fit, metres.
-    rest_weight : float
-        How much a body at rest counts in the first pose (`Prior`).
-    first_facing_m : float
-        By how much facing as the heading says lowers the cost of a first pose, metres.
     last_weight : float
         How much the last pose counts in a new start (`Prior`).
     spin_weight : float
@@ -89,15 +79,11 @@ class SwarmSettings:
     iterations: int = 15
     doubt_m: float = 0.055
     doubt_ratio: float = 1.4
-    retry_frames: int = 5
     margin_m: float = 0.012
-    margin_share: float = 0.15
     facing_m: float = 0.02
     backwards: float = -2.5
     farthest_m: float = 0.25
     lost_m: float = 0.15
-    rest_weight: float = 0.02
-    first_facing_m: float = 0.02
     last_weight: float = 0.02
     spin_weight: float = 0.01
     always_check: bool = False
@@ -118,8 +104,6 @@ class SwarmState:
         Sum of the evidence for the heading since the last start; negative: probably back to front.
     missed : int
         Frames without a fit since the last one.
-    untried : int
-        Frames since a fresh pose was tried.
     """
 
     state: np.ndarray
@@ -127,7 +111,6 @@ class SwarmState:
     usual_m: float
     facing: float = 0.0
     missed: int = 0
-    untried: int = 0
 
 
 @dataclass(frozen=True)
@@ -244,25 +227,14 @@ def swarm_step(
         return missed(state), SwarmInfo(f"no fit: {reading.status}", np.nan, False, False, 0, doubts)
     heading = heading_of(reading.feet, velocity)
     if state is None:
-        first = _first_pose(rng, model, reading, heading, settings)
-        if first is None or (settings.voxels and first.cost_m > settings.lost_m):
-            why = "nobody is upright in the curves or the voxels" if first is None else FAR
-            return None, SwarmInfo(f"no fit: {why}", np.nan, False, False, 0, doubts)
-        found = first
-        facing = facing_evidence(found.state, heading)
-        return SwarmState(found.state, np.zeros_like(found.state), found.cost_m, facing), _info(found, True, False, 0, doubts)
+        trials = start_fits(rng, model, reading, heading, settings)
+        first = next((one for one in trials if is_upright(one.state)), None)
+        if first is None:
+            return None, SwarmInfo("no fit: nobody is upright in the curves", np.nan, False, False, 0, doubts)
+        facing = facing_evidence(first.state, heading)
+        return SwarmState(first.state, np.zeros_like(first.state), first.cost_m, facing), _info(first, True, False, 0, doubts)
     frames = 1 + state.missed
-    metres = max(settings.reach_m_s * frames / fps, settings.least_reach_m)
-    radians = max(settings.reach_rad_s * frames / fps, settings.least_reach_rad)
-    prior = Prior(state.state, spin_weight=settings.spin_weight / frames)
-    low, high = bounds_around(model, state.state, metres, min(radians, np.pi))
-    starts = np.stack([state.state, state.state + state.velocity])
-    near = curves_near(model, state.state, reading, settings.farthest_m)
-    observed = observe_curves(model, near, settings.nodes, volume=volume)
-    found = fit_around(rng, model, observed, starts, low, high, settings.fit, settings.particles, settings.iterations, prior)
-    freed, more = free_limbs(rng, model, observed, found.state, prior) if settings.voxels else (found.state, 0)
-    tuned = fine_tune(rng, model, observed, freed, settings.fit, prior)
-    found = replace(tuned, evaluations=found.evaluations + more + tuned.evaluations)
+    found = fit_near(rng, model, state, reading, fps, settings)
     facing = state.facing + facing_evidence(found.state, heading)
     started = turned = False
     spent = 0
@@ -282,61 +254,47 @@ def swarm_step(
             facing = facing_evidence(trial.state, heading)
         elif backwards:
             facing = 0.0
-    untried = state.untried + 1
-    if settings.voxels and not started and cost_m > settings.doubt_m and untried >= settings.retry_frames:
-        # What is wrong costs much in frame after frame, and is what is usual then.
-        trial = _fresh_pose(rng, model, reading, found, replace(prior, weight=settings.last_weight), settings)
-        spent, untried = spent + trial.evaluations, 0
-        if trial.cost_m < found.cost_m - max(settings.margin_m, settings.margin_share * found.cost_m):
-            found, started = trial, True
     if found.cost_m > settings.lost_m:
         read = reading.status == "read"
         why = FAR if read else reading.status
         error_m = found.error_m if read else np.nan
-        return missed(replace(state, untried=untried)), SwarmInfo(
-            f"no fit: {why}", error_m, False, False, found.evaluations + spent, doubts, found.cost_m
-        )
+        return missed(state), SwarmInfo(f"no fit: {why}", error_m, False, False, found.evaluations + spent, doubts, found.cost_m)
     change = np.zeros_like(found.state) if started else (found.state - state.state) / frames
     # Sums of evidence fade, so that a wrong start can be seen after a while.
-    now = SwarmState(found.state, change, 0.9 * state.usual_m + 0.1 * found.cost_m, 0.97 * facing, 0, untried)
+    now = SwarmState(found.state, change, 0.9 * state.usual_m + 0.1 * found.cost_m, 0.97 * facing)
     return now, _info(found, started, turned, spent, doubts)
 
 
-def _first_pose(
-    rng: np.random.Generator, model: SkeletonModel, reading: BodyReading, heading: np.ndarray | None, settings: SwarmSettings
-) -> Fitted | None:
-    """The upright pose that explains a frame best; None where there is none."""
-    trials = start_fits(rng, model, reading, heading, settings)
-    if settings.voxels:
-        rest = rest_poses(rng, model, reading, heading, settings.particles, settings.iterations, settings.fit)
-        likely = Prior(rest_state(model, np.zeros(3), np.array([0.0, 0.0, 1.0])), settings.rest_weight)
-        trials = _led_near(rng, model, reading, [*trials[:2], *rest], likely, settings)
-        if heading is not None:
-            way = heading / np.linalg.norm(heading)
-            trials.sort(key=lambda one: _unlikely(one, likely) - settings.first_facing_m * facing_evidence(one.state, way))
-    return next((one for one in trials if is_upright(one.state)), None)
-
-
-def _fresh_pose(
-    rng: np.random.Generator, model: SkeletonModel, reading: BodyReading, found: Fitted, likely: Prior, settings: SwarmSettings
+def fit_near(
+    rng: np.random.Generator, model: SkeletonModel, state: SwarmState, reading: BodyReading, fps: float, settings: SwarmSettings
 ) -> Fitted:
-    """The better of a pose with its limbs tried anew, and of a body at rest in its place that is led into the voxels."""
-    rest = rest_poses(rng, model, reading, None, settings.particles, settings.iterations, settings.fit, found.state)
-    trials = _led_near(rng, model, reading, [found, *rest], likely, settings)
-    return replace(trials[0], evaluations=sum(one.evaluations for one in (*trials, *rest)))
+    """The pose near the last one that explains a frame best: a swarm within the temporal constraint, then every part tuned.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    model : SkeletonModel
+    state : SwarmState
+    reading : BodyReading
+    fps : float
+    settings : SwarmSettings
+    """
+    frames = 1 + state.missed
+    metres = max(settings.reach_m_s * frames / fps, settings.least_reach_m)
+    radians = max(settings.reach_rad_s * frames / fps, settings.least_reach_rad)
+    prior = Prior(state.state, spin_weight=settings.spin_weight / frames)
+    low, high = bounds_around(model, state.state, metres, min(radians, np.pi))
+    starts = np.stack([state.state, state.state + state.velocity])
+    near = curves_near(model, state.state, reading, settings.farthest_m)
+    observed = observe_curves(model, near, settings.nodes, volume=reading.volume if settings.voxels else None)
+    found = fit_around(rng, model, observed, starts, low, high, settings.fit, settings.particles, settings.iterations, prior)
+    tuned = fine_tune(rng, model, observed, found.state, settings.fit, prior)
+    return replace(tuned, evaluations=found.evaluations + tuned.evaluations)
 
 
-def _led_near(
-    rng: np.random.Generator, model: SkeletonModel, reading: BodyReading, rough: list[Fitted], likely: Prior, settings: SwarmSettings
-) -> list[Fitted]:
-    """Rough poses made better, the likeliest first."""
-    near = (settings.nodes, settings.farthest_m, settings.fit, likely)
-    return sorted((pose_near(rng, model, reading, one.state, *near) for one in rough), key=lambda one: _unlikely(one, likely))
-
-
-def _unlikely(found: Fitted, likely: Prior) -> float:
-    """What a pose costs, and what it has of angles that are not likely, metres."""
-    return found.cost_m + likely.weight * float(np.abs(found.state[7:] - likely.state[7:]).mean())
+def is_upright(state: np.ndarray) -> bool:
+    """Whether the neck of a state (23,) is above its pelvis: people begin a recording upright, bent or sitting, never on their heads."""
+    return bool(state[5] > state[2])
 
 
 def missed(state: SwarmState | None) -> SwarmState | None:

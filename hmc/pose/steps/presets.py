@@ -7,13 +7,14 @@ from typing import Literal
 
 import numpy as np
 
+from hmc.body.dimensions import FitBodySettings
 from hmc.body.joints import DOF_NAMES
 from hmc.body.scalable_models import Inclusive
 from hmc.errors import InputError
 from hmc.pose.objectives.symmetric import SymmetricSettings
-from hmc.pose.starts.fit_body import FitBodySettings
 from hmc.pose.steps.hidden.limbs import LimbSettings
 from hmc.pose.steps.limb_search import SearchSettings
+from hmc.pose.steps.polish import PolishSettings
 from hmc.pose.steps.refine import RefineSettings
 from hmc.search.filters import AnnealedSettings
 from hmc.search.structural import StructuralSettings
@@ -120,6 +121,11 @@ class PosePreset:
             raise InputError(f"preset '{self.name}': `search.far_m` must not exceed `symmetric.cap_m`, beyond which no distance is known")
         if self.refine is not None and self.likelihood != "symmetric":
             raise InputError(f"preset '{self.name}': `refine` needs the symmetric likelihood")
+
+    @property
+    def polish(self) -> PolishSettings:
+        """How its estimates are refined."""
+        return PolishSettings(self.symmetric, self.fine_hull_points, self.refine or RefineSettings(), self.search)
 
 
 PRESETS: dict[str, PosePreset] = {

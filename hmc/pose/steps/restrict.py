@@ -14,6 +14,7 @@ from hmc.body.flesh import SurfaceSamples
 from hmc.body.limbs import CHAIN_OF_PART
 from hmc.body.model import PART_OF_SEGMENT, PARTS, BodyModel, Cones
 from hmc.body.nearest_cone import part_distances
+from hmc.pose.method import Subject
 from hmc.pose.objectives.four_scores import (
     ScoreMaps,
     ScoreTable,
@@ -21,12 +22,13 @@ from hmc.pose.objectives.four_scores import (
     log_likelihood_by_part,
     log_likelihood_factorised,
     log_likelihood_global,
+    observe,
     scores,
 )
-from hmc.pose.objectives.symmetric import BodyPoints, symmetric_cost, symmetric_cost_by_part, thinned
-from hmc.pose.steps.annealed import PoseFilter
+from hmc.pose.objectives.symmetric import BodyPoints, Symmetric, SymmetricSettings, thinned
 from hmc.pose.views.hull_target import HullTarget
 from hmc.search.filters import LogLikelihood
+from hmc.voxels.grid import VoxelGrid
 
 __all__ = [
     "ScoreData",
@@ -35,9 +37,10 @@ __all__ = [
     "nearest_part",
     "part_body",
     "part_mask",
-    "restrict_filter",
     "restrict_table",
     "restrict_target",
+    "restricted",
+    "score_maps",
 ]
 
 #: Sums over the parts of each limb, shape (n_parts, n_limbs).
@@ -63,24 +66,28 @@ def part_body(body: BodyModel, keep: np.ndarray) -> BodyModel:
     )
 
 
-def restrict_filter(filt: PoseFilter, keep: np.ndarray) -> PoseFilter:
-    """A person's filter for a body of some parts only.
+def restricted(subject: Subject, keep: np.ndarray, free: np.ndarray | None = None) -> Subject:
+    """A person with the flesh of some parts only.
 
     Parameters
     ----------
-    filt : PoseFilter
+    subject : Subject
     keep : ndarray of bool, shape (n_parts,)
+    free : ndarray of bool, shape (27,), optional
+        Angles that may move; as before by default.
     """
+    free = subject.free if free is None else free
     if keep.all():
-        return filt
-    surface, axes, cones = filt.samples.surface, filt.samples.axes, filt.body.cones
+        return replace(subject, free=free)
+    surface, axes, cones = subject.points.surface, subject.points.axes, subject.body.cones
     rows = keep[surface.part]
     surface = SurfaceSamples(surface.points[rows], surface.normals[rows], surface.segment[rows], surface.part[rows])
     # Points on the axes stay, so that overlap weighs as much as ever; those of missing parts meet nothing.
     there = keep[PART_OF_SEGMENT[axes.segment]]
     axes = replace(axes, against=axes.against[:, keep[cones.part]] & there[:, None])
-    table = None if filt.table is None else restrict_table(filt.table, keep)
-    return replace(filt, body=part_body(filt.body, keep), samples=BodyPoints(surface, axes), table=table)
+    table = None if subject.flesh is None else restrict_table(subject.flesh, keep)
+    body, parts = part_body(subject.body, keep), subject.parts & keep
+    return replace(subject, body=body, points=BodyPoints(surface, axes), flesh=table, parts=parts, free=free)
 
 
 def restrict_table(table: ScoreTable, keep: np.ndarray) -> ScoreTable:
@@ -159,44 +166,68 @@ class SymmetricData:
     target : HullTarget
     points : ndarray, shape (k, 3) or (k, 6)
         What has to be explained.
-    part : ndarray of int, shape (k,)
-        Which part is expected to explain each: the nearest one in the pose that is expected.
+    settings : SymmetricSettings
+    part : ndarray of int, shape (k,), optional
+        Which part is expected to explain each: the nearest one in the pose that is expected. Needed for some parts only.
     """
 
     target: HullTarget
     points: np.ndarray
-    part: np.ndarray
+    settings: SymmetricSettings
+    part: np.ndarray | None = None
 
-    def likelihood(self, filt: PoseFilter, keep: np.ndarray, every: int = 1, by_limb: bool = False) -> LogLikelihood:
-        """Of the kept parts, at every so many-th point of the body's surface; `filt` is the whole body's. Whole, or a column a limb."""
-        one, target, settings = restrict_filter(filt, keep), restrict_target(self.target, keep), filt.preset.symmetric
-        samples = one.samples if every == 1 else thinned(one.samples, max(1, len(one.samples.surface.points) // every))
+    def likelihood(self, subject: Subject, keep: np.ndarray, every: int = 1, by_limb: bool = False) -> LogLikelihood:
+        """Of the kept parts, at every so many-th point of the body's surface; whole, or a column a limb."""
+        one, target = restricted(subject, keep), restrict_target(self.target, keep)
+        samples = one.points if every == 1 else thinned(one.points, max(1, len(one.points.surface.points) // every))
+        if self.part is None:
+            objective = Symmetric(one.body, samples, target, self.points, self.settings)
+            return lambda states: -objective.cost(states)
         rows = np.flatnonzero(keep[self.part])
         rows = rows if len(rows) else np.arange(1)
-        points, part = self.points[rows], self.part[rows]
+        objective = Symmetric(one.body, samples, target, self.points[rows], self.settings, self.part[rows])
         if by_limb:
-            return lambda states: -symmetric_cost_by_part(one.body, samples, states, target, points, part, settings) @ _LIMBS
-        return lambda states: -symmetric_cost(one.body, samples, states, target, points, settings)
+            return lambda states: -objective.by_part(states) @ _LIMBS  # type: ignore[operator]
+        return lambda states: -objective.cost(states)
 
 
 @dataclass(frozen=True)
 class ScoreData:
-    """A frame as the four scores read it."""
+    """A frame as the four scores read it.
+
+    Parameters
+    ----------
+    maps : ScoreMaps
+    whole : bool
+        The product of the scores of the whole body in place of that of its parts.
+    """
 
     maps: ScoreMaps
+    whole: bool = False
 
-    def likelihood(self, filt: PoseFilter, keep: np.ndarray, every: int = 1, by_limb: bool = False) -> LogLikelihood:
-        """Of the kept parts, at every so many-th point of the flesh; `filt` is the whole body's, with a table of its flesh.
-
-        Whole; or a column a limb, if the likelihood is a product over the parts.
-        """
-        if filt.table is None:
-            raise ValueError("`filt` has no table of its flesh")
-        table = coarser_table(restrict_table(filt.table, keep), every)
+    def likelihood(self, subject: Subject, keep: np.ndarray, every: int = 1, by_limb: bool = False) -> LogLikelihood:
+        """Of the kept parts, at every so many-th point of the flesh; whole, or a column a limb, if it is a product over the parts."""
+        if subject.flesh is None:
+            raise ValueError("the subject has no table of its flesh")
+        keep = keep & subject.parts
+        table = coarser_table(restrict_table(subject.flesh, keep), every)
         variances, counts = ScoreVariances(), table.counts[keep]
-        if filt.preset.likelihood == "global":
+        if self.whole:
             return lambda states: log_likelihood_global(scores(table, states, self.maps)[:, keep], counts, variances.whole_body())
         if by_limb:
             kept = variances.by_part()[keep]
             return lambda states: log_likelihood_by_part(scores(table, states, self.maps)[:, keep], kept) @ _LIMBS[keep]
         return lambda states: log_likelihood_factorised(scores(table, states, self.maps)[:, keep], variances.by_part()[keep])
+
+
+def score_maps(target: HullTarget, room: np.ndarray | None) -> ScoreMaps:
+    """The tolerant hull as the four scores read it.
+
+    Parameters
+    ----------
+    target : HullTarget
+    room : ndarray, shape (2, 3), or None
+        Where a body may be, metres; for the score Out.
+    """
+    grid = VoxelGrid(target.origin - 0.5 * target.voxel_size_m, target.voxel_size_m, target.distance.shape)
+    return observe(target.tolerant, grid, room)

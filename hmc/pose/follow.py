@@ -1,0 +1,285 @@
+"""The poses of everybody in a recording by any method: views in, poses out, streamed frame by frame.
+
+Each person is a state that a step takes from frame to frame (`hmc.pose.person`). Only the views of people who have just appeared are held
+in memory. Records of what is decided go to a journal, so that a run that was stopped goes on where it was.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from hmc.body.joints import DOF_NAMES
+from hmc.body.kinematics import landmark_masks, landmarks
+from hmc.errors import InputError
+from hmc.io.detections import DetectionTable
+from hmc.io.masks import MaskStep, kept_masks
+from hmc.io.recording import Recording, iterate_frames
+from hmc.io.results import PoseStates, PoseTable, TrackTable
+from hmc.landmarks import LANDMARKS
+from hmc.pose.method import Capture, PoseMethod
+from hmc.pose.person import Decided, PersonState, PersonTrack, PoseTask, person_step, taken_up
+from hmc.pose.records import keep_decided, kept_decided
+from hmc.pose.views.markers import marker_views, seen_in_frame
+from hmc.pose.views.person_view import IMAGES_FOR, PersonView, check_needs, views_of
+from hmc.tracking.resumable import WARM_UP_FRAMES, person_grid
+from hmc.tracking.tracks import velocities
+from hmc.voxels.grid import VoxelGrid
+from hmc.voxels.hulls import FrontendSettings, HullStep, stream_hulls
+
+__all__ = ["FollowOptions", "PosedPeople", "RunOptions", "follow", "only_person", "persons_of", "unfitted_notes"]
+
+logger = logging.getLogger("hmc")
+
+
+@dataclass(frozen=True)
+class PosedPeople:
+    """Everybody's poses.
+
+    Parameters
+    ----------
+    poses : PoseTable
+        Landmarks; NaN in a frame without a fit.
+    states : PoseStates
+        The same frames as state vectors, with the bodies.
+    costs : ndarray, shape (n,)
+        Of each row, as the method tells them; NaN where there is none.
+    notes : tuple of str
+        What a user should know, one line each.
+    details : tuple of mapping
+        What the method tells of each row beside that; empty for most.
+    status : tuple of str
+        ``"fitted"``, or why there is no pose, of each row.
+    """
+
+    poses: PoseTable
+    states: PoseStates
+    costs: np.ndarray
+    notes: tuple[str, ...]
+    details: tuple[Mapping[str, object], ...] = ()
+    status: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class FollowOptions:
+    """What a method is run with.
+
+    Parameters
+    ----------
+    voxel_size_m : float
+    seed : int
+        The same seed gives the same result, stopped and resumed or not.
+    height_m : float or None
+        Stature of everybody; estimated for each person where left out.
+    detections : DetectionTable or None
+        For methods that need them; one person's.
+    """
+
+    voxel_size_m: float = 0.03
+    seed: int = 0
+    height_m: float | None = None
+    detections: DetectionTable | None = None
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """How a run is kept and told of.
+
+    Parameters
+    ----------
+    frontend : FrontendSettings or None
+    journal : path, optional
+        File in which the run is kept, and from which it goes on.
+    masks : path, optional
+        File in which silhouettes were kept under the same key; where it lacks any that are needed, they are made again.
+    key : str
+        Says what the run depends on. A journal with another key is begun anew.
+    on_problem : callable, optional
+        Called with one line for everything that was survived.
+    progress : callable, optional
+        ``progress(steps, total)`` passes the frames on and may show how far they are.
+    """
+
+    frontend: FrontendSettings | None = None
+    journal: str | Path | None = None
+    masks: str | Path | None = None
+    key: str = ""
+    on_problem: Callable[[str], None] = field(default=logger.warning)
+    progress: Callable[[Iterable, int], Iterable] | None = None
+
+
+def follow(
+    recording: Recording,
+    tracks: TrackTable | None,
+    method: PoseMethod,
+    options: FollowOptions | None = None,
+    run: RunOptions | None = None,
+) -> PosedPeople:
+    """The pose of every tracked person in every frame of their track.
+
+    Parameters
+    ----------
+    recording : Recording
+    tracks : TrackTable or None
+        As from `hmc.tracking.resumable.track_recording`; None for a method that needs none: there is one person then, in all frames.
+    method : PoseMethod
+    options : FollowOptions, optional
+    run : RunOptions, optional
+
+    Returns
+    -------
+    PosedPeople
+
+    Raises
+    ------
+    InputError
+        When the voxels are too many for the memory, or what the method needs is not given.
+    """
+    options, run, needs = options or FollowOptions(), run or RunOptions(), check_needs(method.needs)
+    if "detections" in needs and options.detections is None:
+        raise InputError(f"method {method.name} needs detections (frame, camera, u, v)")
+    tracks = only_person(recording) if tracks is None else tracks
+    capture = Capture(recording.fps, options.voxel_size_m, recording.room, recording.rig)
+    task, persons = PoseTask(method, capture, options.seed, options.height_m), persons_of(recording, tracks)
+    states = dict.fromkeys(persons, PersonState())
+    done: list[Decided] = []
+    for decided in kept_decided(run.journal, run.key, task):
+        done.append(replace(decided, tracked=None))
+        states[decided.person] = taken_up(task, states[decided.person], decided)
+    left = {number: person.frames[person.frames > states[number].done_to] for number, person in persons.items()}
+    first = min((int(frames[0]) for frames in left.values() if len(frames)), default=None)
+    for views in () if first is None else _views_from(recording, tracks, method, (options, run), first):
+        for number, view in views.items():
+            before = states[number].done_to
+            if view.frame <= before:
+                continue
+            view = replace(view, velocity=persons[number].velocity(view.frame))
+            states[number], new = person_step(task, persons[number], states[number], view)
+            for decided in new:
+                keep_decided(run.journal, decided, before)
+                done.append(replace(decided, tracked=None))  # memories are not kept for long
+    return _posed_people(done)
+
+
+def _views_from(
+    recording: Recording, tracks: TrackTable, method: PoseMethod, how: tuple[FollowOptions, RunOptions], first: int
+) -> Iterator[dict[int, PersonView]]:
+    """What each frame shows of everybody, from the first that somebody still needs to the end of the selection."""
+    options, run = how
+    end = recording.start + recording.n_frames
+    if method.needs <= {"detections"}:
+        frames: Iterable = range(first, end)
+        for frame in run.progress(frames, end - first) if run.progress else frames:
+            persons = tracks.persons[tracks.frames == frame].tolist()
+            yield _with_markers({person: PersonView(frame) for person in persons}, recording, method, options)
+        return
+    grid = person_grid(recording, options.voxel_size_m)
+    hulls: Iterable = _hulls_from(recording, grid, run, first, bool(method.needs & IMAGES_FOR))
+    for hull in run.progress(hulls, end - first) if run.progress else hulls:
+        yield _with_markers(views_of(recording, grid, tracks, hull, method.needs), recording, method, options)
+
+
+def _hulls_from(recording: Recording, grid: VoxelGrid, run: RunOptions, first: int, images: bool) -> Iterator[HullStep]:
+    """Hulls from a frame on, of the silhouettes that were kept, where they were."""
+    end = recording.start + recording.n_frames
+    kept: Iterable[MaskStep] | None = None if run.masks is None else kept_masks(run.masks, run.key, first, end)
+    if kept is not None and images:
+        frames = iterate_frames(recording, first, end, run.on_problem)
+        kept = (replace(step, images=frame.images) for step, frame in zip(kept, frames, strict=True))
+    return stream_hulls(recording, grid, run.frontend, first=first, warm_up=WARM_UP_FRAMES, masks=kept, on_problem=run.on_problem)
+
+
+def _with_markers(views: dict[int, PersonView], recording: Recording, method: PoseMethod, options: FollowOptions) -> dict[int, PersonView]:
+    """The same with the frame's detections, where the method needs them."""
+    if "detections" not in method.needs or options.detections is None:
+        return views
+    rig, detections = recording.rig, options.detections
+    return {
+        person: replace(view, markers=seen_in_frame(rig, marker_views(rig), detections.in_frame(view.frame, rig.names), method.gate_px))
+        for person, view in views.items()
+    }
+
+
+def only_person(recording: Recording) -> TrackTable:
+    """The track of somebody who is there in every frame of the selection, nobody knows where: person 0."""
+    frames = np.arange(recording.start, recording.start + recording.n_frames)
+    return TrackTable(frames, np.zeros(len(frames), int), np.zeros((len(frames), 3)))
+
+
+def persons_of(recording: Recording, tracks: TrackTable) -> dict[int, PersonTrack]:
+    """Everybody who is tracked in the recording's selection.
+
+    Parameters
+    ----------
+    recording : Recording
+    tracks : TrackTable
+        Rows outside of the selection do not count.
+    """
+    tracks = tracks.where((tracks.frames >= recording.start) & (tracks.frames < recording.start + recording.n_frames))
+    speed = velocities(tracks, recording.fps)
+    persons = {}
+    for number in np.unique(tracks.persons).tolist():
+        rows = np.flatnonzero(tracks.persons == number)
+        rows = rows[np.argsort(tracks.frames[rows])]
+        persons[number] = PersonTrack(number, tracks.frames[rows], speed[rows])
+    return persons
+
+
+def unfitted_notes(persons: Iterable[int], status: Iterable[str]) -> list[str]:
+    """A line for every reason why somebody has frames without a pose.
+
+    Parameters
+    ----------
+    persons, status : iterables of one length
+        Person and status of every frame of a track; "fitted" is a pose.
+    """
+    why = Counter((int(person), str(reason)) for person, reason in zip(persons, status, strict=True) if reason != "fitted")
+    return [f"person {who}: {n} frame{'s' if n > 1 else ''} without a pose: {reason}" for (who, reason), n in sorted(why.items())]
+
+
+def _posed_people(rows: Sequence[Decided]) -> PosedPeople:
+    """Tables of all rows of a run, in order of frame and person."""
+    none = np.zeros((0, len(DOF_NAMES)))
+    frames = np.array([frame for one in rows for frame in one.frames], int)
+    persons = np.array([one.person for one in rows for _ in one.frames], int)
+    states, infos = np.concatenate([none, *(one.states for one in rows)]), [info for one in rows for info in one.infos]
+    order = np.lexsort([persons, frames])
+    frames, persons, states, infos = frames[order], persons[order], states[order], [infos[k] for k in order]
+    status = np.array([info.status for info in infos], object)
+    missing = np.array([np.zeros(len(DOF_NAMES), bool) if info.missing is None else info.missing for info in infos]).reshape(states.shape)
+    bodies = {one.person: one.body for one in rows if one.body is not None}
+    positions = np.full((len(frames), len(LANDMARKS), 3), np.nan)
+    for person, body in bodies.items():
+        fitted = (persons == person) & (status == "fitted")
+        positions[fitted] = landmarks(body, states[fitted])
+        # An angle that no data shows is not a number, and neither is what it moves.
+        unknown = missing[fitted].astype(int) @ landmark_masks(body).T
+        positions[fitted] = np.where(unknown[..., None] > 0, np.nan, positions[fitted])
+    return PosedPeople(
+        PoseTable(frames, persons, positions),
+        PoseStates(
+            frames, persons, np.where(missing, np.nan, states), DOF_NAMES, {person: one.dimensions for person, one in bodies.items()}
+        ),
+        np.array([info.cost for info in infos], float),
+        tuple(unfitted_notes(persons, status) + _limb_notes(persons, missing)),
+        tuple(info.details for info in infos),
+        tuple(status.tolist()),
+    )
+
+
+def _limb_notes(persons: np.ndarray, missing: np.ndarray) -> list[str]:
+    """In how many frames each person lacks which joints."""
+    notes = []
+    for person in np.unique(persons[missing.any(axis=1)]).tolist():
+        counts: dict[str, int] = {}
+        for dof, n in enumerate(missing[persons == person].sum(axis=0)):
+            joint = DOF_NAMES[dof].rpartition("_")[0]
+            counts[joint] = max(counts.get(joint, 0), int(n))
+        lacking = ", ".join(f"{joint} {n}" for joint, n in counts.items() if n)
+        notes.append(f"person {person}: frames in which the data does not show what hangs on a joint: {lacking}")
+    return notes

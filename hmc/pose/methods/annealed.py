@@ -1,0 +1,59 @@
+"""The annealed particle filters: apf, and with scalable body models shbm-apf, ddm-apf and shbm-ddm-apf. Canton (2009), chapters 3, 6, 7."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from hmc.body.joints import canton_limits, default_limits
+from hmc.pose.legs import LegSettings, TellLegs
+from hmc.pose.method import PoseMethod
+from hmc.pose.recovery import Recovery
+from hmc.pose.starts.window import WindowStart
+from hmc.pose.steps.annealed import annealed, annealed_subject
+from hmc.pose.steps.hidden.step import with_hidden_limbs
+from hmc.pose.steps.polish import polished
+from hmc.pose.steps.presets import PosePreset
+from hmc.pose.steps.proposal import as_proposed
+from hmc.pose.steps.structured import structured
+
+__all__ = ["annealed_method", "annealed_pose_step"]
+
+
+def annealed_pose_step(preset: PosePreset):
+    """One frame by a preset: annealed, of one body or of models of rising detail; refined; without the limbs that nothing shows.
+
+    Parameters
+    ----------
+    preset : PosePreset
+
+    Returns
+    -------
+    callable
+        `hmc.pose.method.PoseStep`.
+    """
+    propose = structured(preset) if preset.models else annealed(preset)
+    step = as_proposed(propose) if preset.refine is None else polished(propose, preset.polish)
+    return step if preset.limbs is None else with_hidden_limbs(step, preset.limbs)
+
+
+def annealed_method(preset: PosePreset, name: str = "apf") -> PoseMethod:
+    """The method of a preset; a preset that refines also recovers lost poses and tells the legs.
+
+    Parameters
+    ----------
+    preset : PosePreset
+    name : str
+    """
+    refines = preset.refine is not None
+    return PoseMethod(
+        name,
+        preset.source,
+        start=WindowStart(preset),
+        step=annealed_pose_step(preset),
+        equip=partial(annealed_subject, preset=preset),
+        recover=Recovery(preset) if refines else None,
+        choose=TellLegs(preset.polish) if refines else None,
+        legs=LegSettings() if refines else None,
+        limits=canton_limits() if preset.body == "canton" else default_limits(),
+        settings=preset,
+    )

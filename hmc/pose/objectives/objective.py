@@ -1,0 +1,153 @@
+"""What every likelihood of a pose is: an objective, "how well does this pose explain this view".
+
+An objective is a value made of a body and a view. What filters ask of it is a cost for many states at once; what refines or descends asks
+for residuals and how they change; structural annealing asks which part of the body costs what. Objectives add up (`Sum`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from hmc.body.model import BodyModel
+
+__all__ = ["Linearised", "Objective", "Sum", "Unexplained", "cost_at"]
+
+
+@dataclass(frozen=True)
+class Unexplained:
+    """Where body and data contradict each other in one pose.
+
+    Parameters
+    ----------
+    outside : ndarray, shape (n,)
+        How far points of the body's surface are from where the data allows them, metres.
+    part : ndarray of int, shape (n,)
+        Of these points, the place in `hmc.body.model.PARTS`.
+    places : ndarray, shape (m, 3)
+        What the data shows, world, metres.
+    distance : ndarray, shape (m,)
+        How far each of these is from the body, metres; infinite beyond what is looked at.
+    """
+
+    outside: np.ndarray
+    part: np.ndarray
+    places: np.ndarray
+    distance: np.ndarray
+
+
+class Linearised(Protocol):
+    """An objective at one state.
+
+    Attributes
+    ----------
+    residuals : ndarray, shape (n,)
+        Metres; their squares sum to the cost.
+    near : object
+        What speeds up the next call of `Objective.linearise` for a state near this one.
+    unexplained : Unexplained or None
+        Where body and data contradict each other, if the objective can tell.
+    """
+
+    @property
+    def residuals(self) -> np.ndarray: ...
+    @property
+    def near(self) -> Any: ...
+    @property
+    def unexplained(self) -> Unexplained | None: ...
+    def pulls(self) -> tuple[np.ndarray, np.ndarray]:
+        """Which residuals change with the state, (m,), and how, (m, 27)."""
+
+
+class Objective(Protocol):
+    """How well poses explain a view; costs are square metres."""
+
+    @property
+    def body(self) -> BodyModel: ...
+    def cost(self, states: np.ndarray) -> np.ndarray:
+        """Of states (n, 27), shape (n,)."""
+
+    def by_part(self, states: np.ndarray) -> np.ndarray | None:
+        """The share of each of `hmc.body.model.PARTS` in the cost, shape (n, n_parts); None where it cannot be told."""
+
+    def linearise(self, state: np.ndarray, near: Any = None) -> Linearised:
+        """Residuals at a state (27,), with what it takes to tell how they change."""
+
+    def coarser(self, rng: np.random.Generator, n: int) -> Objective:
+        """The same on about `n` of the data's points."""
+
+
+@dataclass(frozen=True)
+class _SummedAt:
+    """Several objectives at one state."""
+
+    parts: tuple[Linearised, ...]
+
+    @property
+    def residuals(self) -> np.ndarray:
+        return np.concatenate([one.residuals for one in self.parts])
+
+    @property
+    def near(self) -> tuple[Any, ...]:
+        return tuple(one.near for one in self.parts)
+
+    @property
+    def unexplained(self) -> Unexplained | None:
+        known = [one.unexplained for one in self.parts if one.unexplained is not None]
+        if not known:
+            return None
+        return Unexplained(*(np.concatenate([getattr(one, name) for one in known]) for name in ("outside", "part", "places", "distance")))
+
+    def pulls(self) -> tuple[np.ndarray, np.ndarray]:
+        rows, jacobians, first = [], [], 0
+        for one in self.parts:
+            row, jacobian = one.pulls()
+            rows.append(first + row)
+            jacobians.append(jacobian)
+            first += len(one.residuals)
+        return np.concatenate(rows), np.concatenate(jacobians)
+
+
+@dataclass(frozen=True)
+class Sum:
+    """Objectives of one body, added up.
+
+    Parameters
+    ----------
+    parts : sequence of Objective
+        One at least; that each weighs what it should is for whoever makes it.
+    """
+
+    parts: Sequence[Objective]
+
+    @property
+    def body(self) -> BodyModel:
+        """The body of all of them."""
+        return self.parts[0].body
+
+    def cost(self, states: np.ndarray) -> np.ndarray:
+        """The sum, shape (n,)."""
+        return np.sum([one.cost(states) for one in self.parts], axis=0)
+
+    def by_part(self, states: np.ndarray) -> np.ndarray | None:
+        """The sum, shape (n, n_parts); None where one of them cannot tell."""
+        shares = [one.by_part(states) for one in self.parts]
+        return None if any(share is None for share in shares) else np.sum(shares, axis=0)
+
+    def linearise(self, state: np.ndarray, near: Any = None) -> Linearised:
+        """The residuals of all, one after the other."""
+        before = near or (None,) * len(self.parts)
+        return _SummedAt(tuple(one.linearise(state, other) for one, other in zip(self.parts, before, strict=True)))
+
+    def coarser(self, rng: np.random.Generator, n: int) -> Sum:
+        """Each on about `n` points."""
+        return Sum([one.coarser(rng, n) for one in self.parts])
+
+
+def cost_at(objective: Objective, state: np.ndarray) -> float:
+    """The cost of one state (27,), by its residuals: what a refinement compares, square metres."""
+    residuals = objective.linearise(state).residuals
+    return float(residuals @ residuals)

@@ -1,0 +1,167 @@
+"""The pose methods by name. A new method is one file and one line here; a stranger's is added with `register`.
+
+Nothing heavy is imported until a method is made, so that the command line can list the names.
+
+>>> sorted(METHODS)[:3]
+['apf', 'ddm-apf', 'marker-apf']
+>>> pose_method("smd", preset="kehl2006").source
+'Kehl and Van Gool (2006)'
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from hmc.errors import InputError
+
+if TYPE_CHECKING:
+    from hmc.pose.method import PoseMethod
+
+__all__ = ["INITS", "METHODS", "MethodChoice", "MethodEntry", "pose_method", "register"]
+
+#: Where a start takes its candidates from.
+INITS = ("hypotheses", "spectral")
+
+
+@dataclass(frozen=True)
+class MethodChoice:
+    """What a user says beside a method's name.
+
+    Parameters
+    ----------
+    preset : str
+    models : sequence of str
+        Scalable body models (`hmc.pose.methods.scalable.method_preset`).
+    init : str or None
+        One of `INITS`; None: as the preset has it.
+    skin : bool
+        Markers are worn on the skin; else they are the joint centres.
+    """
+
+    preset: str = "default"
+    models: Sequence[str] = ()
+    init: str | None = None
+    skin: bool = True
+
+
+@dataclass(frozen=True)
+class MethodEntry:
+    """A method in the registry.
+
+    Parameters
+    ----------
+    name : str
+    help : str
+        A line for the command line.
+    presets : tuple of str
+    make : callable
+        ``make(choice)`` gives the `hmc.pose.method.PoseMethod`.
+    needs_tracks : bool
+        Whether people are tracked first.
+    """
+
+    name: str
+    help: str
+    presets: tuple[str, ...]
+    make: Callable[[MethodChoice], PoseMethod]
+    needs_tracks: bool = True
+
+
+def pose_method(name: str, preset: str = "default", models: Sequence[str] = (), init: str | None = None, skin: bool = True) -> PoseMethod:
+    """A method by its name.
+
+    Parameters
+    ----------
+    name : str
+        A key of `METHODS`.
+    preset, models, init, skin
+        As in `MethodChoice`.
+
+    Raises
+    ------
+    InputError
+        When there is no such method or preset, or the method has no use for what is said.
+    """
+    if name not in METHODS:
+        raise InputError(f"no pose method named {name!r}; there are {', '.join(METHODS)}")
+    entry = METHODS[name]
+    if preset not in entry.presets:
+        raise InputError(f"no preset named {preset!r} of method {name}; there are {', '.join(entry.presets)}")
+    if models and "shbm" not in name and "ddm" not in name:
+        raise InputError(f"--model {models[0]}: method {name} has no use for a scalable model; shbm-apf, ddm-apf and shbm-ddm-apf have")
+    if init is not None and init not in INITS:
+        raise InputError(f"--init {init}: use one of {', '.join(INITS)}")
+    return entry.make(MethodChoice(preset, models, init, skin))
+
+
+def register(method: PoseMethod, help: str = "") -> None:
+    """Add a method under its name: from then on it is used by that name from Python, the command line and the experiments.
+
+    Parameters
+    ----------
+    method : PoseMethod
+    help : str
+        A line for the command line.
+
+    Raises
+    ------
+    InputError
+        When there is a method of this name.
+    """
+    if method.name in METHODS:
+        raise InputError(f"there is a pose method named {method.name!r} already; choose another name")
+    METHODS[method.name] = MethodEntry(method.name, help or method.source, ("default",), lambda choice: method)
+
+
+def _annealed(name: str) -> Callable[[MethodChoice], PoseMethod]:
+    def make(choice: MethodChoice) -> PoseMethod:
+        from hmc.pose.methods.annealed import annealed_method
+        from hmc.pose.methods.scalable import method_preset
+
+        return annealed_method(method_preset(_house(choice), name, choice.models), name)
+
+    return make
+
+
+def _house(choice: MethodChoice, preset: str | None = None):
+    """The preset whose start, refinement and recovery a method has, with the candidates that are asked for."""
+    from hmc.pose.steps.presets import pose_preset
+
+    house = pose_preset(preset or choice.preset)
+    return house if choice.init is None else replace(house, start=choice.init)
+
+
+def _smd(choice: MethodChoice) -> PoseMethod:
+    from hmc.pose.methods.smd import smd_method, smd_preset
+
+    return smd_method(smd_preset(choice.preset), None if choice.preset == "kehl2006" else _house(choice, "default"))
+
+
+def _pso(choice: MethodChoice) -> PoseMethod:
+    from hmc.pose.methods.pso import pso_method, swarm_preset
+
+    return pso_method(swarm_preset(choice.preset), None if choice.preset == "hsiao2008" else _house(choice, "default"))
+
+
+def _markers(choice: MethodChoice) -> PoseMethod:
+    from hmc.pose.methods.marker_apf import marker_method
+    from hmc.pose.steps.marker_filter import marker_preset
+
+    return marker_method(marker_preset(choice.preset), choice.skin)
+
+
+#: By name, in the order in which they are listed.
+METHODS: dict[str, MethodEntry] = {
+    entry.name: entry
+    for entry in (
+        MethodEntry("apf", "annealed particle filter (default)", ("default", "canton2009"), _annealed("apf")),
+        MethodEntry("shbm-apf", "by models of rising detail", ("default", "canton2009"), _annealed("shbm-apf")),
+        MethodEntry("ddm-apf", "without the limbs that the data does not show", ("default", "canton2009"), _annealed("ddm-apf")),
+        MethodEntry("shbm-ddm-apf", "both", ("default", "canton2009"), _annealed("shbm-ddm-apf")),
+        MethodEntry("smd", "superellipsoids by stochastic meta descent", ("default", "kehl2006"), _smd),
+        MethodEntry("pso", "spectral skeleton and particle swarm", ("default", "hsiao2008"), _pso),
+        MethodEntry("marker-apf", "annealed particle filter on markers", ("default", "canton2009"), _markers, needs_tracks=False),
+    )
+}

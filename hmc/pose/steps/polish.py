@@ -1,0 +1,103 @@
+"""A proposed pose refined on the symmetric cost, and limbs that got lost looked for: steps that any method takes.
+
+The cost and the search are ours (`hmc.pose.objectives.symmetric`, `hmc.pose.steps.refine`, `hmc.pose.steps.limb_search`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hmc.pose.method import PoseStep, StepInfo, Subject, Tracked, unseen
+from hmc.pose.objectives.objective import Objective
+from hmc.pose.objectives.symmetric import Symmetric, SymmetricSettings
+from hmc.pose.steps.limb_search import SearchSettings, lost_limbs, search_limbs
+from hmc.pose.steps.proposal import Propose, shows_enough
+from hmc.pose.steps.refine import RefineSettings, refine_all
+from hmc.pose.views.hull_target import HullTarget
+from hmc.pose.views.person_view import PersonView
+from hmc.pose.views.rays import points_to_explain
+
+__all__ = ["PolishSettings", "fine_objective", "polish", "polished"]
+
+
+@dataclass(frozen=True)
+class PolishSettings:
+    """How a proposed pose is refined.
+
+    Parameters
+    ----------
+    symmetric : SymmetricSettings
+    hull_points : int
+        Rays and points of the hull that have to be explained.
+    refine : RefineSettings
+    search : SearchSettings or None
+        Search for a limb that got lost; None: there is none.
+    """
+
+    symmetric: SymmetricSettings = field(default_factory=SymmetricSettings)
+    hull_points: int = 600
+    refine: RefineSettings = field(default_factory=RefineSettings)
+    search: SearchSettings | None = field(default_factory=SearchSettings)
+
+
+def fine_objective(rng: np.random.Generator, subject: Subject, target: HullTarget, settings: PolishSettings) -> Symmetric:
+    """The symmetric cost of a person in a frame, at as many points as a refinement takes."""
+    asked = points_to_explain(rng, target, settings.hull_points, settings.symmetric.ray_share)
+    return Symmetric(subject.body, subject.points, target, asked, settings.symmetric)
+
+
+def polish(
+    rng: np.random.Generator, objective: Objective, starts: Sequence[np.ndarray], anchor: np.ndarray, settings: PolishSettings
+) -> tuple[np.ndarray, float, list[str], int]:
+    """The best of several starts, refined, with limbs that the hulls contradict looked for.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    objective : Objective
+    starts : sequence of ndarray, shape (27,)
+    anchor : ndarray, shape (27,)
+        Pose on which what no data speaks of is held.
+    settings : PolishSettings
+
+    Returns
+    -------
+    state : ndarray, shape (27,)
+    cost : float
+        Square metres.
+    searched : list of str
+    evaluations : int
+    """
+    # Each to the end: a start that has moved a limb across costs more than one that has lost it until late in the refinement.
+    trials = refine_all(objective, starts, settings.refine, anchor=anchor)
+    evaluations = sum(info.evaluations for _, info in trials)
+    estimate, info = min(trials, key=lambda trial: trial[1].cost_after)
+    cost = info.cost
+    searched: list[str] = []
+    if settings.search is not None and info.unexplained is not None:
+        searched = lost_limbs(rng, info.unexplained, settings.search)
+        estimate, cost, more = search_limbs(rng, objective, (estimate, cost), searched, settings.refine, settings.search)
+        evaluations += more
+    return estimate, cost, searched, evaluations
+
+
+def polished(propose: Propose, settings: PolishSettings) -> PoseStep:
+    """The step that refines what a search proposes, and the last pose beside it."""
+
+    def step(rng: np.random.Generator, tracked: Tracked, view: PersonView) -> tuple[Tracked, StepInfo]:
+        if view.target is None or not shows_enough(view.target):
+            return unseen(tracked)
+        found = propose(rng, tracked, view)
+        starts = [found.best, tracked.state] if found.status == "fitted" else [tracked.state]
+        objective = fine_objective(rng, tracked.subject, view.target, settings)
+        estimate, cost, searched, more = polish(rng, objective, starts, tracked.state, settings)
+        after = Tracked(tracked.subject, estimate, estimate - tracked.state, found.memory)
+        evaluations = found.evaluations + more
+        return after, StepInfo(
+            "fitted", cost, evaluations, tuple(searched), annealed=found.annealed, levels=found.levels, details=found.details
+        )
+
+    return step
