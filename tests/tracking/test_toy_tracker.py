@@ -20,7 +20,7 @@ from hmc.tracking import resumable
 from hmc.tracking.method import TrackerMethod
 from hmc.tracking.trackers import TRACKERS, make_tracker, register
 
-FRAMES = 24
+FRAMES, N = 24, 15  # later the two touch
 #: Each component goes to the person expected nearest to it, at constant velocity; what is left begins a person.
 TOY = """
 from dataclasses import dataclass, field, replace
@@ -45,7 +45,7 @@ def step(rng, state, frame, observation, settings):
     places, speeds = (state.arrays.get(name, np.zeros((0, 3))) for name in ("places", "speeds"))  # a row a person
     expected, rows = places + speeds, []
     places, speeds = expected.copy(), speeds.copy()
-    for b in np.flatnonzero(observation.blobs.volume_m3 > 0.05):
+    for b in np.flatnonzero(observation.blobs.volume_m3 > 0.25):
         centroid, head = observation.blobs.centroid[b], observation.blobs.highest[b]
         gaps = np.linalg.norm(expected - centroid, axis=1)
         person = int(gaps.argmin()) if gaps.min(initial=np.inf) < settings.reach_m else len(places)
@@ -66,9 +66,10 @@ register(TrackerMethod("toy", "these tests", "nearest components", step, {"defau
 def folder(tmp_path_factory, ring):
     other = [(0.9, -0.9 + 0.02 * k) for k in range(FRAMES)]
     places = [[*one, two] for one, two in zip(walk(FRAMES), other, strict=True)]
-    path = draw_recording(tmp_path_factory.mktemp("toy") / "two", ring, places[:18], silhouettes=True)  # later the two touch
-    frames, persons = np.repeat(np.arange(18), 2), np.tile([0, 1], 18)
-    write_tracks(path / "truth" / "centroids.csv", TrackTable(frames, persons, np.array([(*p, 0.875) for two in places[:18] for p in two])))
+    path = draw_recording(tmp_path_factory.mktemp("toy") / "two", ring, places[:N], silhouettes=True)
+    frames, persons = np.repeat(np.arange(N), 2), np.tile([0, 1], N)
+    centres = np.array([(*place, 0.875) for two in places[:N] for place in two])
+    write_tracks(path / "truth" / "centroids.csv", TrackTable(frames, persons, centres, centres + (0, 0, 0.8)))
     return path
 
 
@@ -95,7 +96,7 @@ def distances(table):
 
 def test_it_runs_from_python(toy, folder):
     table = resumable.track_recording(open_recording(folder), 0.08, toy.tracker())
-    assert set(table.persons) == {0, 1} and len(table.frames) == 36 and distances(table).max() < 0.06
+    assert set(table.persons) == {0, 1} and len(table.frames) == 2 * N and distances(table).max() < 0.06
     assert same(table, resumable.track_recording(open_recording(folder), 0.08, make_tracker("toy")))
     near = make_tracker("toy", preset="near")
     assert near.settings.reach_m == 0.1 and near.name == "toy" and not near.color
@@ -107,7 +108,7 @@ def test_a_stopped_run_takes_its_arrays_from_the_journal(toy, folder, tmp_path, 
 
     def dying(rng, state, frame, observation, settings):
         calls.append(frame)
-        if frame == 13 and calls.count(frame) == 1:
+        if frame == 12 and calls.count(frame) == 1:
             raise KeyboardInterrupt
         return toy.step(rng, state, frame, observation, settings)
 
@@ -116,7 +117,7 @@ def test_a_stopped_run_takes_its_arrays_from_the_journal(toy, folder, tmp_path, 
     with pytest.raises(KeyboardInterrupt):
         resumable.track_recording(open_recording(folder), 0.08, tracker, journal=journal)
     assert same(resumable.track_recording(open_recording(folder), 0.08, tracker, journal=journal), whole)
-    assert [calls.count(frame) for frame in (0, 9, 10, 13, 17)] == [1, 1, 2, 2, 1]
+    assert [calls.count(frame) for frame in (0, 9, 10, 12, 14)] == [1, 1, 2, 2, 1]
 
 
 def test_the_command_line_knows_it(toy, folder, tmp_path, capsys):
@@ -137,7 +138,7 @@ def test_an_experiment_takes_it_by_name(toy, folder, tmp_path):
     assert {one["preset"] for one in cells} == {"default"} and len(cells) == len(runs.voxel_sizes(Plan(quick=True)))
     assert runs.method_name(cells[0]) == "toy"
     results = runs.cell(cells[1], Inputs(tmp_path, {source.label: Path(folder)}), np.random.default_rng(0))
-    assert results["objects"] == 36 and results["matches"] == 36 and results["mismatches"] == 0
+    assert results["objects"] == 2 * N and results["matches"] == 2 * N and results["mismatches"] == 0
 
 
 def test_a_method_without_its_default_preset_is_refused(toy):
