@@ -1,5 +1,7 @@
 """Forward kinematics against the exponential maps of the thesis (appendix A), SciPy's rotations and finite differences."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,7 +11,7 @@ from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
 from hmc.body.joints import DOF_NAMES, N_DOF, SEGMENTS, dof_index
-from hmc.body.kinematics import SEGMENT_DOFS, dof_masks, joint_twists, landmarks, segment_transforms
+from hmc.body.kinematics import SEGMENT_DOFS, dof_masks, joint_twists, landmarks, place_segments, segment_transforms
 from hmc.body.proportions import canton_body, default_body, landmark_segments
 from hmc.landmarks import BONES, landmark_index
 
@@ -60,6 +62,37 @@ def test_segments_are_products_of_exponential_maps(body):
             expected = product_of_exponentials(body, state, index)
             assert_allclose(rotations[k, index], expected[:3, :3], atol=1e-12)
             assert_allclose(positions[k, index], expected[:3, 3], atol=1e-12)
+
+
+def one_by_one(body, state):
+    """Rotation and position of every segment, by products of matrices from the root outwards."""
+    rotations, positions = [], []
+    for segment, dofs, offset in zip(SEGMENTS, SEGMENT_DOFS, body.offsets, strict=True):
+        frame, at = (np.eye(3), state[:3]) if segment.parent < 0 else (rotations[segment.parent], positions[segment.parent])
+        positions.append(at + frame @ offset)
+        for name, dof in zip(segment.axes, dofs, strict=True):
+            frame = frame @ Rotation.from_euler(name.upper(), state[dof]).as_matrix()
+        rotations.append(frame)
+    return np.array(rotations), np.array(positions)
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 2**31), n=st.sampled_from([1, 2, 7]))
+def test_all_forms_are_the_loop_over_segments_and_axes(seed, n):
+    rng = np.random.default_rng(seed)
+    body = replace(BODY, offsets=np.r_[np.zeros((1, 3)), rng.normal(0, 0.3, (len(SEGMENTS) - 1, 3))])  # in all directions
+    states, origin = random_states(seed, n, body), rng.normal(0, 2, 3)
+    rotations, positions = segment_transforms(body, states)
+    placed = place_segments(body, states, origin)
+    assert placed.dtype == np.float32 and placed.shape == (len(SEGMENTS), 3, 4, n)
+    for k, state in enumerate(states):
+        expected = one_by_one(body, state)
+        assert_allclose(rotations[k], expected[0], atol=1e-12)
+        assert_allclose(positions[k], expected[1], atol=1e-12)
+        for found, wanted in zip(joint_twists(body, state)[2:], expected, strict=True):
+            assert_allclose(found, wanted, atol=1e-12)
+        assert_allclose(placed[:, :, :3, k], expected[0], atol=2e-6)
+        assert_allclose(placed[:, :, 3, k], expected[1] - origin, atol=1e-5)
 
 
 def test_rotations_are_the_intrinsic_turns_of_scipy():
