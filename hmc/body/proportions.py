@@ -12,7 +12,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from hmc.body.joints import SEGMENTS, JointLimits, canton_limits, default_limits
-from hmc.body.model import PARTS, BodyModel, Cones
+from hmc.body.model import PART_OF_SEGMENT, BodyModel, Cones
 from hmc.errors import InputError
 from hmc.landmarks import LANDMARKS
 
@@ -146,56 +146,40 @@ def _flesh(d: dict[str, float]) -> Cones:
     h = d["height"]
     rows: list[tuple] = []
 
-    def cone(segment: str, part: str, start, end, radius_start, radius_end, across, girth: tuple[float, float]) -> None:
-        if np.linalg.norm(np.subtract(end, start)) < 1e-3:
-            return
-        radii = h * np.array([radius_start, radius_end]) * np.array(girth)
-        rows.append(
-            (_SEGMENT_INDEX[segment], PARTS.index(part), np.asarray(start, float), np.asarray(end, float), radii, np.asarray(across, float))
-        )
+    def cone(segment: str, ends, radii, across, girth: tuple[float, float]) -> None:
+        start, end = np.array(ends, float)
+        if np.linalg.norm(end - start) >= 1e-3:
+            index = _SEGMENT_INDEX[segment]
+            rows.append((index, PART_OF_SEGMENT[index], start, end, h * np.array(radii) * np.array(girth), np.array(across, float)))
 
     wide, deep, trunk = d["girth_torso"], d["girth_torso"] * d["girth_depth"], d["trunk"]
     y = (0, 1, 0)
     chest, ahead = d["chest_forward"], d["head_forward"]
     waist = nape = 0.4 * chest
-    # [lateral, front to back] at both ends
-    cone("pelvis", "torso", (0, 0, -0.035 * h), (waist, 0, 0.15 * trunk), (0.090, 0.062), (0.086, 0.060), y, (wide, deep))
-    cone("torso", "torso", (waist, 0, 0.12 * trunk), (chest, 0, 0.48 * trunk), (0.084, 0.059), (0.082, 0.057), y, (wide, deep))
-    cone("torso", "torso", (chest, 0, 0.48 * trunk), (chest, 0, 0.82 * trunk), (0.084, 0.058), (0.096, 0.058), y, (wide, deep))
-    cone("torso", "torso", (chest, 0, 0.82 * trunk), (nape, 0, trunk), (0.096, 0.056), (0.042, 0.036), y, (wide, deep))
+    # Radii over stature: [lateral, front to back] at both ends.
+    cone("pelvis", ((0, 0, -0.035 * h), (waist, 0, 0.15 * trunk)), ((0.090, 0.062), (0.086, 0.060)), y, (wide, deep))
+    cone("torso", ((waist, 0, 0.12 * trunk), (chest, 0, 0.48 * trunk)), ((0.084, 0.059), (0.082, 0.057)), y, (wide, deep))
+    cone("torso", ((chest, 0, 0.48 * trunk), (chest, 0, 0.82 * trunk)), ((0.084, 0.058), (0.096, 0.058)), y, (wide, deep))
+    cone("torso", ((chest, 0, 0.82 * trunk), (nape, 0, trunk)), ((0.096, 0.056), (0.042, 0.036)), y, (wide, deep))
     head, g = d["head"], (d["girth_head"], d["girth_head"])
     skull = 0.01 * h + 0.6 * ahead
-    cone("head", "head", (nape, 0, -0.02 * h), (0.004 * h + 0.4 * ahead, 0, 0.28 * head), (0.034, 0.034), (0.034, 0.040), y, g)
-    cone("head", "head", (0.006 * h + 0.4 * ahead, 0, 0.22 * head), (skull, 0, 0.65 * head), (0.036, 0.046), (0.045, 0.057), y, g)
-    cone("head", "head", (skull, 0, 0.65 * head), (skull - 0.002 * h, 0, head), (0.045, 0.057), (0.026, 0.032), y, g)
+    cone("head", ((nape, 0, -0.02 * h), (0.004 * h + 0.4 * ahead, 0, 0.28 * head)), ((0.034, 0.034), (0.034, 0.040)), y, g)
+    cone("head", ((0.006 * h + 0.4 * ahead, 0, 0.22 * head), (skull, 0, 0.65 * head)), ((0.036, 0.046), (0.045, 0.057)), y, g)
+    cone("head", ((skull, 0, 0.65 * head), (skull - 0.002 * h, 0, head)), ((0.045, 0.057), (0.026, 0.032)), y, g)
     x, arms = (1, 0, 0), (d["girth_arms"], d["girth_arms"])
     thighs, shanks = (d["girth_thighs"],) * 2, (d["girth_shanks"],) * 2
     for side, sign in (("r", -1.0), ("l", 1.0)):
         upper, fore, hand = (sign * d[name] for name in ("upper_arm", "forearm", "hand"))
-        part = f"{side}_upper_arm"
-        cone(part, part, (0, -sign * 0.01 * h, 0), (0, upper, 0), (0.034, 0.034), (0.025, 0.025), x, arms)
-        part = f"{side}_forearm"
-        cone(part, part, (0, 0, 0), (0, fore, 0), (0.026, 0.026), (0.016, 0.016), x, arms)
-        cone(part, part, (0, fore, 0), (0, fore + hand, 0), (0.021, 0.015), (0.016, 0.010), x, arms)
-        part = f"{side}_thigh"
-        cone(part, part, (0, 0, 0.0), (0, 0, -d["thigh"]), (0.050, 0.050), (0.033, 0.033), x, thighs)
-        part, shank, ankle = f"{side}_shank", d["shank"], d["ankle_height"]
-        cone(part, part, (0, 0, 0), (-0.004 * h, 0, -0.4 * shank), (0.030, 0.032), (0.031, 0.033), y, shanks)
-        cone(part, part, (-0.004 * h, 0, -0.4 * shank), (0, 0, -shank - 0.3 * ankle), (0.031, 0.033), (0.020, 0.021), y, shanks)
+        cone(f"{side}_upper_arm", ((0, -sign * 0.01 * h, 0), (0, upper, 0)), ((0.034, 0.034), (0.025, 0.025)), x, arms)
+        cone(f"{side}_forearm", ((0, 0, 0), (0, fore, 0)), ((0.026, 0.026), (0.016, 0.016)), x, arms)
+        cone(f"{side}_forearm", ((0, fore, 0), (0, fore + hand, 0)), ((0.021, 0.015), (0.016, 0.010)), x, arms)
+        cone(f"{side}_thigh", ((0, 0, 0), (0, 0, -d["thigh"])), ((0.050, 0.050), (0.033, 0.033)), x, thighs)
+        shank, ankle, foot = d["shank"], d["ankle_height"], d["foot"]
+        calf = (-0.004 * h, 0, -0.4 * shank)
+        cone(f"{side}_shank", ((0, 0, 0), calf), ((0.030, 0.032), (0.031, 0.033)), y, shanks)
+        cone(f"{side}_shank", (calf, (0, 0, -shank - 0.3 * ankle)), ((0.031, 0.033), (0.020, 0.021)), y, shanks)
         sole = -shank - ankle + 0.024 * h  # the foot's axis at the heel: flesh reaches to the floor
-        foot = d["foot"]
         if foot > 0:
-            cone(
-                part,
-                part,
-                (-0.032 * h, 0, sole),
-                (-0.032 * h + 1.35 * foot, 0, sole - 0.012 * h),
-                (0.020, 0.024),
-                (0.028, 0.012),
-                y,
-                (1.0, 1.0),
-            )
-    columns = list(zip(*rows, strict=True))
-    return Cones(
-        np.array(columns[0]), np.array(columns[1]), np.array(columns[2]), np.array(columns[3]), np.array(columns[4]), np.array(columns[5])
-    )
+            heel, toe = (-0.032 * h, 0, sole), (-0.032 * h + 1.35 * foot, 0, sole - 0.012 * h)
+            cone(f"{side}_shank", (heel, toe), ((0.020, 0.024), (0.028, 0.012)), y, (1.0, 1.0))
+    return Cones(*(np.array(column) for column in zip(*rows, strict=True)))

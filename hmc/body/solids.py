@@ -12,8 +12,8 @@ from functools import cached_property
 import numpy as np
 
 from hmc.body.joints import DOF_NAMES, SEGMENTS, dof_index
-from hmc.body.limbs import LIMBS
-from hmc.body.model import BodyModel
+from hmc.body.limbs import CHAIN_OF_PART, LIMBS
+from hmc.body.model import PART_OF_SEGMENT, BodyModel
 from hmc.body.superellipsoids import Superellipsoids
 
 __all__ = ["CHAINS", "FREE", "FREE_NAMES", "GROUPS", "SolidBody", "solid_body", "to_world"]
@@ -28,6 +28,8 @@ CHAINS: tuple[np.ndarray, ...] = tuple(
     np.searchsorted(FREE, dofs) for dofs in (dof_index("neck_x", "neck_y"), *(limb.dofs for limb in LIMBS.values()))
 )
 _SEGMENT = {segment.name: k for k, segment in enumerate(SEGMENTS)}
+_CHAIN = CHAIN_OF_PART[PART_OF_SEGMENT]
+_GROUP_OF_SEGMENT = np.where(_CHAIN > 0, _CHAIN + 1, PART_OF_SEGMENT)  # of the trunk's chain, torso and head are the first two parts
 
 
 @dataclass(frozen=True)
@@ -112,43 +114,33 @@ def solid_body(skeleton: BodyModel) -> SolidBody:
     x, y, z = np.eye(3)
     rows: list[tuple] = []
 
-    def solid(name, segment, group, edges, origin, axes, across, below, above, eps1, eps2=1.0) -> None:
-        rows.append(
-            (name, _SEGMENT[segment], GROUPS.index(group), edges, origin, np.stack(axes, axis=1), across, (below, above), eps1, eps2)
-        )
+    def solid(name: str, segment: str, frame, across: tuple[float, float], along: tuple[float, float], eps1, eps2: float = 1.0) -> None:
+        index, (origin, axes) = _SEGMENT[segment], frame
+        has_edges = _GROUP_OF_SEGMENT[index] >= GROUPS.index("r_arm") and not name.endswith("foot")
+        rows.append((name, index, _GROUP_OF_SEGMENT[index], has_edges, origin, np.stack(axes, axis=1), across, along, eps1, eps2))
 
     upright = (x, y, z)
-    solid(
-        "pelvis", "pelvis", "trunk", False, (0.3 * chest, 0, 0.05 * trunk), upright, (0.063 * h * deep, 0.092 * h * wide),
-        0.062 * h, 0.42 * trunk, (0.7, 0.6), 0.8,
-    )  # fmt: skip
-    solid(
-        "chest", "torso", "trunk", False, (chest, 0, 0.60 * trunk), upright, (0.059 * h * deep, 0.097 * h * wide),
-        0.42 * trunk, 0.40 * trunk, (0.7, 0.7), 0.8,
-    )  # fmt: skip
+    hips, ribs = (0.063 * h * deep, 0.092 * h * wide), (0.059 * h * deep, 0.097 * h * wide)
+    solid("pelvis", "pelvis", ((0.3 * chest, 0, 0.05 * trunk), upright), hips, (0.062 * h, 0.42 * trunk), (0.7, 0.6), 0.8)
+    solid("chest", "torso", ((chest, 0, 0.60 * trunk), upright), ribs, (0.42 * trunk, 0.40 * trunk), (0.7, 0.7), 0.8)
     wide_head = 0.046 * h * d["girth_head"]
-    solid(
-        "head", "head", "head", False, (skull, 0, 0.56 * head), upright, (1.25 * wide_head, wide_head), 0.62 * head, 0.45 * head, (1.0, 0.9)
-    )
+    solid("head", "head", ((skull, 0, 0.56 * head), upright), (1.25 * wide_head, wide_head), (0.62 * head, 0.45 * head), (1.0, 0.9))
     for side, sign in (("r", -1.0), ("l", 1.0)):
         outwards, down, ahead = (-x, sign * z, sign * y), (x, -y, -z), (-z, y, x)
-        radius = 0.035 * h * d["girth_arms"]
-        name = f"{side}_upper_arm"
-        solid(name, name, f"{side}_arm", True, (0, 0, 0), outwards, (radius,) * 2, radius, d["upper_arm"] * _reach(0.75, 0.5), (1.0, 0.5))
-        radius = 0.027 * h * d["girth_arms"]
-        name = f"{side}_forearm"
-        solid(name, name, f"{side}_arm", True, (0, 0, 0), outwards, (radius,) * 2, radius, d["forearm"] + d["hand"], (1.0, 0.8))
-        radius = 0.050 * h * d["girth_thighs"]
-        name = f"{side}_thigh"
-        solid(name, name, f"{side}_leg", True, (0, 0, 0), down, (radius,) * 2, radius, d["thigh"] * _reach(0.68, 0.6), (1.0, 0.6))
-        radius = 0.033 * h * d["girth_shanks"]
+        arm, thigh, calf = 0.035 * h * d["girth_arms"], 0.050 * h * d["girth_thighs"], 0.033 * h * d["girth_shanks"]
+        fore = 0.027 * h * d["girth_arms"]
         shank = d["shank"] + 0.3 * d["ankle_height"]
-        name = f"{side}_shank"
-        solid(name, name, f"{side}_leg", True, (-0.003 * h, 0, 0), down, (radius,) * 2, radius, shank * _reach(0.6, 0.7), (1.0, 0.7))
+        joint = (0, 0, 0)
+        for name, frame, radius, length, eps1 in (
+            ("upper_arm", (joint, outwards), arm, d["upper_arm"] * _reach(0.75, 0.5), (1.0, 0.5)),
+            ("forearm", (joint, outwards), fore, d["forearm"] + d["hand"], (1.0, 0.8)),
+            ("thigh", (joint, down), thigh, d["thigh"] * _reach(0.68, 0.6), (1.0, 0.6)),
+            ("shank", ((-0.003 * h, 0, 0), down), calf, shank * _reach(0.6, 0.7), (1.0, 0.7)),
+        ):
+            solid(f"{side}_{name}", f"{side}_{name}", frame, (radius, radius), (radius, length), eps1)
         if d["foot"] > 0:
             sole = (0, 0, -d["shank"] - d["ankle_height"] + 0.022 * h)
-            across = (0.021 * h, 0.027 * h)
-            solid(f"{side}_foot", name, f"{side}_leg", False, sole, ahead, across, 0.032 * h, 1.05 * d["foot"], (0.9, 0.7))
+            solid(f"{side}_foot", f"{side}_shank", (sole, ahead), (0.021 * h, 0.027 * h), (0.032 * h, 1.05 * d["foot"]), (0.9, 0.7))
     names, segment, group, edges, origin, axes, across, along, eps1, eps2 = zip(*rows, strict=True)
     solids = Superellipsoids(np.array(across, float), np.array(along, float), np.array(eps1, float), np.array(eps2, float))
     return SolidBody(
