@@ -1,7 +1,7 @@
-"""What people look like: histograms of the colours of their surface voxels, and which voxels are coloured at all.
+"""What people look like: histograms of the colors of their surface voxels, and which voxels are colored at all.
 
 Source: Canton (2009), sections 4.3.2 and 4.3.3: histograms in YCbCr with 21 bins a channel, an adaptive reference (Eq. 4.11), the
-Bhattacharyya coefficient (Eq. 4.10) and the threshold below which a colour is not the person's (after Eq. 4.21). The histogram is
+Bhattacharyya coefficient (Eq. 4.10) and the threshold below which a color is not the person's (after Eq. 4.21). The histogram is
 joint, 21 x 21 x 21, so that "the histogram value for the tested color" is one number.
 """
 
@@ -23,17 +23,17 @@ YCBCR = np.array([[0.114, 0.587, 0.299], [0.5, -0.331264, -0.168736], [-0.081312
 
 
 def color_bins(bgr: np.ndarray) -> np.ndarray:
-    """Bin of each colour in the joint YCbCr histogram.
+    """Bin of each color in the joint YCbCr histogram.
 
     Parameters
     ----------
     bgr : ndarray, shape (n, 3)
-        0 to 255; NaN where no colour is known.
+        0 to 255; NaN where no color is known.
 
     Returns
     -------
     ndarray of int64, shape (n,)
-        0 to ``N_COLORS - 1``, or -1 where no colour is known.
+        0 to ``N_COLORS - 1``, or -1 where no color is known.
     """
     ycc = np.asarray(bgr, np.float32) @ YCBCR.T + np.array([0, 128, 128], np.float32)
     known = ~np.isnan(ycc[:, 0])
@@ -44,7 +44,7 @@ def color_bins(bgr: np.ndarray) -> np.ndarray:
 
 
 def histogram(bins: np.ndarray) -> np.ndarray:
-    """Shares of the colours, shape (N_COLORS,); empty where no bin is known (all negative)."""
+    """Shares of the colors, shape (N_COLORS,); empty where no bin is known (all negative)."""
     known = bins[bins >= 0]
     return np.bincount(known, minlength=N_COLORS) / len(known) if len(known) else np.zeros(0)
 
@@ -57,12 +57,12 @@ def adapt(reference: np.ndarray, seen: np.ndarray, keep: float) -> np.ndarray:
 
 
 def bhattacharyya(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Bhattacharyya coefficient of histograms that sum to 1: 0 without a common colour, 1 where equal; shape (..., n) to (...)."""
+    """Bhattacharyya coefficient of histograms that sum to 1: 0 without a common color, 1 where equal; shape (..., n) to (...)."""
     return np.sqrt(np.asarray(a) * np.asarray(b)).sum(axis=-1)
 
 
 def similar_colors(reference: np.ndarray, share: float = 0.8) -> np.ndarray:
-    """The commonest colours, which together make up a share of the histogram.
+    """The commonest colors, which together make up a share of the histogram.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def similar_colors(reference: np.ndarray, share: float = 0.8) -> np.ndarray:
 
 
 def color_surface(observation: Observation, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Colour the surface of some of the voxels, from the cameras that have direct sight of it; nothing else is coloured.
+    """The colors of the surface of some of the voxels, from the cameras that have direct sight of it; nothing else is colored.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def color_surface(observation: Observation, rows: np.ndarray) -> tuple[np.ndarra
     rows : ndarray of int, shape (s,)
         Those on the surface.
     bins : ndarray of int, shape (s,)
-        Their colours (`color_bins`), -1 where no camera sees the voxel.
+        Their colors (`color_bins`), -1 where no camera sees the voxel.
     """
     views, grid = observation.views, observation.grid
     voxels = observation.indices[rows]

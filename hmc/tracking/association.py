@@ -62,7 +62,7 @@ def locating_voxels(observation: Observation, owners: np.ndarray, n_persons: int
     ----------
     observation : Observation
     owners : ndarray of int, shape (n,)
-        Person of each voxel, -1 for nobody.
+        Person of each voxel, or -1.
     n_persons : int
     settings : FollowingSettings
 

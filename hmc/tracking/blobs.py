@@ -107,11 +107,11 @@ def observe(grid: VoxelGrid, occupied: np.ndarray, certain: np.ndarray | None = 
     ----------
     grid : VoxelGrid
     occupied : ndarray of bool, shape (nx, ny, nz)
-        The hull; best the tolerant one, so that nobody is lost whom a camera does not see.
+        The hull; best the tolerant one, so that no person is lost whom a camera does not see.
     certain : ndarray of bool, shape (nx, ny, nz), optional
         The strict hull, by which people are located where it has enough of them. All of `occupied` where left out.
     views : FrameViews, optional
-        The silhouettes, their cameras and, where colours are asked for, the images.
+        The silhouettes, their cameras and, where colors are asked for, the images.
 
     Returns
     -------

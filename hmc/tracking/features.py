@@ -14,7 +14,7 @@ __all__ = ["FEATURES", "assign_components", "feature_matrix"]
 
 #: Table 4.1, in its order: the names of the columns of `feature_matrix`.
 FEATURES = ("weight_kg", "centroid_z_m", "top_m", "height_m", "longer_side_m", "shorter_side_m")
-#: A person is at least this share of the region of influence; with less of it the reconstruction is faulty and nobody is assigned.
+#: A person is at least this share of the region of influence; with less of it the reconstruction is faulty and no person is assigned.
 LEAST_FILL = 0.02
 
 

@@ -1,7 +1,7 @@
 """Which way a person faces, as far as a track and its voxels tell: a start for the pose estimator.
 
 Angles are radians about Z: 0 faces along X, pi/2 along Y. The shoulders' axis tells the direction but for its sign, because front and
-back of a hull look alike. The sign is told by the walk of somebody who walks, and else by the arms, which reach forwards.
+back of a hull look alike. The sign is told by the walk of a person who walks, and else by the arms, which reach forwards.
 """
 
 from __future__ import annotations
@@ -111,7 +111,7 @@ def facing_hypotheses(points: np.ndarray, velocity: np.ndarray) -> tuple[np.ndar
     angles : ndarray, shape (3,)
         The two normals of the shoulders' axis, and the walking direction; radians in (-pi, pi].
     weights : ndarray, shape (3,)
-        They sum to 1. The normal that agrees with the walk, or with the arms of somebody who stands, weighs more; the walking direction
+        They sum to 1. The normal that agrees with the walk, or with the arms of a person who stands, weighs more; the walking direction
         itself counts where the shoulders tell little.
     """
     axis, axis_sure = shoulder_axis(points)

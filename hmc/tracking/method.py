@@ -13,7 +13,7 @@ A tracker of your own is a settings class, a function and one record; it needs n
 
         return advance(state, frame, observation, settings.following, stand_still)
 
-    register(TrackerMethod("still", "nobody", "whoever is there stays there", step, {"default": StillSettings()}))
+    register(TrackerMethod("still", "", "persons stay where they are", step, {"default": StillSettings()}))
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The particle filter: each particle is an upright ellipsoid the size of a person, scored by how much of it is occupied and by its colours.
+"""The particle filter: each particle is an upright ellipsoid the size of a person, scored by how much of it is occupied and by its colors.
 
 Source: Canton (2009), section 4.3.2, Eq. 4.8-4.13. What differs from the text: particles move with the person's smoothed velocity
 (``drift``; 0 is the thesis's), and weights are raised to a power (``sharpness``; 1 is the thesis's), because an ellipsoid that is a third
@@ -37,9 +37,9 @@ class ParticleSettings:
     particles : int
         Particles a person.
     color : bool
-        Whether colours count.
+        Whether colors count.
     raw_share : float
-        Canton's lambda (Eq. 4.8); the rest is the colour's.
+        Canton's lambda (Eq. 4.8); the rest is the color's.
     noise_m_s, noise_z_m_s : float
         Standard deviation of the propagation, horizontally and vertically, for a second's step; a frame's is its share. Canton's is
         proportional to the largest variation of the centroid.
@@ -73,14 +73,14 @@ class ParticleSettings:
 def step(
     rng: np.random.Generator, state: TrackerState, frame: int, observation: Observation | None, settings: ParticleSettings
 ) -> tuple[TrackerState, StepInfo]:
-    """One frame on.
+    """The state after a frame, and what was found in it.
 
     Parameters
     ----------
     rng : numpy.random.Generator
     state : TrackerState
     frame, observation
-        As for `hmc.tracking.following.advance`; for colours the observation's views hold the images.
+        As for `hmc.tracking.following.advance`; for colors the observation's views hold the images.
     settings : ParticleSettings
 
     Returns
@@ -149,12 +149,12 @@ def overlap(voxels: np.ndarray, centres: np.ndarray, radii: np.ndarray, origin: 
 
 
 def color_likelihood(points: np.ndarray, colors: np.ndarray, centres: np.ndarray, radii: np.ndarray, reference: np.ndarray) -> np.ndarray:
-    """Bhattacharyya coefficient of the reference histogram and that of the coloured voxels in each ellipsoid (Canton, Eq. 4.10).
+    """Bhattacharyya coefficient of the reference histogram and that of the colored voxels in each ellipsoid (Canton, Eq. 4.10).
 
     Parameters
     ----------
     points : ndarray, shape (m, 3)
-        Centres of the coloured voxels, world, metres.
+        Centres of the colored voxels, world, metres.
     colors : ndarray of int, shape (m,)
         Their bins.
     centres, radii : ndarray, shape (n, 3)
@@ -165,7 +165,7 @@ def color_likelihood(points: np.ndarray, colors: np.ndarray, centres: np.ndarray
     Returns
     -------
     ndarray, shape (n,)
-        0 where an ellipsoid holds no coloured voxel.
+        0 where an ellipsoid holds no colored voxel.
     """
     if len(points) == 0:
         return np.zeros(len(centres))
@@ -181,7 +181,7 @@ def color_likelihood(points: np.ndarray, colors: np.ndarray, centres: np.ndarray
 def _filter(
     rng: np.random.Generator, state: TrackerState, predicted: np.ndarray, observation: Observation, settings: ParticleSettings
 ) -> FilterEstimate:
-    """Move everybody's particles by one frame."""
+    """The estimate from all persons' particles, moved by one frame."""
     last = np.array([track.position for track in state.tracks]).reshape(-1, 3)
     centres = last + settings.drift * (predicted - last)
     sd = np.array([settings.noise_m_s, settings.noise_m_s, settings.noise_z_m_s]) / state.fps

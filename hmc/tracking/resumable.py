@@ -1,4 +1,4 @@
-"""Following everybody through a whole recording, so that a run that was stopped goes on where it was.
+"""All tracks of a whole recording, so that a run that was stopped goes on where it was.
 
 Every `CHECKPOINT_FRAMES` frames the tracker's rows and its whole state go into a journal. A run that is started again with the same
 journal and the same key takes them up and computes what is left. What is guaranteed: finished frames are kept as they were, and the
@@ -55,7 +55,7 @@ def track_recording(
     on_timing: Callable[[Timing], None] | None = None,
     progress: Callable[[Iterable[HullStep], int], Iterable[HullStep]] | None = None,
 ) -> TrackTable:
-    """Where everybody is in every frame of the selection.
+    """The tracks of all persons in the selection.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def person_grid(recording: Recording, voxel_size_m: float) -> VoxelGrid:
 def observe_step(recording: Recording, grid: VoxelGrid, hull: HullStep, images: bool = False) -> Observation | None:
     """What the tracker sees of a frame, or None where it tells nothing.
 
-    That is the tolerant hull, the strict one in it, the silhouettes and, where colours are asked for, the images.
+    That is the tolerant hull, the strict one in it, the silhouettes and, where colors are asked for, the images.
     """
     if not hull.usable:
         return None
@@ -162,7 +162,7 @@ class Timing:
     ----------
     frames : int
     input_s : float
-        Reading, segmenting, carving, components and colours.
+        Reading, segmenting, carving, components and colors.
     filter_s : float
         Saying where the people are who are known.
     lifecycle_s : float

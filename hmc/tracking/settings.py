@@ -25,7 +25,7 @@ class LifecycleSettings:
     least_height_m : float
         Least extent from lowest to highest point: no table top, no shadow.
     most_bottom_m : float
-        Furniture may hide the legs, but nobody floats higher than this.
+        Furniture may hide the legs, but no person floats higher than this.
     least_volume_m3, most_volume_m3 : float
         A hull is fatter than its person; the most leaves room for two who come in arm in arm.
     least_joined_m3 : float
@@ -43,15 +43,15 @@ class LifecycleSettings:
     edge_m : float
         Width of that edge.
     unlike_s : float
-        A track is deleted when its voxels have not looked like a person for so long, however many they are: furniture that somebody left
+        A track is deleted when its voxels have not looked like a person for so long, however many they are: furniture that was left
         behind (Canton, section 4.2.3, third criterion of deletion). A frame in which they do makes up for two in which they do not.
     established_s : float
         A track whose voxels have looked like a person for so long altogether is one, whatever they look like now: people sit on the floor,
         lie and crouch. Verdicts do not end it (beyond the thesis).
     still_s, still_m : float
-        But it ends when what it holds has looked like a thing and has not moved by more than this for so long (beyond the thesis).
+        But it ends when what it holds has looked like an object and has not moved by more than this for so long (beyond the thesis).
     least_lying_m : float
-        Things that people leave behind are not as long as what is seen of somebody who lies.
+        Objects that people leave behind are not as long as what is seen of a person who lies.
     least_efficiency, efficiency_s : float
         A track is deleted when the survival rate of its filter's particles (Canton, Eq. 3.11) has been below this share for so long
         (section 4.2.3, second criterion). Of Sparse Sampling, the share of the samples that found a voxel of their own.
@@ -116,7 +116,7 @@ class FollowingSettings:
     velocity_time_s : float
         Time constant of the velocity's smoothing.
     most_speed_m_s : float
-        Nobody is faster.
+        No person is faster.
     most_reach_m : float
         A person who was lost is not looked for further away than this.
     shared_gain : float

@@ -1,7 +1,7 @@
 """Sparse Sampling: samples sit on voxels of a person's surface, and the person is at their weighted mean.
 
 Source: Canton (2009), section 4.3.3. Each frame the samples are resampled by their weights, moved by a little discrete noise so that no
-two share a voxel, weighted by their neighbourhoods in the hull and by the colours there, and averaged (Eq. 4.18). What differs from the
+two share a voxel, weighted by their neighbourhoods in the hull and by the colors there, and averaged (Eq. 4.18). What differs from the
 text: samples move with the person's smoothed velocity (``drift``; 0 is the thesis's), and each person's samples are seeded on the surface.
 """
 
@@ -38,7 +38,7 @@ __all__ = [
 
 #: Bits that each of the three counts of a neighbourhood has.
 COUNT_BITS = 10
-#: What a coloured voxel counts beside its occupancy: of another's colours, and of the person's.
+#: What a colored voxel counts beside its occupancy: of another's colors, and of the person's.
 CODES = np.array([1 << COUNT_BITS, (1 << COUNT_BITS) + (1 << 2 * COUNT_BITS)], np.int32)
 #: Times that samples which fell on the same voxels may look for others.
 ROUNDS = 6
@@ -57,9 +57,9 @@ class SparseSettings:
     samples : int
         Samples a person.
     color : bool
-        Whether colours count.
+        Whether colors count.
     raw_share : float
-        Canton's lambda: weight of the raw pseudo-likelihood; the rest is the colour's.
+        Canton's lambda: weight of the raw pseudo-likelihood; the rest is the color's.
     radius : int
         Of the neighbourhood, voxels (26-connected, so a cube of ``2 radius + 1``); at most 4.
     solid : bool
@@ -78,7 +78,7 @@ class SparseSettings:
     keep_histogram : float
         Canton's alpha of Eq. 4.11.
     similar_share : float
-        Share of the reference histogram whose colours count as the person's.
+        Share of the reference histogram whose colors count as the person's.
     following : FollowingSettings
     """
 
@@ -106,14 +106,14 @@ class SparseSettings:
 def step(
     rng: np.random.Generator, state: TrackerState, frame: int, observation: Observation | None, settings: SparseSettings
 ) -> tuple[TrackerState, StepInfo]:
-    """One frame on.
+    """The state after a frame, and what was found in it.
 
     Parameters
     ----------
     rng : numpy.random.Generator
     state : TrackerState
     frame, observation
-        As for `hmc.tracking.following.advance`; for colours the observation's views hold the images.
+        As for `hmc.tracking.following.advance`; for colors the observation's views hold the images.
     settings : SparseSettings
 
     Returns
@@ -176,13 +176,13 @@ def pseudo_likelihood(counts: np.ndarray, own: np.ndarray, settings: SparseSetti
     Parameters
     ----------
     counts : ndarray of int, shape (n,)
-        In the neighbourhood: occupied voxels, plus the coloured ones times ``2**10``, plus those of the person's colours times ``2**20``.
+        In the neighbourhood: occupied voxels, plus the colored ones times ``2**10``, plus those of the person's colors times ``2**20``.
     own : ndarray of int, shape (n,)
         Whether the sample's own voxel is occupied.
     settings : SparseSettings
         Of which the raw share, the radius and whether samples must be solid count.
     colored : bool or ndarray of bool, shape (n,)
-        Whether colours count.
+        Whether colors count.
 
     Returns
     -------
@@ -232,8 +232,8 @@ def spread_out(rng: np.random.Generator, samples: np.ndarray, person: np.ndarray
         beside = home[waiting, None] + around[TURNS[rng.integers(len(ADJACENT), size=waiting.size)]]
         free = holder[beside] < 0
         best = free.argmax(axis=1)
-        hopeful = free[np.arange(waiting.size), best]
-        waiting, wanted = waiting[hopeful], beside[hopeful, best[hopeful]]
+        lucky = free[np.arange(waiting.size), best]
+        waiting, wanted = waiting[lucky], beside[lucky, best[lucky]]
     kept = np.flatnonzero(place >= 0)
     rest, z = np.divmod(place[kept], shape[3])
     rest, y = np.divmod(rest, shape[2])
@@ -263,7 +263,7 @@ def filter_samples(
     around: Surroundings,
     settings: SparseSettings,
 ) -> FilterEstimate:
-    """Move everybody's samples by one frame, weigh them and take their means (Canton, Eq. 4.18).
+    """The estimate from all persons' samples, moved by one frame and weighed: their means (Canton, Eq. 4.18).
 
     Parameters
     ----------
@@ -312,7 +312,7 @@ def propagate(
     around: Surroundings,
     settings: SparseSettings,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Everybody's samples in this frame: the last ones resampled and moved, and voxels of the hull drawn anew.
+    """All persons' samples in this frame: the last ones resampled and moved, and voxels of the hull drawn anew.
 
     Parameters
     ----------
@@ -357,7 +357,7 @@ def sample_likelihood(
     around: Surroundings,
     settings: SparseSettings,
 ) -> np.ndarray:
-    """Pseudo-likelihood of everybody's samples.
+    """Pseudo-likelihood of all persons' samples, shape (n,).
 
     Parameters
     ----------

@@ -16,9 +16,9 @@ from hmc.tracking.region import person_radii, region_distance
 
 __all__ = ["Surroundings", "blocking", "look_around", "looks_of"]
 
-#: Colour of a voxel inside the hull, and of a surface voxel that no camera sees.
+#: Color of a voxel inside the hull, and of a surface voxel that no camera sees.
 INNER, UNSEEN = -2, -1
-#: Fewer coloured voxels tell nothing of a person.
+#: Fewer colored voxels tell nothing of a person.
 LEAST_COLORED = 30
 
 
@@ -31,10 +31,10 @@ class Surroundings:
     rows : tuple of ndarray of int
         The observation's voxels near each person: those of the strict hull where it has enough of them, else all.
     colors : ndarray of int, shape (n,)
-        Of every voxel of the observation: bin of its colour (`hmc.tracking.appearance.color_bins`), `UNSEEN` or `INNER`. All are
-        `INNER` where nobody asks for colours.
+        Of every voxel of the observation: bin of its color (`hmc.tracking.appearance.color_bins`), `UNSEEN` or `INNER`. All are
+        `INNER` where no colors are asked for.
     color_s : float
-        Processor seconds spent on the colours.
+        Processor seconds spent on the colors.
     """
 
     rows: tuple[np.ndarray, ...]
@@ -43,7 +43,7 @@ class Surroundings:
 
 
 def look_around(observation: Observation, centres: np.ndarray, reach_m: float, least_certain_m3: float, color: bool) -> Surroundings:
-    """Gather the voxels near each person and, where asked for, colour the surface there and nowhere else.
+    """The voxels near each person and, where asked for, the colors of the surface there and nowhere else.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def blocking(points: np.ndarray, person: np.ndarray, centres: np.ndarray, sharpn
     person : ndarray of int, shape (n,)
         Whose each point is: a row of `centres`.
     centres : ndarray, shape (k, 3)
-        Everybody's position.
+        The persons' positions.
     sharpness : float
         ``k``, for metres; 0 or less: there are no zones.
 
@@ -105,9 +105,9 @@ def blocking(points: np.ndarray, person: np.ndarray, centres: np.ndarray, sharpn
 
 
 def looks_of(observation: Observation, surroundings: Surroundings, positions: np.ndarray) -> tuple[np.ndarray, ...]:
-    """What each person looks like in this frame: the histogram of the coloured voxels in their ellipsoid (Eq. 4.11).
+    """What each person looks like in this frame: the histogram of the colored voxels in their ellipsoid (Eq. 4.11).
 
-    A voxel in several ellipsoids counts for nobody, so that people who stand together do not take on one another's colours.
+    A voxel in several ellipsoids does not count, so that people who stand together do not take on one another's colors.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def looks_of(observation: Observation, surroundings: Surroundings, positions: np
     Returns
     -------
     tuple of ndarray, shape (n_colors,) or (0,)
-        Empty where fewer than `LEAST_COLORED` voxels have a colour.
+        Empty where fewer than `LEAST_COLORED` voxels have a color.
     """
     colored = np.flatnonzero(surroundings.colors >= 0)
     inside = region_distance(observation.points[colored], positions, person_radii(positions, 1.0, 1.0)) <= 1

@@ -22,7 +22,7 @@ __all__ = ["fill_gaps", "frame_rng", "from_rows", "person_voxels", "run", "table
 def run(
     observations: Iterable[tuple[int, Observation | None]], fps: float, tracker: Tracker | None = None, seed: int = 0, gap_s: float = 1.0
 ) -> TrackTable:
-    """Follow everybody through a recording.
+    """The tracks of all persons in a recording.
 
     Parameters
     ----------

@@ -124,7 +124,7 @@ def test_people_who_were_exchanged_get_their_numbers_back(crossing):
         assert np.linalg.norm(track.position - before.position) < 0.2
 
 
-def test_people_who_come_back_are_recognised_by_their_colours():
+def test_people_who_come_back_are_recognised_by_their_colors():
     nobody = [seen([])] * 26
     visit = {colour: [seen([(*p, colour)]) for p in line((-0.8, 0), (0.8, 0.2), 26)] for colour in (RED, BLUE)}
     observations = [*visit[RED], *nobody, *visit[BLUE], *nobody, *visit[RED]]

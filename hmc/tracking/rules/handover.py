@@ -1,6 +1,6 @@
 """Handover: where a person gets up from an object that the track stays with, the number goes with the person.
 
-Only established tracks are given on, and nobody who comes in at the edge of the room is taken for one of them. Shown by
+Only established tracks are given on, and who comes in at the edge of the room is not taken for one of them. Shown by
 `test_who_gets_up_from_a_chair_that_stays_keeps_the_number_and_the_chair_is_nobody` and
 `test_a_newcomer_does_not_take_the_number_of_somebody_who_sits_low`.
 """

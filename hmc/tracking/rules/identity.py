@@ -1,8 +1,8 @@
 """Identity by colors: persons who were taken for one another when they met, and persons who come back.
 
 Beyond Canton (2009), which compares colors within a person's samples only. Each person's reference histogram (Eq. 4.11) is compared with
-what everybody looks like in this frame by the Bhattacharyya coefficient. Shown by
-`test_people_who_were_exchanged_get_their_numbers_back` and `test_people_who_come_back_are_recognised_by_their_colours`.
+what all look like in this frame by the Bhattacharyya coefficient. Shown by
+`test_people_who_were_exchanged_get_their_numbers_back` and `test_people_who_come_back_are_recognised_by_their_colors`.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ def recognise(histogram: np.ndarray, first_frame: int, departed: tuple[DepartedT
     ----------
     histogram : ndarray, shape (n_colors,)
     first_frame : int
-        In which the person was seen again; who was seen elsewhere then is somebody else.
+        In which the person was seen again; who was seen elsewhere then is another person.
     departed : tuple of DepartedTrack
     """
     absent = [one for one in departed if one.last_frame < first_frame]

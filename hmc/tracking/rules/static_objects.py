@@ -21,7 +21,7 @@ from hmc.tracking.update import FrameUpdate
 
 __all__ = ["hide_static_objects", "learn_static", "learn_static_objects", "reject_static_objects", "without_static"]
 
-#: Nobody whose centroid is further away than this, seen from above, fills a voxel for long: the reach of Sparse Sampling and a little.
+#: No person whose centroid is further away than this, seen from above, fills a voxel for long: the reach of Sparse Sampling and a little.
 AWAY_M = 0.5
 #: Nor than this where a person lies or sits on the floor, whose head is lower than `LEGS_M`.
 LYING_AWAY_M = 1.0

@@ -15,7 +15,7 @@ from hmc.tracking.update import FrameUpdate
 
 __all__ = ["reject_unsolid"]
 
-#: So near, seen from above, whoever pushes a chair is; metres.
+#: So near, seen from above, is a person who pushes a chair; metres.
 BESIDE_M = 1.5
 
 
