@@ -278,7 +278,6 @@ def annealed_step(
     low: np.ndarray | float,
     high: np.ndarray | float,
     settings: AnnealedSettings,
-    resample: Resample = systematic,
 ) -> tuple[ParticleState, AnnealedInfo]:
     """One instant of the annealed particle filter (Canton, Alg. 3).
 
@@ -294,8 +293,6 @@ def annealed_step(
     low, high : array_like, shape (d,) or scalar
         Limits of the state.
     settings : AnnealedSettings
-    resample : callable
-        ``(rng, weights, n) -> indices``.
 
     Returns
     -------
@@ -313,7 +310,6 @@ def annealed_step(
             truncated_drift(sd, low, high, scales[-1]),
             settings.layer_particles(layer),
             settings.layer_survival(layer),
-            resample,
         )
         infos.append(info)
     best = max(infos, key=lambda info: info.best_log_likelihood)

@@ -209,8 +209,7 @@ def converged(state: SmdState, tolerance: np.ndarray, settings: SmdSettings, gro
 def smd_run(
     objective: Callable[[np.ndarray, np.ndarray], Evaluation],
     parameters: np.ndarray,
-    low: np.ndarray,
-    high: np.ndarray,
+    bounds: tuple[np.ndarray, np.ndarray],
     tolerance: np.ndarray,
     settings: SmdSettings,
     groups: Sequence[np.ndarray] | None = None,
@@ -224,7 +223,9 @@ def smd_run(
     ----------
     objective : callable
         ``objective(parameters, going)``, with `going` (n_groups,) telling which groups are still moving.
-    parameters, low, high, tolerance : ndarray, shape (n,)
+    parameters, tolerance : ndarray, shape (n,)
+    bounds : tuple of ndarray, shape (n,)
+        Low and high limits.
     settings : SmdSettings
     groups : sequence of ndarray of int, optional
         One group of all parameters by default. What is in no group stays.
@@ -237,6 +238,7 @@ def smd_run(
     info : SmdInfo
     """
     groups = [np.arange(len(parameters))] if groups is None else list(groups)
+    low, high = bounds
     going = np.ones(len(groups), bool)
     counts = np.zeros(len(groups), int)
     values: list[float] = []

@@ -19,6 +19,7 @@ from hmc.search.weights import normalise, systematic
 __all__ = [
     "StructuralInfo",
     "StructuralSettings",
+    "Variables",
     "backward",
     "cross_limbs",
     "crossing",
@@ -84,6 +85,27 @@ class StructuralSettings:
     def particles(self, added: np.ndarray) -> np.ndarray:
         """Particles of each model for the dimensions that it adds (Eq. 7.28), two at least."""
         return np.maximum(np.rint(self.gamma * np.asarray(added)).astype(int), 2)
+
+
+@dataclass(frozen=True)
+class Variables:
+    """What states are made of.
+
+    Parameters
+    ----------
+    group : ndarray of int, shape (d,)
+        The first model that has each variable.
+    sd, low, high : ndarray, shape (d,)
+        First spread and limits.
+    limb : ndarray of int, shape (d,), optional
+        The column of the likelihoods to which each variable belongs; by default limbs are not crossed.
+    """
+
+    group: np.ndarray
+    sd: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    limb: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -267,12 +289,8 @@ def structural_step(
     rng: np.random.Generator,
     threads: Sequence[ParticleState],
     log_likelihoods: Sequence[LogLikelihood],
-    group: np.ndarray,
-    sd: np.ndarray,
-    low: np.ndarray,
-    high: np.ndarray,
+    variables: Variables,
     settings: StructuralSettings,
-    limb: np.ndarray | None = None,
 ) -> tuple[tuple[ParticleState, ...], StructuralInfo]:
     """One instant: every model in turn, then back (section 7.3.1).
 
@@ -283,20 +301,15 @@ def structural_step(
         One a model, from the instant before; each particle has all variables, those of later models included.
     log_likelihoods : sequence of callable
         One a model, ``(n, d) -> (n,)``; or ``(n, d) -> (n, n_limbs)``, to be summed.
-    group : ndarray of int, shape (d,)
-        The first model that has each variable.
-    sd, low, high : ndarray, shape (d,)
-        First spread and limits.
+    variables : Variables
     settings : StructuralSettings
-    limb : ndarray of int, shape (d,), optional
-        The column of the likelihoods to which each variable belongs; by default limbs are not crossed.
 
     Returns
     -------
     threads : tuple of ParticleState
     info : StructuralInfo
     """
-    group = np.asarray(group)
+    group, limb = variables.group, variables.limb
     counts = settings.particles(np.bincount(group, minlength=len(threads))[: len(threads)])
     filtered: list[ParticleState] = []
     infos: list[tuple[LayerInfo, ...]] = []
@@ -308,7 +321,7 @@ def structural_step(
         for layer in range(settings.layers):
             if limb is not None and shares is not None and limb[group <= level].any():
                 state = cross_limbs(rng, state, shares, limb, settings.survival_rate)
-            drift = truncated_drift(sd * spread_schedule(group, level, layer, settings), low, high)
+            drift = truncated_drift(variables.sd * spread_schedule(group, level, layer, settings), variables.low, variables.high)
             state, info, shares = _weighed(rng, state, log_likelihoods[level], drift, n, settings.survival_rate)
             layers.append(info)
         filtered.append(state)

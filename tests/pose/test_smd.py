@@ -258,7 +258,7 @@ def test_descent_finds_the_minimum_of_a_quadratic(seed, by_curvature):
     matrix = 0.01 * (root @ root.T + 5 * np.diag(rng.uniform(0.5, 5, 5)))
     goal, wide = rng.normal(size=5), np.full(5, np.inf)
     chosen = SmdSettings(first_step=0.5, meta_step=3e-4, iterations=2000, reach=1e6, by_curvature=by_curvature)
-    found, info = smd_run(quadratic(matrix, goal), np.zeros(5), -wide, wide, np.full(5, 1e-7), chosen)
+    found, info = smd_run(quadratic(matrix, goal), np.zeros(5), (-wide, wide), np.full(5, 1e-7), chosen)
     np.testing.assert_allclose(found, goal, atol=1e-4)
     assert info.iterations[0] < 2000
 
@@ -281,12 +281,12 @@ def test_the_descent_does_not_depend_on_the_units():
     matrix, goal, wide = np.diag([1.0, 4.0]), np.array([0.3, -0.2]), np.full(2, np.inf)
     factor, chosen = np.degrees(1.0), SmdSettings(iterations=12, first_step=0.05, by_curvature=False)
     tight = np.full(2, 1e-9)
-    _, radians = smd_run(quadratic(matrix, goal), np.zeros(2), -wide, wide, tight, replace(chosen, reach=1e9), None, 1 / factor)
+    _, radians = smd_run(quadratic(matrix, goal), np.zeros(2), (-wide, wide), tight, replace(chosen, reach=1e9), None, 1 / factor)
     scaled = quadratic(matrix / factor**2, goal * factor)
-    _, degrees = smd_run(scaled, np.zeros(2), -wide, wide, factor * tight, replace(chosen, reach=1e9), None, 1.0)
+    _, degrees = smd_run(scaled, np.zeros(2), (-wide, wide), factor * tight, replace(chosen, reach=1e9), None, 1.0)
     np.testing.assert_allclose(degrees.path, factor * radians.path, rtol=1e-6, atol=1e-9)
     _, fixed = smd_run(
-        quadratic(matrix, goal), np.zeros(2), -wide, wide, tight, replace(chosen, reach=1e9, meta_step=0.0), None, 1 / factor
+        quadratic(matrix, goal), np.zeros(2), (-wide, wide), tight, replace(chosen, reach=1e9, meta_step=0.0), None, 1 / factor
     )
     assert np.linalg.norm(radians.path[-1] - goal) < 0.9 * np.linalg.norm(fixed.path[-1] - goal)
 
@@ -301,10 +301,10 @@ def test_along_the_curvatures_axes_the_descent_does_not_depend_on_the_parameters
     matrix, wide, tight = 0.1 * (root @ root.T + np.eye(4)), np.full(4, np.inf), np.full(4, 1e-2)
     chosen = SmdSettings(first_step=0.4, iterations=6, meta_step=0.0, damping=0.0, reach=1e9)
     other = np.linalg.inv(mixed)
-    _, one = smd_run(quadratic(matrix, goal), start, -wide, wide, tight, chosen)
-    _, two = smd_run(quadratic(other.T @ matrix @ other, mixed @ goal), start, -wide, wide, tight, chosen)
+    _, one = smd_run(quadratic(matrix, goal), start, (-wide, wide), tight, chosen)
+    _, two = smd_run(quadratic(other.T @ matrix @ other, mixed @ goal), start, (-wide, wide), tight, chosen)
     np.testing.assert_allclose(two.path @ other.T, one.path, atol=1e-3)
-    _, quick = smd_run(quadratic(matrix, goal), start, -wide, wide, tight, replace(chosen, first_step=1.0))
+    _, quick = smd_run(quadratic(matrix, goal), start, (-wide, wide), tight, replace(chosen, first_step=1.0))
     np.testing.assert_allclose(quick.path[1], goal, atol=1e-3)
 
 
@@ -329,7 +329,7 @@ def test_the_average_of_the_last_states_is_nearer_than_the_last():
         def objective(at, going, rng=rng):
             return Evaluation(0.0, at - goal + 0.3 * rng.normal(size=2), lambda v: v, lambda: np.eye(2))
 
-        found, info = smd_run(objective, np.zeros(2), -wide, wide, tight, SmdSettings(first_step=1.0, iterations=12, reach=1e9))
+        found, info = smd_run(objective, np.zeros(2), (-wide, wide), tight, SmdSettings(first_step=1.0, iterations=12, reach=1e9))
         np.testing.assert_allclose(found, info.path[-4:].mean(axis=0))
         errors.append([np.linalg.norm(found - goal), np.linalg.norm(info.path[-1] - goal)])
     averaged, last = np.mean(errors, axis=0)
@@ -345,7 +345,7 @@ def test_limits_hold_and_the_constrained_gradient_leads_to_them():
     np.testing.assert_allclose(state.trace, [-0.05, -0.1])
     goal = np.array([2.0, 0.5])
     at, _ = smd_run(
-        quadratic(np.eye(2), goal), np.zeros(2), low, high, np.full(2, 1e-6), SmdSettings(iterations=300, reach=1e5, first_step=0.5)
+        quadratic(np.eye(2), goal), np.zeros(2), (low, high), np.full(2, 1e-6), SmdSettings(iterations=300, reach=1e5, first_step=0.5)
     )
     np.testing.assert_allclose(at, [0.05, 0.5], atol=1e-4)
 
@@ -364,9 +364,9 @@ def test_chains_together_are_the_chains_one_by_one():
     matrix[:2, :2] += 0.3
     goal, wide, groups = np.arange(4.0), np.full(4, np.inf), [np.array([0, 1]), np.array([2]), np.array([3])]
     chosen = SmdSettings(iterations=100, first_step=0.5, reach=20.0)
-    together, info = smd_run(quadratic(matrix, goal), np.zeros(4), -wide, wide, np.full(4, 0.01), chosen, groups)
+    together, info = smd_run(quadratic(matrix, goal), np.zeros(4), (-wide, wide), np.full(4, 0.01), chosen, groups)
     for group, count in zip(groups, info.iterations, strict=True):
-        alone, one = smd_run(quadratic(matrix, goal), np.zeros(4), -wide, wide, np.full(4, 0.01), chosen, [group])
+        alone, one = smd_run(quadratic(matrix, goal), np.zeros(4), (-wide, wide), np.full(4, 0.01), chosen, [group])
         np.testing.assert_allclose(together[group], alone[group])
         assert one.iterations[0] == count
     assert len(set(info.iterations)) > 1

@@ -10,6 +10,7 @@ from hmc.errors import InputError
 from hmc.search.filters import AnnealedSettings, ParticleState, annealed_step, particle_init
 from hmc.search.structural import (
     StructuralSettings,
+    Variables,
     backward,
     cross_limbs,
     crossing,
@@ -102,7 +103,9 @@ def test_one_model_is_the_annealed_filter():
     low, high, sd = np.full(3, -5.0), np.full(3, 5.0), np.full(3, 0.5)
     start = particle_init(np.zeros((1, 3)))
     settings = StructuralSettings(gamma=20, layers=3, inner=0.5, survival_rate=0.3)
-    (threads,), info = structural_step(np.random.default_rng(4), [start], [likelihood], np.zeros(3, int), sd, low, high, settings)
+    (threads,), info = structural_step(
+        np.random.default_rng(4), [start], [likelihood], Variables(np.zeros(3, int), sd, low, high), settings
+    )
     state, annealed = annealed_step(np.random.default_rng(4), start, likelihood, sd, low, high, AnnealedSettings(3, 60, 0.3, 0.5))
     assert_array_equal(threads.particles, state.particles)
     assert_array_equal(info.best, annealed.best)
@@ -122,7 +125,7 @@ def test_a_chain_is_found_from_its_root_outwards_and_every_model_has_an_estimate
     threads = [particle_init(np.zeros((1, 6)))] * 3
     rng = np.random.default_rng(0)
     for _ in range(4):
-        threads, info = structural_step(rng, threads, [likelihood_of(k) for k in range(3)], GROUP, sd, low, high, settings)
+        threads, info = structural_step(rng, threads, [likelihood_of(k) for k in range(3)], Variables(GROUP, sd, low, high), settings)
     assert_allclose(info.best, goal, atol=0.25)
     assert_allclose(info.estimates[2], goal, atol=0.25)
     for level in range(3):
@@ -157,6 +160,7 @@ def test_limbs_are_drawn_each_by_its_own_share_of_the_likelihood(n, seed):
 def test_crossed_limbs_are_found_with_fewer_particles():
     goal = np.linspace(-0.9, 0.9, 12)
     group, limb = np.repeat([0, 1], [3, 9]), np.repeat(np.arange(4), 3)
+    variables = Variables(group, np.full(12, 0.4), np.full(12, -2.0), np.full(12, 2.0), limb)
     settings = StructuralSettings(gamma=10, survival_rate=0.3)
 
     def errors(by_limb):
@@ -168,9 +172,7 @@ def test_crossed_limbs_are_found_with_fewer_particles():
         for seed in range(12):
             threads, rng = [particle_init(np.zeros((1, 12)))] * 2, np.random.default_rng(seed)
             for _ in range(3):
-                threads, info = structural_step(
-                    rng, threads, [share, share], group, np.full(12, 0.4), np.full(12, -2.0), np.full(12, 2.0), settings, limb
-                )
+                threads, info = structural_step(rng, threads, [share, share], variables, settings)
             out.append(np.linalg.norm(info.estimates[-1] - goal))
         return np.array(out)
 
@@ -182,10 +184,10 @@ def test_crossed_limbs_are_found_with_fewer_particles():
 def test_variables_that_no_model_has_stay_where_they_are():
     group = np.array([0, 1, 2, 2])
     start = particle_init(np.array([[0.0, 0.0, 0.3, -0.4]]))
+    variables = Variables(group, np.ones(4), np.full(4, -2.0), np.full(4, 2.0))
     threads, _ = structural_step(
-        np.random.default_rng(0), [start, start], [lambda s: -(s[:, 0] ** 2)] * 2, group, np.ones(4), np.full(4, -2.0), np.full(4, 2.0),
-        StructuralSettings(gamma=30),
-    )  # fmt: skip
+        np.random.default_rng(0), [start, start], [lambda s: -(s[:, 0] ** 2)] * 2, variables, StructuralSettings(gamma=30)
+    )
     assert_array_equal(threads[-1].particles[:, 2:], np.tile([0.3, -0.4], (30, 1)))
 
 

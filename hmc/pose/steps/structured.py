@@ -17,7 +17,7 @@ from hmc.pose.steps.proposal import Proposal, Propose
 from hmc.pose.steps.restrict import ScoreData, SymmetricData, part_mask
 from hmc.pose.views.person_view import PersonView
 from hmc.search.filters import LogLikelihood, ParticleState
-from hmc.search.structural import structural_step
+from hmc.search.structural import Variables, structural_step
 
 __all__ = ["structured", "suited"]
 
@@ -51,8 +51,9 @@ def structured(preset: PosePreset) -> Propose:
         else:
             starts = [starting_particles(tracked, preset)] * n
         group = np.where(subject.free, hierarchy.group, n)
-        limits, sd = subject.body.limits, first_spread(tracked, preset)
-        threads, info = structural_step(rng, starts, likelihoods, group, sd, limits.low, limits.high, preset.structural, CHAIN_OF_DOF)
+        limits = subject.body.limits
+        variables = Variables(group, first_spread(tracked, preset), limits.low, limits.high, CHAIN_OF_DOF)
+        threads, info = structural_step(rng, starts, likelihoods, variables, preset.structural)
         memory = with_particles(threads[-1])
         if preset.refine is None:
             for level, thread in enumerate(threads[:-1]):

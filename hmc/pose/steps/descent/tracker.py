@@ -290,7 +290,7 @@ def optimise(
         return evaluation(*matched(at, going, scene.draw(rng, trunk) if preset.optimiser == "smd" else first), preset.cues.width)
 
     tolerance = tolerance_share * np.where(FREE < 3, preset.tolerance_m, np.radians(preset.tolerance_deg))
-    found, info = smd_run(objective, parameters, low, high, tolerance, preset.descent, groups, _UNITS)
+    found, info = smd_run(objective, parameters, (low, high), tolerance, preset.descent, groups, _UNITS)
     return found, info.iterations, float(info.values[-1])
 
 
