@@ -1,4 +1,4 @@
-"""Bodies and poses that several pose tests share."""
+"""Bodies, poses, subjects and views that several pose tests share."""
 
 from dataclasses import replace
 from functools import cache
@@ -10,8 +10,13 @@ from hmc.body.flesh import surface_coordinates
 from hmc.body.inverse import fit_landmarks
 from hmc.body.joints import N_DOF, dof_index
 from hmc.body.model import BodyModel, neutral_state
-from hmc.body.proportions import default_body
+from hmc.body.proportions import canton_body, default_body
+from hmc.pose.method import Capture, Subject
 from hmc.pose.objectives.symmetric import BodyPoints, SymmetricSettings, body_points
+from hmc.pose.steps.annealed import annealed_subject
+from hmc.pose.steps.presets import PosePreset
+from hmc.pose.views.hull_target import HullTarget
+from hmc.pose.views.person_view import PersonView
 
 #: Weights of the tests' own, so that tuning the presets does not move what is claimed here.
 COST = SymmetricSettings(cap_m=0.2, explain_weight=1.0, overlap_weight=2.0, posture_weight=3e-6)
@@ -22,6 +27,34 @@ def body_of(height_m: float = 1.78) -> tuple[BodyModel, BodyPoints]:
     """A body of average proportions and its points."""
     body = default_body(height_m)
     return body, body_points(body, surface_coordinates(body, 250))
+
+
+def capture_of(acted: Act) -> Capture:
+    """The recording of an act."""
+    return Capture(acted.fps, acted.grid.voxel_size_m, acted.grid.bounds)
+
+
+def plain_subject(height_m: float = 1.78) -> Subject:
+    """A subject with the body and the points of `body_of`."""
+    body, points = body_of(height_m)
+    return Subject(body, Capture(), points)
+
+
+def subject_of(acted: Act, preset: PosePreset) -> Subject:
+    """What an annealed method makes of an actor's body of average proportions."""
+    body = canton_body(acted.height_m) if preset.body == "canton" else default_body(acted.height_m)
+    return annealed_subject(body, capture_of(acted), preset)
+
+
+def view_of(target: HullTarget | None, velocity: np.ndarray | None = None, frame: int = 0) -> PersonView:
+    """A frame that shows hulls and nothing else."""
+    return PersonView(frame, target, velocity=np.zeros(3) if velocity is None else velocity)
+
+
+def views_of_act(acted: Act, velocities: np.ndarray | None = None) -> list[PersonView]:
+    """What an act shows, frame by frame; the track's velocities are those of the pelvis unless others are given."""
+    velocities = acted.velocities if velocities is None else velocities
+    return [view_of(target, velocity, k) for k, (target, velocity) in enumerate(zip(acted.targets, velocities, strict=True))]
 
 
 def with_cylinders(body: BodyModel, radius_m: float = 0.05) -> BodyModel:

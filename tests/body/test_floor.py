@@ -11,7 +11,7 @@ from hmc.body.kinematics import segment_transforms
 from hmc.body.model import neutral_state
 from hmc.body.proportions import canton_body, default_body, stature
 from hmc.pose.objectives.residuals import residual_rows
-from hmc.pose.objectives.symmetric import SymmetricSettings, body_points, symmetric_cost
+from hmc.pose.objectives.symmetric import Symmetric, SymmetricSettings, body_points
 from hmc.pose.views.hull_target import LOOSE_M, distance_at, make_target
 from hmc.voxels.grid import VoxelGrid
 
@@ -51,16 +51,16 @@ def test_floor_row_against_finite_differences():
     box = np.argwhere(np.ones((4, 4, 8), bool)) + [18, 18, 12]
     target = make_target(GRID, box, box, None, 0.0)
     points = body_points(BODY, surface_coordinates(BODY, 60))
-    settings = SymmetricSettings(floor_weight=1.0)
+    objective = Symmetric(BODY, points, target, target.surface, SymmetricSettings(floor_weight=1.0))
     state = standing(1.5)
     state[dof_index("r_hip_y", "l_hip_y", "root_ry")] = (-0.3, 0.2, 0.1)
     row = -1 - 27  # before the rows of the posture
-    values, jacobian = residual_rows(BODY, points, state, target, target.surface, settings)
+    values, jacobian = residual_rows(objective, state)
     assert values[row] > 0.2
     for dof in range(27):
         step = np.zeros(27)
         step[dof] = 1e-6
-        up, down = (residual_rows(BODY, points, state + s, target, target.surface, settings)[0][row] for s in (step, -step))
+        up, down = (residual_rows(objective, state + s)[0][row] for s in (step, -step))
         assert_allclose(jacobian[row, dof], (up - down) / 2e-6, atol=1e-6)
 
 
@@ -69,7 +69,7 @@ def test_hanging_costs_and_standing_does_not():
     with_floor, without = (make_target(GRID, box, box, None, floor) for floor in (0.0, None))
     points = body_points(BODY, surface_coordinates(BODY, 60))
     states = np.stack([standing(leg_length()), standing(leg_length() + 0.5)])
-    extra = [symmetric_cost(BODY, points, states, target, box * 0.05, SymmetricSettings()) for target in (with_floor, without)]
+    extra = [Symmetric(BODY, points, target, box * 0.05).cost(states) for target in (with_floor, without)]
     assert_allclose(extra[0] - extra[1], [0, SymmetricSettings().floor_weight * (0.5 - HANG_M) ** 2], atol=1e-9)
 
 

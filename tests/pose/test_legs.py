@@ -7,18 +7,20 @@ import numpy as np
 import pytest
 from acted import act
 from numpy.testing import assert_array_equal
-from posed import COST, mean_error, true_state
+from posed import COST, mean_error, subject_of, true_state, view_of
 
 from hmc.body.exchange import swapped_pose
+from hmc.body.joints import N_DOF, dof_index
 from hmc.body.kinematics import landmarks
-from hmc.body.proportions import default_body
 from hmc.landmarks import landmark_index
-from hmc.pose.legs import LegSettings, choose_legs, leg_choice, leg_points
-from hmc.pose.steps.annealed import make_filter
+from hmc.pose.legs import LegSettings, TellLegs, choose_legs, leg_alternatives, limb_points
+from hmc.pose.method import StepInfo, begin_tracking
+from hmc.pose.objectives.symmetric import Symmetric
 from hmc.pose.steps.presets import PRESETS
 from hmc.pose.steps.refine import refine
 
 FPS = 15.0
+PRESET = replace(PRESETS["default"], symmetric=COST)
 
 
 def path_cost(path, frames, costs, legs, settings):
@@ -85,47 +87,73 @@ def test_a_frame_that_went_wrong_does_not_turn_the_rest():
 @pytest.fixture(scope="module")
 def walker():
     acted = act("walk", frames=10)
-    filt = make_filter(default_body(acted.height_m), replace(PRESETS["default"], symmetric=COST), acted.fps)
-    return acted, filt, [refined(filt, true_state(filt.body, acted, k), target) for k, target in enumerate(acted.targets)]
+    subject = subject_of(acted, PRESET)
+    return acted, subject, [refined(subject, true_state(subject.body, acted, k), target) for k, target in enumerate(acted.targets)]
 
 
-def refined(filt, state, target):
-    return refine(filt.body, filt.samples, state, target, target.surface, filt.preset.symmetric, filt.preset.refine)[0]
+def refined(subject, state, target):
+    return refine(Symmetric(subject.body, subject.points, target, target.surface, COST), state, PRESET.refine)[0]
 
 
 def test_the_other_choice_has_exchanged_legs(walker):
-    acted, filt, states = walker
+    acted, subject, states = walker
     wide = int(
         np.argmax([np.linalg.norm(truth[landmark_index("l_ankle")] - truth[landmark_index("r_ankle")]) for truth in acted.landmarks])
     )
-    choice = leg_choice(np.random.default_rng(0), filt, states[wide], acted.targets[wide])
+    choice = leg_alternatives(np.random.default_rng(0), subject, states[wide], view_of(acted.targets[wide]), PRESET.polish)
     assert_array_equal(choice.states[0], states[wide])
-    kept, other = leg_points(filt.body, choice.states)
+    kept, other = limb_points(subject.body, choice.states, LegSettings())
     assert np.linalg.norm(other[[1, 3]] - kept[[3, 1]], axis=1).max() < 0.15  # ankles
     assert np.linalg.norm(kept[1] - kept[3]) > 0.3
     assert np.all(choice.costs > 0)
-    assert np.all((choice.states >= filt.body.limits.low) & (choice.states <= filt.body.limits.high))
+    assert np.all((choice.states >= subject.body.limits.low) & (choice.states <= subject.body.limits.high))
 
 
 def test_a_frame_without_a_hull_offers_nothing(walker):
-    _, filt, states = walker
-    choice = leg_choice(np.random.default_rng(0), filt, states[0], None)
+    _, subject, states = walker
+    choice = leg_alternatives(np.random.default_rng(0), subject, states[0], view_of(None), PRESET.polish)
     assert_array_equal(choice.states, [states[0], states[0]])
     assert_array_equal(choice.costs, 0)
 
 
+def test_any_step_s_pose_is_offered_with_exchanged_legs_unless_a_leg_is_missing(walker):
+    acted, subject, states = walker
+    tell, tracked = TellLegs(PRESET.polish), begin_tracking(subject, states[0])
+    view, missing = view_of(acted.targets[0]), np.zeros(N_DOF, bool)
+    missing[dof_index("l_elbow_z")] = True  # an arm that is missing says nothing of the legs
+    offered = tell(np.random.default_rng(0), (tracked, StepInfo(missing=missing)), view)
+    expected = leg_alternatives(np.random.default_rng(0), subject, states[0], view, PRESET.polish)
+    assert_array_equal(offered.states, expected.states)
+    missing[dof_index("r_knee_y")] = True
+    for info in (StepInfo(missing=missing), StepInfo("no hull of this person in this frame")):
+        nothing = tell(np.random.default_rng(0), (tracked, info), view)
+        assert_array_equal(nothing.states, [states[0]] * 2)
+        assert not nothing.costs.any()
+
+
+def test_arms_are_told_apart_too_where_that_is_asked(walker):
+    _, subject, states = walker
+    points = limb_points(subject.body, np.array(states[:2]), LegSettings(arms_too=True))
+    whole = landmarks(subject.body, np.array(states[:2]))
+    names = [landmark_index(f"{side}_{name}") for side in "lr" for name in ("elbow", "wrist", "knee", "ankle")]
+    assert {tuple(point) for point in points[0]} == {tuple(point) for point in whole[0, names]}
+
+
 def test_a_walker_whose_legs_were_exchanged_is_put_right(walker):
     """True poses, but for some frames whose legs were exchanged: hulls and swing tell which."""
-    acted, filt, states = walker
+    acted, subject, states = walker
     given = [
-        refined(filt, swapped_pose(filt.body, state, "legs"), acted.targets[k]) if 4 <= k < 8 else state for k, state in enumerate(states)
+        refined(subject, swapped_pose(subject.body, state, "legs"), acted.targets[k]) if 4 <= k < 8 else state
+        for k, state in enumerate(states)
     ]
     rng = np.random.default_rng(1)
-    choices = [leg_choice(rng, filt, state, target) for state, target in zip(given, acted.targets, strict=True)]
-    legs = np.array([leg_points(filt.body, one.states) for one in choices])
+    choices = [
+        leg_alternatives(rng, subject, state, view_of(target), PRESET.polish) for state, target in zip(given, acted.targets, strict=True)
+    ]
+    legs = np.array([limb_points(subject.body, one.states, LegSettings()) for one in choices])
     picks = choose_legs(np.arange(len(given)), np.array([one.costs for one in choices]), legs, acted.fps, LegSettings())
     errors = [
-        [mean_error(landmarks(filt.body, one), truth) for one in (state, choice.states[pick])]
+        [mean_error(landmarks(subject.body, one), truth) for one in (state, choice.states[pick])]
         for state, choice, pick, truth in zip(given, choices, picks, acted.landmarks, strict=True)
     ]
     before, after = np.mean(errors, axis=0)

@@ -9,8 +9,8 @@ from posed import COST, body_of, crossed_arms, mean_error, true_state, with_cyli
 from hmc.body.joints import N_DOF, dof_index
 from hmc.body.kinematics import landmarks
 from hmc.body.penetration import axis_points
-from hmc.pose.objectives.residuals import residual_rows, residual_values
-from hmc.pose.objectives.symmetric import BodyPoints, SymmetricSettings, symmetric_cost, thinned
+from hmc.pose.objectives.residuals import residual_rows
+from hmc.pose.objectives.symmetric import BodyPoints, Symmetric, SymmetricSettings, thinned
 from hmc.pose.steps.refine import RefineSettings, refine, refine_all, refine_best
 from hmc.pose.views.rays import points_to_explain
 
@@ -60,8 +60,8 @@ def test_derivatives_are_exact_for_cylinders(scene, pose):
     body = with_cylinders(body)
     points = BodyPoints(points.surface, axis_points(body))
     state = poses(scene)[pose]
-    _, jacobian = residual_rows(body, points, state, target, hull, COST)
-    measured, smooth = smooth_derivatives(lambda s: residual_rows(body, points, s, target, hull, COST)[0], state)
+    _, jacobian = residual_rows(Symmetric(body, points, target, hull, COST), state)
+    measured, smooth = smooth_derivatives(lambda s: residual_rows(Symmetric(body, points, target, hull, COST), s)[0], state)
     for name, rows in groups(points, hull).items():
         assert smooth[rows].mean() > 0.95
         fine = np.flatnonzero(smooth)
@@ -78,8 +78,8 @@ def test_derivatives_for_flesh_point_the_right_way(scene, pose):
     """Elliptic and tapered cones may be treated as round and straight: descent needs the direction."""
     body, points, target, hull, _ = scene
     state = poses(scene)[pose]
-    _, jacobian = residual_rows(body, points, state, target, hull, COST)
-    measured, smooth = smooth_derivatives(lambda s: residual_rows(body, points, s, target, hull, COST)[0], state)
+    _, jacobian = residual_rows(Symmetric(body, points, target, hull, COST), state)
+    measured, smooth = smooth_derivatives(lambda s: residual_rows(Symmetric(body, points, target, hull, COST), s)[0], state)
     for name, rows in groups(points, hull).items():
         fine = smooth[rows] & (np.linalg.norm(measured[rows], axis=1) > 1e-9)
         a, b = jacobian[rows][fine], measured[rows][fine]
@@ -94,17 +94,18 @@ def test_derivatives_for_flesh_point_the_right_way(scene, pose):
 def test_residuals_square_to_the_cost(scene, settings):
     """The refinement interpolates the distance field, the particles take the nearest voxel: the same up to the voxel's size."""
     body, points, target, hull, true = scene
+    objective = Symmetric(body, points, target, hull, settings)
     for state in (true, *poses(scene)):
-        residuals, _ = residual_rows(body, points, state, target, hull, settings)
-        assert residuals @ residuals == pytest.approx(symmetric_cost(body, points, state[None], target, hull, settings)[0], rel=0.15)
-        assert_allclose(residual_values(body, points, state, target, hull, settings), residuals, atol=1e-5)
+        residuals, _ = residual_rows(objective, state)
+        assert residuals @ residuals == pytest.approx(objective.cost(state[None])[0], rel=0.15)
+        assert_allclose(objective.linearise(state).residuals, residuals, atol=1e-5)
 
 
 def test_nothing_pulls_beyond_the_cap(scene):
     body, points, target, hull, true = scene
     far = true.copy()
     far[2] += 50.0
-    residuals, jacobian = residual_rows(body, points, far, target, hull, COST)
+    residuals, jacobian = residual_rows(Symmetric(body, points, target, hull, COST), far)
     both = slice(0, len(points.surface.points) + len(hull))
     assert not jacobian[both].any()
     assert residuals[both] @ residuals[both] == pytest.approx((1 + COST.explain_weight) * COST.cap_m**2, rel=1e-6)
@@ -116,11 +117,11 @@ def test_the_cost_never_rises_and_limits_hold(scene, seed):
     start = true + np.random.default_rng(seed).normal(0, [0.1] * 3 + [0.4] * 24)
     last = np.inf
     for iterations in (1, 2, 4, 8):
-        state, info = refine(body, points, start, target, hull, COST, RefineSettings(iterations=iterations))
+        state, info = refine(Symmetric(body, points, target, hull, COST), start, RefineSettings(iterations=iterations))
         assert np.all((state >= body.limits.low) & (state <= body.limits.high))
         assert info.cost_after <= info.cost_before and info.cost_after <= last
         assert info.evaluations >= 1
-        residuals, _ = residual_rows(body, points, state, target, hull, COST)
+        residuals, _ = residual_rows(Symmetric(body, points, target, hull, COST), state)
         assert residuals @ residuals <= info.cost_after + 1e-12  # the rest is the hold on the start
         last = info.cost_after
 
@@ -130,10 +131,10 @@ def test_only_free_degrees_move(scene):
     start = np.clip(true + np.random.default_rng(1).normal(0, 0.15, N_DOF), body.limits.low, body.limits.high)
     free = np.zeros(N_DOF, bool)
     free[dof_index("l_shoulder_x", "l_shoulder_z", "l_elbow_z")] = True
-    state, info = refine(body, points, start, target, hull, COST, RefineSettings(), free=free)
+    state, info = refine(Symmetric(body, points, target, hull, COST), start, RefineSettings(), free=free)
     assert_allclose(state[~free], start[~free])
     assert np.abs(state[free] - start[free]).max() > 1e-3 and info.cost_after < info.cost_before
-    state, info = refine(body, points, start, target, hull, COST, RefineSettings(), free=np.zeros(N_DOF, bool))
+    state, info = refine(Symmetric(body, points, target, hull, COST), start, RefineSettings(), free=np.zeros(N_DOF, bool))
     assert_allclose(state, start)
     assert info.cost_after == info.cost_before
 
@@ -141,11 +142,11 @@ def test_only_free_degrees_move(scene):
 def test_a_strong_hold_keeps_the_pose(scene):
     body, points, target, hull, true = scene
     start = np.clip(true + np.random.default_rng(4).normal(0, 0.1, N_DOF), body.limits.low, body.limits.high)
-    weak, _ = refine(body, points, start, target, hull, COST, RefineSettings(stay_weight=1e-7))
-    strong, _ = refine(body, points, start, target, hull, COST, RefineSettings(stay_weight=10.0))
+    weak, _ = refine(Symmetric(body, points, target, hull, COST), start, RefineSettings(stay_weight=1e-7))
+    strong, _ = refine(Symmetric(body, points, target, hull, COST), start, RefineSettings(stay_weight=10.0))
     assert np.abs(strong - start).max() < 0.01 * np.abs(weak - start).max()
     # The hold pulls to the anchor, where one is given.
-    anchored, _ = refine(body, points, start, target, hull, COST, RefineSettings(iterations=40, stay_weight=10.0), anchor=true)
+    anchored, _ = refine(Symmetric(body, points, target, hull, COST), start, RefineSettings(iterations=40, stay_weight=10.0), anchor=true)
     assert np.abs(anchored - np.clip(true, body.limits.low, body.limits.high)).max() < 0.02
 
 
@@ -161,7 +162,7 @@ def test_displaced_poses_of_rendered_people_are_recovered(motion):
         rng = np.random.default_rng(frame)
         for _ in range(3):
             start = np.clip(true + rng.normal(0, [0.05] * 3 + [0.08] * 3 + [0.2] * 21), body.limits.low, body.limits.high)
-            state, _ = refine(body, points, start, target, target.surface[::3], COST, RefineSettings(iterations=20))
+            state, _ = refine(Symmetric(body, points, target, target.surface[::3], COST), start, RefineSettings(iterations=20))
             before, after = (mean_error(landmarks(body, s), acted.landmarks[frame]) for s in (start, state))
             gains.append((before, after))
     before, after = np.mean(gains, axis=0)
@@ -173,8 +174,8 @@ def test_of_several_starts_the_best_goes_to_the_end(scene):
     body, points, target, hull, _ = scene
     near, far = poses(scene)
     settings = RefineSettings(iterations=12)
-    alone, info = refine(body, points, near, target, hull, COST, settings)
-    best, both = refine_best(body, points, [far, near], target, hull, COST, settings, trial_steps=4)
+    alone, info = refine(Symmetric(body, points, target, hull, COST), near, settings)
+    best, both = refine_best(Symmetric(body, points, target, hull, COST), [far, near], settings, trial_steps=4)
     assert_allclose(best, alone, atol=0.02)
     assert both.cost == pytest.approx(info.cost, rel=0.02) and both.evaluations > info.evaluations
     seen = []
@@ -183,7 +184,7 @@ def test_of_several_starts_the_best_goes_to_the_end(scene):
         seen.append((state, cost))
         return True
 
-    left, given_up = refine_best(body, points, [far, near], target, hull, COST, settings, trial_steps=2, is_hopeless=is_hopeless)
+    left, given_up = refine_best(Symmetric(body, points, target, hull, COST), [far, near], settings, trial_steps=2, is_hopeless=is_hopeless)
     assert given_up.cost > info.cost and given_up.evaluations < both.evaluations
     np.testing.assert_array_equal(seen[0][0], left)
     assert seen[0][1] == pytest.approx(given_up.cost_after)
@@ -193,8 +194,8 @@ def test_starts_that_come_to_the_same_place_are_not_refined_twice(scene):
     body, points, target, hull, _ = scene
     near, far = poses(scene)
     settings = RefineSettings(iterations=12)
-    alone = [refine(body, points, start, target, hull, COST, settings) for start in (near, far)]
-    together = refine_all(body, points, [near, far, near], target, hull, COST, settings, trial_steps=5)
+    alone = [refine(Symmetric(body, points, target, hull, COST), start, settings) for start in (near, far)]
+    together = refine_all(Symmetric(body, points, target, hull, COST), [near, far, near], settings, trial_steps=5)
     for (state, info), (expected, expected_info) in zip(together, alone, strict=False):
         assert_allclose(state, expected, atol=0.02)
         assert info.cost == pytest.approx(expected_info.cost, rel=0.02)
@@ -208,5 +209,5 @@ def test_thinned_points_cost_nearly_the_same(scene):
     few = thinned(points, 120)
     assert 80 < len(few.surface.points) < 180 and set(few.surface.segment) == set(points.surface.segment)
     states = np.stack(poses(scene))
-    full, rough = (symmetric_cost(body, p, states, target, hull, SymmetricSettings()) for p in (points, few))
+    full, rough = (Symmetric(body, p, target, hull).cost(states) for p in (points, few))
     assert_allclose(rough, full, rtol=0.35)

@@ -21,7 +21,7 @@ from hmc.body.penetration import penetration_depth
 from hmc.body.prior import POSTURE, posture_spread
 from hmc.errors import InputError
 from hmc.landmarks import landmark_index
-from hmc.pose.objectives.symmetric import SymmetricSettings, body_distance, outside_distance, symmetric_cost
+from hmc.pose.objectives.symmetric import Symmetric, SymmetricSettings, body_distance, outside_distance
 from hmc.pose.views.hull_target import FAR_M, HullTarget, distance_at, distance_gradient, make_target, sample_points
 from hmc.pose.views.near_distance import near_distance
 from hmc.voxels.grid import VoxelGrid
@@ -215,7 +215,7 @@ def test_the_cost_is_the_sum_of_its_parts(balls, settings):
     states = np.stack([crossed_arms(), *random_states(6, 3)])
     states[:, 1] += 2.8
     hull = balls.surface[::9]
-    found = symmetric_cost(body, points, states, balls, hull, settings)
+    found = Symmetric(body, points, balls, hull, settings).cost(states)
     for n, state in enumerate(states):
         rotations, positions = segment_transforms(body, state)
         world = place_points(rotations, positions, points.surface.points, points.surface.segment)
@@ -263,7 +263,7 @@ def test_the_true_pose_of_a_rendered_person_costs_least():
         spread = np.r_[np.full(3, 0.15), np.full(24, 0.35)]
         others = np.clip(true + rng.normal(0, 1, (60, N_DOF)) * spread, body.limits.low, body.limits.high)
         target = acted.targets[frame]
-        costs = symmetric_cost(body, points, np.stack([true, *others]), target, target.surface[::4], COST)
+        costs = Symmetric(body, points, target, target.surface[::4], COST).cost(np.stack([true, *others]))
         assert np.argmin(costs) == 0
         assert costs[0] < 0.3 * np.median(costs)
 
