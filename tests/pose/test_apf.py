@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 from acted import act
 from numpy.testing import assert_allclose, assert_array_equal
-from posed import COST, body_of, mean_error, true_state
+from posed import COST, mean_error, subject_of, true_state, view_of
 
 from hmc.body.joints import DOF_NAMES, N_DOF, mirror_state
 from hmc.body.kinematics import landmarks
-from hmc.body.proportions import canton_body
 from hmc.errors import InputError
-from hmc.pose.steps.annealed import make_filter, pose_init, pose_step, starting_particles
+from hmc.pose.method import begin_tracking, particles_of, with_particles
+from hmc.pose.methods.annealed import annealed_pose_step
+from hmc.pose.steps.annealed import DRIFT, first_spread, starting_particles
 from hmc.pose.steps.presets import PRESETS, drift, pose_preset
 from hmc.search.filters import AnnealedSettings, particle_init
 
@@ -27,41 +28,40 @@ LEAN = {
 }
 
 
-def filter_of(name: str, acted):
-    preset = LEAN[name]
-    body = canton_body(acted.height_m) if preset.body == "canton" else body_of(acted.height_m)[0]
-    return make_filter(body, preset, acted.fps, acted.grid.voxel_size_m, acted.grid.bounds)
+def parts_of(name: str, acted):
+    """A person's body by a preset, and the step that follows it."""
+    return subject_of(acted, LEAN[name]), annealed_pose_step(LEAN[name])
 
 
 @pytest.mark.parametrize("name", LEAN)
 def test_a_step_keeps_the_limits_and_follows_its_seed(name):
     acted = act("walk")
-    filt = filter_of(name, acted)
-    body = filt.body
-    start = pose_init(true_state(body, acted))
-    one, info = pose_step(np.random.default_rng(1), filt, start, acted.targets[1])
-    again, _ = pose_step(np.random.default_rng(1), filt, start, acted.targets[1])
-    other, _ = pose_step(np.random.default_rng(2), filt, start, acted.targets[1])
+    subject, step = parts_of(name, acted)
+    body, view = subject.body, view_of(acted.targets[1])
+    start = begin_tracking(subject, true_state(body, acted))
+    one, info = step(np.random.default_rng(1), start, view)
+    again, _ = step(np.random.default_rng(1), start, view)
+    other, _ = step(np.random.default_rng(2), start, view)
     assert_array_equal(one.state, again.state)
-    assert_array_equal(one.particles.particles, again.particles.particles)
+    assert_array_equal(particles_of(one).particles, particles_of(again).particles)
     assert np.abs(one.state - other.state).max() > 1e-6
-    for states in (one.state, one.particles.particles):
+    for states in (one.state, particles_of(one).particles):
         assert np.all((states >= body.limits.low) & (states <= body.limits.high))
     assert_allclose(one.velocity, one.state - start.state)
     assert info.status == "fitted" and info.annealed is not None and np.isfinite(info.annealed.best_log_likelihood)
-    assert np.isfinite(info.cost) == (filt.table is None)  # square metres; the four scores give a likelihood and no cost
-    settings = filt.preset.annealed
+    assert np.isfinite(info.cost) == (subject.flesh is None)  # square metres; the four scores give a likelihood and no cost
+    settings = LEAN[name].annealed
     assert info.evaluations >= settings.layers * settings.particles
 
 
 @pytest.mark.parametrize("name", LEAN)
 def test_without_a_hull_the_pose_stays(name):
     acted = act("walk")
-    filt = filter_of(name, acted)
-    start = pose_init(true_state(filt.body, acted), np.full(N_DOF, 0.1))
+    subject, step = parts_of(name, acted)
+    start = begin_tracking(subject, true_state(subject.body, acted), np.full(N_DOF, 0.1))
     tiny = replace(acted.targets[0], surface=acted.targets[0].surface[:3])
     for target in (None, tiny):
-        after, info = pose_step(np.random.default_rng(0), filt, start, target)
+        after, info = step(np.random.default_rng(0), start, view_of(target))
         assert_array_equal(after.state, start.state)
         assert not after.velocity.any()
         assert np.isnan(info.cost) and info.annealed is None and info.evaluations == 0 and "no hull" in info.status
@@ -69,26 +69,26 @@ def test_without_a_hull_the_pose_stays(name):
 
 def test_the_default_preset_follows_a_rendered_walker():
     acted = act("walk")
-    filt = filter_of("default", acted)
-    state = pose_init(true_state(filt.body, acted))
+    subject, step = parts_of("default", acted)
+    tracked = begin_tracking(subject, true_state(subject.body, acted))
     errors = []
     for frame, target in enumerate(acted.targets):
-        state, info = pose_step(np.random.default_rng([3, frame]), filt, state, target)
-        errors.append(mean_error(landmarks(filt.body, state.state), acted.landmarks[frame]))
+        tracked, info = step(np.random.default_rng([3, frame]), tracked, view_of(target))
+        errors.append(mean_error(landmarks(subject.body, tracked.state), acted.landmarks[frame]))
         assert 0 < info.cost < 0.01
     assert np.mean(errors) < 0.06 and max(errors) < 0.10
 
 
 def test_refinement_beats_the_particles_alone():
     acted = act("walk")
-    full = filter_of("default", acted)
-    bare = replace(full, preset=replace(full.preset, refine=None, search=None, fit_body=None, start="neutral"))
+    subject, full = parts_of("default", acted)
+    bare = annealed_pose_step(replace(LEAN["default"], refine=None, search=None, fit_body=None, start="neutral"))
     errors: dict[str, list[float]] = {}
-    for name, filt in (("full", full), ("bare", bare)):
-        state, errors[name] = pose_init(true_state(filt.body, acted)), []
+    for name, step in (("full", full), ("bare", bare)):
+        tracked, errors[name] = begin_tracking(subject, true_state(subject.body, acted)), []
         for frame, target in enumerate(acted.targets[:6]):
-            state, _ = pose_step(np.random.default_rng([4, frame]), filt, state, target)
-            errors[name].append(mean_error(landmarks(filt.body, state.state), acted.landmarks[frame]))
+            tracked, _ = step(np.random.default_rng([4, frame]), tracked, view_of(target))
+            errors[name].append(mean_error(landmarks(subject.body, tracked.state), acted.landmarks[frame]))
     assert np.mean(errors["full"]) < np.mean(errors["bare"])
 
 
@@ -99,37 +99,38 @@ def test_the_four_scores_keep_hold_of_a_person(name):
     Single runs of so few particles end .05 to .35 m off, whichever way double occupancy is counted, so that one alone tells nothing.
     """
     acted = act("walk")
-    filt = filter_of(name, acted)
-    start = true_state(filt.body, acted)
+    subject, step = parts_of(name, acted)
+    start = true_state(subject.body, acted)
     pelvis = acted.landmarks[4, 0]
     ends = []
     for seed in range(15):
-        state = pose_init(start)
+        tracked = begin_tracking(subject, start)
         for frame, target in enumerate(acted.targets[:5]):
-            state, _ = pose_step(np.random.default_rng([seed, frame]), filt, state, target)
-        ends.append(np.linalg.norm(landmarks(filt.body, state.state)[0] - pelvis))
-    left_behind = np.linalg.norm(landmarks(filt.body, start)[0] - pelvis)
+            tracked, _ = step(np.random.default_rng([seed, frame]), tracked, view_of(target))
+        ends.append(np.linalg.norm(landmarks(subject.body, tracked.state)[0] - pelvis))
+    left_behind = np.linalg.norm(landmarks(subject.body, start)[0] - pelvis)
     assert np.median(ends) < 2 / 3 * left_behind
 
 
 def test_a_state_is_all_that_goes_on():
     """With refinement the next frame depends on pose and velocity, so a stopped run can go on from them."""
     acted = act("walk")
-    filt = filter_of("default", acted)
-    state, _ = pose_step(np.random.default_rng(0), filt, pose_init(true_state(filt.body, acted)), acted.targets[0])
-    on, _ = pose_step(np.random.default_rng(1), filt, state, acted.targets[1])
-    resumed, _ = pose_step(np.random.default_rng(1), filt, pose_init(state.state, state.velocity), acted.targets[1])
+    subject, step = parts_of("default", acted)
+    first, second = (view_of(target) for target in acted.targets[:2])
+    tracked, _ = step(np.random.default_rng(0), begin_tracking(subject, true_state(subject.body, acted)), first)
+    on, _ = step(np.random.default_rng(1), tracked, second)
+    resumed, _ = step(np.random.default_rng(1), begin_tracking(subject, tracked.state, tracked.velocity), second)
     assert_array_equal(on.state, resumed.state)
 
 
 @pytest.mark.parametrize("name", ["default", "canton2009"])
 def test_particles_start_as_the_motion_says(name):
-    filt = filter_of(name, act("walk"))
-    body, refined = filt.body, name == "default"
+    subject, _ = parts_of(name, act("walk"))
+    body, refined = subject.body, name == "default"
     particles = np.stack([true_state(body, act("walk"))] * 3) + np.arange(3)[:, None] * 1e-3
     velocity = np.full(N_DOF, 0.01)
-    state = pose_init(particles[1], velocity, particle_init(particles))
-    starts = {m: starting_particles(replace(filt, preset=replace(filt.preset, motion=m)), state) for m in ("none", "smooth", "both")}
+    tracked = begin_tracking(subject, particles[1], velocity, with_particles(particle_init(particles)))
+    starts = {motion: starting_particles(tracked, replace(LEAN[name], motion=motion)) for motion in ("none", "smooth", "both")}
     last = particles[1:2] if refined else particles
     moved = np.clip(last + velocity, body.limits.low, body.limits.high)
     assert_array_equal(starts["none"].particles, last)
@@ -140,11 +141,21 @@ def test_particles_start_as_the_motion_says(name):
     assert PRESETS["default"].motion == "both" and PRESETS["canton2009"].motion == "none"
 
 
-def test_a_filter_starts_where_it_is_told():
+def test_tracking_begins_where_it_is_told():
     state = np.arange(N_DOF)
-    started = pose_init(state)
-    assert_array_equal(started.state, state)
-    assert not started.velocity.any() and started.particles.particles.shape == (1, N_DOF)
+    begun = begin_tracking(subject_of(act("walk"), LEAN["default"]), state)
+    assert_array_equal(begun.state, state)
+    assert not begun.velocity.any() and particles_of(begun).particles.shape == (1, N_DOF) and not begun.memory
+
+
+def test_an_experiment_s_own_drift_takes_the_place_of_the_preset_s():
+    subject, _ = parts_of("canton2009", act("walk"))
+    own = np.arange(1.0, 1.0 + N_DOF)
+    tracked = begin_tracking(replace(subject, extras={DRIFT: own}), np.zeros(N_DOF))
+    assert_allclose(first_spread(tracked, replace(LEAN["canton2009"], drift_scale=0.5)), 0.5 * own)
+    free = np.arange(N_DOF) != 7
+    part = replace(tracked, subject=replace(tracked.subject, free=free))
+    assert_allclose(first_spread(part, LEAN["canton2009"]), np.where(free, own, 0))
 
 
 def test_drift_grows_with_the_time_between_frames():

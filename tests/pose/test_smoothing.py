@@ -7,15 +7,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from hmc.body.joints import DOF_NAMES
+from hmc.body.joints import DOF_NAMES, default_limits
 from hmc.body.kinematics import landmarks
 from hmc.body.model import neutral_state
 from hmc.body.proportions import default_body
 from hmc.io.results import PoseStates, PoseTable
 from hmc.landmarks import landmark_index
-from hmc.pose.sequence import PosedPeople
+from hmc.pose.follow import PosedPeople
 from hmc.pose.smoothing import smooth_landmarks, smooth_people
-from hmc.pose.steps.presets import PRESETS
 
 FPS = 30.0
 
@@ -70,7 +69,7 @@ def test_smoothed_poses_are_poses_of_the_same_body():
     people = replace(
         people, poses=replace(people.poses, positions=np.where(np.isnan(noisy).any(1)[:, None, None], np.nan, people.poses.positions))
     )
-    smooth = smooth_people(people, PRESETS["default"], FPS, 0.4)
+    smooth = smooth_people(people, default_limits(), FPS, 0.4)
     assert np.isnan(smooth.poses.positions[5]).all()
     kept = np.delete(np.arange(40), 5)
     truth = landmarks(body, true)[kept]
