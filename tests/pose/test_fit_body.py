@@ -1,16 +1,18 @@
 """A person's own dimensions, from rendered people of known stature."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from acted import act
 from numpy.testing import assert_allclose
 from posed import COST, body_of, mean_error, true_state
 
+from hmc.body.dimensions import FitBodySettings
 from hmc.body.flesh import surface_coordinates
 from hmc.body.kinematics import landmarks
 from hmc.body.proportions import default_body
-from hmc.pose.objectives.symmetric import body_points
-from hmc.body.dimensions import FitBodySettings
+from hmc.pose.objectives.symmetric import Symmetric, body_points
 from hmc.pose.starts.fit_body import fit_body
 from hmc.pose.steps.refine import RefineSettings, refine
 
@@ -21,18 +23,19 @@ def start(acted, height_m: float):
     """A body of some stature on the frames of an act, and the poses refined with it."""
     body, points = body_of(height_m)
     targets = [acted.targets[k] for k in FRAMES]
-    hulls = [target.surface[::4] for target in targets]
-    states = [
-        refine(body, points, true_state(body, acted, k), target, hull, COST, RefineSettings())[0]
-        for k, target, hull in zip(FRAMES, targets, hulls, strict=True)
-    ]
-    return body, np.array(states), targets, hulls
+    objectives = [Symmetric(body, points, target, target.surface[::4], COST) for target in targets]
+    states = [refine(one, true_state(body, acted, k), RefineSettings())[0] for k, one in zip(FRAMES, objectives, strict=True)]
+    return objectives, np.array(states)
 
 
-def pose_cost(body, coordinates, states, targets, hulls) -> float:
+def with_body(objectives, body, coordinates) -> list[Symmetric]:
+    """The same frames for another body, or for its surface sampled elsewhere."""
     points = body_points(body, coordinates)
-    costs = [refine(body, points, s, t, h, COST, RefineSettings())[1].cost_after for s, t, h in zip(states, targets, hulls, strict=True)]
-    return float(np.mean(costs))
+    return [replace(one, body=body, points=points) for one in objectives]
+
+
+def pose_cost(objectives, states) -> float:
+    return float(np.mean([refine(one, state, RefineSettings())[1].cost_after for one, state in zip(objectives, states, strict=True)]))
 
 
 def stature(body) -> float:
@@ -50,12 +53,13 @@ def test_stature_is_recovered_from_perfect_silhouettes(height):
     acted = act("gesture", cameras=7, height_m=height)
     found = []
     for assumed in (height - 0.1, height + 0.12):
-        body, states, targets, hulls = start(acted, assumed)
+        objectives, states = start(acted, assumed)
+        body = objectives[0].body
         coordinates = surface_coordinates(body, 250)
-        fitted, poses, info = fit_body(body, coordinates, states, targets, hulls, COST, FitBodySettings())
+        fitted, poses, info = fit_body(objectives, states, coordinates, FitBodySettings())
         found.append(stature(fitted))
         assert info.cost_after < info.cost_before
-        assert pose_cost(fitted, coordinates, poses, targets, hulls) < pose_cost(body, coordinates, states, targets, hulls)
+        assert pose_cost(with_body(objectives, fitted, coordinates), poses) < pose_cost(objectives, states)
         assert np.all((poses >= body.limits.low) & (poses <= body.limits.high))
         errors = [mean_error(landmarks(fitted, s), acted.landmarks[k]) for s, k in zip(poses, FRAMES, strict=True)]
         assert np.mean(errors) < 0.05
@@ -69,8 +73,9 @@ def walking():
 
 
 def test_the_body_stays_a_person(walking):
-    body, states, targets, hulls = walking
-    fitted, _, _ = fit_body(body, surface_coordinates(body, 200), states, targets, hulls, COST, FitBodySettings())
+    objectives, states = walking
+    body = objectives[0].body
+    fitted, _, _ = fit_body(objectives, states, surface_coordinates(body, 200), FitBodySettings())
     assert set(fitted.dimensions) == set(body.dimensions)
     ratio = np.array([fitted.dimensions[name] / body.dimensions[name] for name in body.dimensions])
     assert np.all((ratio > 0.5) & (ratio < 2.0))
@@ -83,10 +88,11 @@ def test_the_body_stays_a_person(walking):
 
 
 def test_a_strong_prior_keeps_the_body(walking):
-    body, states, targets, hulls = walking
+    objectives, states = walking
+    body = objectives[0].body
     coordinates = surface_coordinates(body, 200)
-    strong, _, info = fit_body(body, coordinates, states, targets, hulls, COST, FitBodySettings(prior_weight=10.0))
-    weak, _, _ = fit_body(body, coordinates, states, targets, hulls, COST, FitBodySettings())
+    strong, _, info = fit_body(objectives, states, coordinates, FitBodySettings(prior_weight=10.0))
+    weak, _, _ = fit_body(objectives, states, coordinates, FitBodySettings())
 
     def change(fitted):
         return max(abs(np.log(fitted.dimensions[name] / body.dimensions[name])) for name in body.dimensions)
@@ -96,15 +102,17 @@ def test_a_strong_prior_keeps_the_body(walking):
 
 
 def test_no_iterations_change_nothing(walking):
-    body, states, targets, hulls = walking
-    same, poses, info = fit_body(body, surface_coordinates(body, 200), states, targets, hulls, COST, FitBodySettings(iterations=0))
+    objectives, states = walking
+    body = objectives[0].body
+    same, poses, info = fit_body(objectives, states, surface_coordinates(body, 200), FitBodySettings(iterations=0))
     assert same.dimensions == pytest.approx(body.dimensions)
     assert_allclose(poses, states)
     assert info.cost_after == info.cost_before
 
 
 def test_one_frame_is_enough_to_run(walking):
-    body, states, targets, hulls = walking
-    fitted, poses, info = fit_body(body, surface_coordinates(body, 150), states[:1], targets[:1], hulls[:1], COST, FitBodySettings())
+    objectives, states = walking
+    body = objectives[0].body
+    fitted, poses, info = fit_body(objectives[:1], states[:1], surface_coordinates(body, 150), FitBodySettings())
     assert poses.shape == (1, 27) and np.isfinite(poses).all()
     assert 1.4 < fitted.height_m < 2.2 and info.cost_after <= info.cost_before

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from acted import act
 from numpy.testing import assert_allclose
-from posed import COST, body_of, mean_error
+from posed import COST, body_of, mean_error, plain_subject
 
 from hmc.body.exchange import swapped_poses
 from hmc.body.joints import DOF_NAMES, N_DOF, mirror_state
@@ -52,8 +52,8 @@ def test_templates_come_in_both_hands_or_are_symmetric():
 @pytest.mark.parametrize(("motion", "heading_deg"), [("gesture", 40), ("walk", -130)])
 def test_one_of_the_first_poses_is_near_the_truth(motion, heading_deg):
     acted = act(motion, heading_deg=heading_deg)
-    body, points = body_of(acted.height_m)
-    states, costs = first_poses(np.random.default_rng(0), body, points, acted.targets[2], COST)
+    body, _ = body_of(acted.height_m)
+    states, costs = first_poses(np.random.default_rng(0), plain_subject(acted.height_m), acted.targets[2], COST)
     assert len(states) == len(costs) <= 6 and np.all(np.diff(costs) >= 0)
     assert np.all((states >= body.limits.low) & (states <= body.limits.high))
     assert min(turn(state[3], acted.heading) for state in states) < 45
@@ -68,8 +68,8 @@ def test_one_of_the_first_poses_is_near_the_truth(motion, heading_deg):
 
 def test_first_poses_are_different_poses():
     acted = act("gesture")
-    body, points = body_of(acted.height_m)
-    states, _ = first_poses(np.random.default_rng(1), body, points, acted.targets[0], COST, keep=4)
+    body, _ = body_of(acted.height_m)
+    states, _ = first_poses(np.random.default_rng(1), plain_subject(acted.height_m), acted.targets[0], COST, keep=4)
     found = landmarks(body, states)
     for a in range(len(found)):
         for b in range(a):
@@ -80,12 +80,11 @@ def test_a_person_on_a_stage():
     """The floor need not be at zero."""
     acted = act("walk")
     target = acted.targets[0]
-    body, points = body_of(acted.height_m)
     raised = replace(
         target, origin=target.origin + [0, 0, 1.5], surface=target.surface + [0, 0, 1.5], rays=target.rays + [0, 0, 1.5, 0, 0, 0]
     )
-    plain, cost = first_poses(np.random.default_rng(3), body, points, target, COST, floor_z=0.0)
-    high, high_cost = first_poses(np.random.default_rng(3), body, points, raised, COST, floor_z=1.5)
+    plain, cost = first_poses(np.random.default_rng(3), plain_subject(acted.height_m), target, COST, floor_z=0.0)
+    high, high_cost = first_poses(np.random.default_rng(3), plain_subject(acted.height_m), raised, COST, floor_z=1.5)
     assert_allclose(high[0][:3], plain[0][:3] + [0, 0, 1.5], atol=0.03)
     assert high_cost[0] == pytest.approx(cost[0], rel=0.2)
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
-from posed import body_of
+from posed import body_of, view_of
 from scipy.ndimage import binary_dilation, binary_fill_holes
 
 from hmc.body.cones import cone_distance
@@ -19,16 +19,19 @@ from hmc.body.nearest_cone import part_distances
 from hmc.body.scalable_models import MODEL_1, MODEL_2, UNITIVE, UNITIVE_PIECES
 from hmc.errors import InputError
 from hmc.landmarks import landmark_index
+from hmc.pose.method import Capture, StepInfo, begin_tracking
+from hmc.pose.methods.annealed import annealed_pose_step
 from hmc.pose.methods.scalable import method_preset
 from hmc.pose.objectives.four_scores import make_score_table, scores
-from hmc.pose.steps.restrict import ScoreData, SymmetricData, coarser_table, nearest_part, part_body, part_mask, restrict_table
-from hmc.pose.objectives.symmetric import body_distance, symmetric_cost
-from hmc.pose.steps.annealed import make_filter, pose_init, score_maps
+from hmc.pose.objectives.symmetric import Symmetric, body_distance
+from hmc.pose.steps.annealed import DRIFT, annealed_subject
 from hmc.pose.steps.hidden.limbs import LimbMemory, LimbSettings, limb_spread_deg, look_again
 from hmc.pose.steps.hidden.scouts import scout
 from hmc.pose.steps.hidden.shown import in_doubt, limb_signs, place_flesh
-from hmc.pose.steps.presets import PRESETS
-from hmc.pose.steps.scalable import scalable_step, suited
+from hmc.pose.steps.hidden.step import with_hidden_limbs
+from hmc.pose.steps.presets import PRESETS, drift
+from hmc.pose.steps.restrict import ScoreData, SymmetricData, coarser_table, nearest_part, part_body, part_mask, restrict_table, score_maps
+from hmc.pose.steps.structured import suited
 from hmc.pose.views.hull_target import make_target
 from hmc.voxels.grid import VoxelGrid
 
@@ -61,20 +64,26 @@ def signs(table, state, target, parts, others):
     return limb_signs(place_flesh(table, state, score_maps(target, None), target, parts), parts, others)
 
 
+def few(preset):
+    """A twentieth of the default's work: what is tested is which limbs are there."""
+    return replace(preset, annealed=replace(preset.annealed, layers=2, particles=30), search=None)
+
+
+DDM = {
+    "default": few(method_preset(PRESETS["default"], "ddm-apf")),
+    "canton2009": method_preset(PRESETS["canton2009"], "ddm-apf"),
+}
+SETTINGS, COST_SETTINGS = DDM["default"].limbs, DDM["default"].symmetric
+
+
 @pytest.fixture(scope="module")
-def filters():
+def subjects():
     body, _ = body_of()
-    refined = method_preset(PRESETS["default"], "ddm-apf")
-    # A twentieth of the default's work: what is tested is which limbs are there.
-    refined = replace(refined, annealed=replace(refined.annealed, layers=2, particles=30), search=None)
-    return {
-        "default": make_filter(body, refined, 30.0, 0.03),
-        "canton2009": make_filter(body, method_preset(PRESETS["canton2009"], "ddm-apf"), 30.0, 0.03),
-    }
+    return {name: annealed_subject(body, Capture(30.0, 0.03), preset) for name, preset in DDM.items()}
 
 
-def test_scores_of_kept_parts_are_those_of_the_whole_body(filters):
-    table = filters["default"].table
+def test_scores_of_kept_parts_are_those_of_the_whole_body(subjects):
+    table = subjects["default"].flesh
     states = standing() + np.random.default_rng(0).normal(0, 0.1, (5, N_DOF))
     maps = score_maps(hull_of(standing()), None)
     whole = scores(table, states, maps)
@@ -87,8 +96,8 @@ def test_scores_of_kept_parts_are_those_of_the_whole_body(filters):
 
 
 @pytest.mark.parametrize("every", [2, 3])
-def test_a_coarser_table_is_that_of_fewer_points(filters, every):
-    table = filters["default"].table
+def test_a_coarser_table_is_that_of_fewer_points(subjects, every):
+    table = subjects["default"].flesh
     flesh = table.flesh
     order = np.lexsort((flesh.segment, ~flesh.is_surface, flesh.part))
     rows = np.sort(np.concatenate([order[start:stop:every] for *_, start, stop in table.blocks]))
@@ -104,35 +113,36 @@ def test_a_coarser_table_is_that_of_fewer_points(filters, every):
 
 @pytest.mark.parametrize("name", ["default", "canton2009"])
 @pytest.mark.parametrize("missing", [(), ("r_thigh", "r_shank")])
-def test_the_limbs_shares_sum_to_the_likelihood_and_know_their_own_limb_only(filters, name, missing):
-    filt, target, keep = filters[name], hull_of(standing()), without(*missing)
+def test_the_limbs_shares_sum_to_the_likelihood_and_know_their_own_limb_only(subjects, name, missing):
+    subject, target, keep = subjects[name], hull_of(standing()), without(*missing)
     rng = np.random.default_rng(1)
     states = standing() + rng.normal(0, 0.03, (6, N_DOF))
-    part = nearest_part(filt.body, standing(), target.surface)
-    data = SymmetricData(target, target.surface, part) if name == "default" else ScoreData(score_maps(target, None))
-    shares = data.likelihood(filt, keep, by_limb=True)(states)
+    part = nearest_part(subject.body, standing(), target.surface)
+    data = SymmetricData(target, target.surface, COST_SETTINGS, part) if name == "default" else ScoreData(score_maps(target, None))
+    shares = data.likelihood(subject, keep, by_limb=True)(states)
     assert shares.shape == (6, 5)
-    assert_allclose(shares.sum(axis=1), data.likelihood(filt, keep)(states), rtol=1e-4)
+    assert_allclose(shares.sum(axis=1), data.likelihood(subject, keep)(states), rtol=1e-4)
     moved = states.copy()
     moved[:, dof_index("l_knee_y")] += 0.6
-    change = np.abs(data.likelihood(filt, keep, by_limb=True)(moved) - shares).mean(axis=0)
+    change = np.abs(data.likelihood(subject, keep, by_limb=True)(moved) - shares).mean(axis=0)
     assert np.argmax(change) == 4  # the left leg
     assert change[1:3].max() < 1e-2 * change[4]  # the arms know nothing of it
 
 
-def test_the_likelihood_of_some_parts_does_not_know_the_others(filters):
-    filt, target = filters["default"], hull_of(standing())
-    data = SymmetricData(target, target.surface, nearest_part(filt.body, standing(), target.surface))
+def test_the_likelihood_of_some_parts_does_not_know_the_others(subjects):
+    subject, target = subjects["default"], hull_of(standing())
+    part = nearest_part(subject.body, standing(), target.surface)
+    data = SymmetricData(target, target.surface, COST_SETTINGS, part)
     rng = np.random.default_rng(1)
     states = standing() + rng.normal(0, 0.05, (6, N_DOF))
-    whole = data.likelihood(filt, ALL)(states)
-    assert_array_equal(whole, -symmetric_cost(filt.body, filt.samples, states, target, target.surface, filt.preset.symmetric))
+    whole = data.likelihood(subject, ALL)(states)
+    assert_array_equal(whole, -Symmetric(subject.body, subject.points, target, target.surface, COST_SETTINGS).cost(states))
     keep = without("r_thigh", "r_shank")
     moved = states.copy()
     moved[:, dof_index("r_hip_x", "r_hip_y", "r_hip_z", "r_knee_y")] += rng.normal(0, 0.5, (6, 4))
-    rest = replace(filt, preset=replace(filt.preset, symmetric=replace(filt.preset.symmetric, posture_weight=0.0)))
-    assert_allclose(data.likelihood(rest, keep)(moved), data.likelihood(rest, keep)(states), rtol=1e-4)
-    assert np.all(np.abs(data.likelihood(rest, ALL)(moved) - data.likelihood(rest, ALL)(states)) > 1e-6)
+    rest = replace(data, settings=replace(COST_SETTINGS, posture_weight=0.0))
+    assert_allclose(rest.likelihood(subject, keep)(moved), rest.likelihood(subject, keep)(states), rtol=1e-4)
+    assert np.all(np.abs(rest.likelihood(subject, ALL)(moved) - rest.likelihood(subject, ALL)(states)) > 1e-6)
 
 
 def test_the_nearest_part_is_that_of_the_nearest_cone():
@@ -216,9 +226,9 @@ def test_thresholds_without_hysteresis_are_refused():
 
 
 @pytest.mark.parametrize("name", ["r_shank", "l_forearm", "l_thigh"])
-def test_occupancy_and_scouts_tell_a_limb_that_is_there_from_one_that_is_not(filters, name):
-    filt = filters["default"]
-    settings, table = filt.preset.limbs, filt.table
+def test_occupancy_and_scouts_tell_a_limb_that_is_there_from_one_that_is_not(subjects, name):
+    subject = subjects["default"]
+    settings, table = SETTINGS, subject.flesh
     state = standing()
     # Away from trunk and floor: the arm out, the knee bent.
     state[dof_index("l_shoulder_x", "r_knee_y", "r_hip_y")] = np.radians([-30.0, 60.0, -30.0])
@@ -246,9 +256,9 @@ def test_occupancy_and_scouts_tell_a_limb_that_is_there_from_one_that_is_not(fil
     assert not any(one.shown for one in lost)
 
 
-def test_a_folded_forearm_is_in_doubt_in_a_fat_hull_that_has_none_and_not_in_its_own(filters):
-    filt = filters["default"]
-    settings, table, active = filt.preset.limbs, filt.table, np.ones(len(LIMBS), bool)
+def test_a_folded_forearm_is_in_doubt_in_a_fat_hull_that_has_none_and_not_in_its_own(subjects):
+    subject = subjects["default"]
+    settings, table, active = SETTINGS, subject.flesh, np.ones(len(LIMBS), bool)
     folded, kneeling = standing(), standing(0.6)
     folded[dof_index("l_shoulder_x", "l_elbow_z")] -= np.radians([25.0, 60.0])
     kneeling[dof_index("r_knee_y", "l_knee_y")] = np.radians(140.0)
@@ -273,9 +283,9 @@ def test_a_folded_forearm_is_in_doubt_in_a_fat_hull_that_has_none_and_not_in_its
     assert doubted(folded, make_target(GRID, body, fat), replace(settings, lost_closeness=0.0)) == set()
 
 
-def test_a_forearm_in_the_trunk_is_in_doubt_unless_what_sticks_out_is_in_the_strict_hull(filters):
-    filt = filters["default"]
-    settings, table, active = filt.preset.limbs, filt.table, np.ones(len(LIMBS), bool)
+def test_a_forearm_in_the_trunk_is_in_doubt_unless_what_sticks_out_is_in_the_strict_hull(subjects):
+    subject = subjects["default"]
+    settings, table, active = SETTINGS, subject.flesh, np.ones(len(LIMBS), bool)
 
     def doubted(angles_deg, keep, settings=settings):
         state = standing()
@@ -291,61 +301,60 @@ def test_a_forearm_in_the_trunk_is_in_doubt_unless_what_sticks_out_is_in_the_str
     assert not doubted(whole, ALL, replace(settings, lost_inside=1.0))
 
 
-def test_a_thigh_is_in_doubt_in_the_trunk_only_and_not_where_it_is_joined_to_it(filters):
-    filt = filters["default"]
-    settings, active = filt.preset.limbs, np.ones(len(LIMBS), bool)
+def test_a_thigh_is_in_doubt_in_the_trunk_only_and_not_where_it_is_joined_to_it(subjects):
+    subject = subjects["default"]
+    settings, active = SETTINGS, np.ones(len(LIMBS), bool)
     found = []
     for bent_deg in (0, 90, 120):
         state = standing()
         state[dof_index("r_hip_y", "torso_y")] = np.radians([-bent_deg, bent_deg / 2])
         target = hull_of(state)
-        flesh = place_flesh(filt.table, state, score_maps(target, None), target, LIMBS)
+        flesh = place_flesh(subject.flesh, state, score_maps(target, None), target, LIMBS)
         found.append((limb_signs(flesh, ("r_thigh",), ALL).inside, in_doubt(flesh, LIMBS.index("r_thigh"), active, settings)))
     (standing_in, no), (sitting_in, neither), (folded_in, yes) = found
     assert 0.1 < standing_in < sitting_in < 0.8 < folded_in
     assert yes and not no and not neither
 
 
-def test_scouts_find_a_shank_although_its_thigh_has_gone_astray(filters):
-    filt = filters["default"]
+def test_scouts_find_a_shank_although_its_thigh_has_gone_astray(subjects):
+    subject = subjects["default"]
     state = standing()
     state[dof_index("r_knee_y", "r_hip_y")] = np.radians([60.0, -30.0])
     target, limb = hull_of(state), LIMBS.index("r_shank")
     maps = score_maps(target, None)
     astray = state.copy()
     astray[dof_index("r_hip_y")] += np.radians(50.0)
-    active = filt.preset.limbs.tree.possible(np.arange(len(LIMBS)) != limb)
-    found = [scout(np.random.default_rng(seed), filt.table, maps, target, astray, limb, active, filt.preset.limbs) for seed in range(5)]
-    away = [np.linalg.norm(landmarks(filt.body, one.state) - landmarks(filt.body, state), axis=1).max() for one in found]
+    active = SETTINGS.tree.possible(np.arange(len(LIMBS)) != limb)
+    found = [scout(np.random.default_rng(seed), subject.flesh, maps, target, astray, limb, active, SETTINGS) for seed in range(5)]
+    away = [np.linalg.norm(landmarks(subject.body, one.state) - landmarks(subject.body, state), axis=1).max() for one in found]
     assert np.median(away) < 0.12
 
 
-def test_an_upper_arm_that_went_into_the_trunk_without_its_forearm_is_put_where_the_scouts_have_it(filters):
-    filt, astray = filters["default"], standing()
+def test_an_upper_arm_that_went_into_the_trunk_without_its_forearm_is_put_where_the_scouts_have_it(subjects):
+    subject, astray = subjects["default"], standing()
     astray[dof_index("l_shoulder_x", "l_shoulder_y", "l_shoulder_z")] = np.radians([29.0, -56.0, -127.0])
     target, elbow = hull_of(standing()), landmark_index("l_elbow")  # the forearm is shown again, for the first frame
-    memory = replace(LimbMemory.first(filt.preset.limbs), active=np.array([name != "l_forearm" for name in LIMBS]))
+    memory = replace(LimbMemory.first(SETTINGS), active=np.array([name != "l_forearm" for name in LIMBS]))
 
     def elbow_off(settings):
-        part = replace(filt, preset=replace(filt.preset, limbs=settings))
-        pose, info = scalable_step(np.random.default_rng(0), part, pose_init(astray, memory=memory.kept()), target)
+        step = annealed_pose_step(replace(DDM["default"], limbs=settings))
+        tracked, info = step(np.random.default_rng(0), begin_tracking(subject, astray, memory=memory.kept()), view_of(target))
         assert info.missing is not None
-        return np.linalg.norm((landmarks(filt.body, pose.state) - landmarks(filt.body, standing()))[elbow])
+        return np.linalg.norm((landmarks(subject.body, tracked.state) - landmarks(subject.body, standing()))[elbow])
 
-    settings = filt.preset.limbs
-    assert elbow_off(settings) < 0.1 < elbow_off(replace(settings, lost_inside=1.0))
+    assert elbow_off(SETTINGS) < 0.1 < elbow_off(replace(SETTINGS, lost_inside=1.0))
 
 
-def test_a_hidden_shank_is_dropped_and_taken_back_and_the_rest_stays(filters):
-    filt = filters["default"]
+def test_a_hidden_shank_is_dropped_and_taken_back_and_the_rest_stays(subjects):
+    subject = subjects["default"]
     state = standing()
     state[dof_index("r_knee_y", "r_hip_y")] = np.radians([50.0, -25.0])
     whole, hidden = hull_of(state), hull_of(state, without("r_shank"))
-    pose, missing = pose_init(state), []
+    step, tracked, missing = annealed_pose_step(DDM["default"]), begin_tracking(subject, state), []
     for frame, target in enumerate([whole] * 2 + [hidden] * 6 + [whole] * 8):
-        pose, info = scalable_step(np.random.default_rng([7, frame]), filt, pose, target)
+        tracked, info = step(np.random.default_rng([7, frame]), tracked, view_of(target))
         missing.append(set() if info.missing is None else set(np.flatnonzero(info.missing).tolist()))
-        away = np.linalg.norm(landmarks(filt.body, pose.state) - landmarks(filt.body, state), axis=1)
+        away = np.linalg.norm(landmarks(subject.body, tracked.state) - landmarks(subject.body, state), axis=1)
         assert away[:-1].max() < 0.1  # the right ankle is the last
     assert away[-1] < 0.08
     knee = set(dof_index("r_knee_y").tolist())
@@ -353,24 +362,57 @@ def test_a_hidden_shank_is_dropped_and_taken_back_and_the_rest_stays(filters):
     assert all(one in (set(), knee) for one in missing)
 
 
-def test_the_printed_test_asks_for_spread_and_occupancy(filters):
-    filt = filters["canton2009"]
-    assert filt.preset.limbs == LimbSettings() and filt.preset.limbs.tree == UNITIVE
-    few = replace(filt, preset=replace(filt.preset, annealed=replace(filt.preset.annealed, layers=1, particles=60)))
-    state = standing()
-    pose = pose_init(state)
-    target = hull_of(state, without("r_shank", "r_thigh", "l_thigh", "l_shank"))
-    tight = replace(few, drift=0.01 * few.drift)
-    for frame in range(4):
-        pose, _ = scalable_step(np.random.default_rng(frame), tight, pose, target)
-    assert LimbMemory.of(pose.memory, filt.preset.limbs).active.all()  # nothing is there, but the particles agree
-    wide = replace(few, drift=np.where(np.arange(N_DOF) < 6, 0.01, 3.0) * few.drift)
-    pose = pose_init(state)
-    for frame in range(4):
-        pose, info = scalable_step(np.random.default_rng(frame), wide, pose, target)
-    memory = LimbMemory.of(pose.memory, filt.preset.limbs)
-    assert not memory.active[[limb.name.endswith(("thigh", "shank")) for limb in UNITIVE.limbs]].any()
+def test_the_printed_test_asks_for_spread_and_occupancy(subjects):
+    preset = DDM["canton2009"]
+    assert preset.limbs == LimbSettings() and preset.limbs.tree == UNITIVE
+    step = annealed_pose_step(replace(preset, annealed=replace(preset.annealed, layers=1, particles=60)))
+    view = view_of(hull_of(standing(), without("r_shank", "r_thigh", "l_thigh", "l_shank")))
+
+    def followed(spread):
+        tracked = begin_tracking(replace(subjects["canton2009"], extras={DRIFT: spread}), standing())
+        for frame in range(4):
+            tracked, info = step(np.random.default_rng(frame), tracked, view)
+        return LimbMemory.of(tracked.memory, preset.limbs), info
+
+    tight, _ = followed(0.01 * drift(30.0))
+    assert tight.active.all()  # nothing is there, but the particles agree
+    wide, info = followed(np.where(np.arange(N_DOF) < 6, 0.01, 3.0) * drift(30.0))
+    assert not wide.active[[limb.name.endswith(("thigh", "shank")) for limb in UNITIVE.limbs]].any()
     assert info.missing[dof_index("r_knee_y", "l_hip_x")].all()
+
+
+def test_any_step_is_told_what_is_there_and_what_it_finds_of_the_rest_does_not_count(subjects):
+    """A made-up step that knows nothing of limbs: it moves every angle, and remembers something of its own."""
+    subject, given = subjects["default"], []
+
+    def step(rng, tracked, view):
+        given.append((tracked.subject, view.target))
+        found = replace(tracked, state=tracked.state + 0.01, memory={"own": np.array([len(given)])})
+        return found, StepInfo("fitted", 1.0, 5)
+
+    target = hull_of(standing(), without("r_shank"))
+    lost = replace(LimbMemory.first(SETTINGS), active=np.array([name != "r_shank" for name in LIMBS]))
+    before = begin_tracking(subject, standing(), memory=lost.kept())
+    look = with_hidden_limbs(step, SETTINGS)
+    after, info = look(np.random.default_rng(0), before, view_of(target))
+    (part, asked), knee = given[0], dof_index("r_knee_y")
+    assert_array_equal(part.parts, without("r_shank"))
+    assert_array_equal(np.flatnonzero(~part.free), knee)
+    assert asked.floor_z is None and len(asked.surface) <= len(target.surface)
+    assert_array_equal(np.flatnonzero(after.state == before.state), knee)
+    assert_array_equal(np.flatnonzero(info.missing), knee)
+    assert after.subject is subject and after.memory["own"] == 1 and after.velocity[knee] == 0
+    assert_array_equal(LimbMemory.of(after.memory, SETTINGS).active, lost.active)
+    assert info.evaluations > 5  # scouts looked for the shank
+    # With every limb there, the step's answer stands as it is.
+    whole, info = look(np.random.default_rng(0), begin_tracking(subject, standing()), view_of(hull_of(standing())))
+    assert_allclose(whole.state, standing() + 0.01)
+    assert info.missing is None and given[1][0].parts.all() and given[1][0].free.all()
+    # Without a hull the step is not asked, and what was missing still is.
+    unseen, info = look(np.random.default_rng(0), before, view_of(None))
+    assert len(given) == 2 and info.status != "fitted"
+    assert_array_equal(np.flatnonzero(info.missing), knee)
+    assert_array_equal(unseen.state, before.state)
 
 
 def test_the_model_is_chosen_by_how_far_limbs_are_bent():

@@ -5,14 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from acted import act
-from posed import COST, body_of, mean_error
+from posed import COST, body_of, mean_error, plain_subject, subject_of, view_of
 
 from hmc.body.kinematics import landmarks
 from hmc.body.proportions import default_body
 from hmc.landmarks import LANDMARKS
+from hmc.pose.method import begin_tracking
+from hmc.pose.methods.annealed import annealed_pose_step
 from hmc.pose.spectral.reading import read_body
 from hmc.pose.starts.spectral import body_state, spectral_poses, strict_voxels
-from hmc.pose.steps.annealed import make_filter, pose_init, pose_step
 from hmc.pose.steps.presets import pose_preset
 
 
@@ -34,8 +35,8 @@ def test_strict_voxels_are_those_of_the_hull():
 @pytest.mark.parametrize("motion", ["gesture", "box"])
 def test_one_of_the_first_poses_is_near_the_truth(motion, heading_deg):
     acted = act(motion, frames=3, heading_deg=heading_deg)
-    body, points = body_of(acted.height_m)
-    states, costs = spectral_poses(np.random.default_rng(0), body, points, acted.targets[2], COST)
+    body, _ = body_of(acted.height_m)
+    states, costs = spectral_poses(np.random.default_rng(0), plain_subject(acted.height_m), acted.targets[2], COST)
     found = landmarks(body, states)
     assert 1 < len(states) == len(costs) <= 6 and np.all(np.diff(costs) >= 0)
     assert min(mean_error(one, acted.landmarks[2]) for one in found) < 0.05
@@ -50,13 +51,13 @@ def test_a_filter_started_in_the_middle_of_an_action_is_at_the_truth_within_ten_
     acted = act(motion, frames=13, heading_deg=heading_deg)
     order = range(12, -1, -1) if backwards else range(13)
     targets, truth = [acted.targets[k] for k in order], acted.landmarks[list(order)]
-    body, points = body_of(acted.height_m)
-    states, _ = spectral_poses(np.random.default_rng(0), body, points, targets[2], COST)
-    filt = make_filter(body, pose_preset("default"), acted.fps)
-    pose, errors = pose_init(states[0]), []
+    body, _ = body_of(acted.height_m)
+    states, _ = spectral_poses(np.random.default_rng(0), plain_subject(acted.height_m), targets[2], COST)
+    preset, errors = pose_preset("default"), []
+    step, tracked = annealed_pose_step(preset), begin_tracking(subject_of(acted, preset), states[0])
     for k in range(3, 13):
-        pose, _ = pose_step(np.random.default_rng(k), filt, pose, targets[k])
-        errors.append(mean_error(landmarks(body, pose.state), truth[k]))
+        tracked, _ = step(np.random.default_rng(k), tracked, view_of(targets[k]))
+        errors.append(mean_error(landmarks(body, tracked.state), truth[k]))
     assert errors[-1] < 0.06 and np.median(errors) < 0.06, np.round(1000 * np.array(errors))
 
 
@@ -71,10 +72,9 @@ def test_a_head_at_the_limit_is_not_taken_for_an_arm():
 
 def test_a_hull_without_limbs_still_has_first_poses():
     acted = act("gesture")
-    body, points = body_of(acted.height_m)
     target = acted.targets[0]
     blob = np.zeros_like(target.tolerant)
     blob[5:9, 5:9, 5:9] = True
     little = replace(target, tolerant=blob, distance=np.where(blob, 0, target.distance + 1).astype(np.float32))
-    states, _ = spectral_poses(np.random.default_rng(0), body, points, little, COST)
+    states, _ = spectral_poses(np.random.default_rng(0), plain_subject(acted.height_m), little, COST)
     assert len(states) >= 1
