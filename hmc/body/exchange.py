@@ -15,8 +15,14 @@ from hmc.landmarks import LANDMARKS
 
 __all__ = ["swapped_pose", "swapped_poses"]
 
-#: Landmarks that move freely of the trunk.
-_LOOSE = {"legs": ("knee", "ankle"), "arms": ("elbow", "wrist")}
+#: The landmark on the other side of each, or itself.
+_OTHER_SIDE = [LANDMARKS.index({"l_": "r_", "r_": "l_"}.get(name[:2], name[:2]) + name[2:]) for name in LANDMARKS]
+#: Landmarks that change places: hips and shoulders stay where the trunk holds them unless the whole body turns.
+_EXCHANGED = {
+    "all": np.arange(len(LANDMARKS)),
+    "legs": np.concatenate([LIMBS["r_leg"].landmarks, LIMBS["l_leg"].landmarks]),
+    "arms": np.concatenate([LIMBS["r_arm"].landmarks, LIMBS["l_arm"].landmarks]),
+}
 #: Steps towards exchanged legs.
 LEG_STEPS = 8
 _LEG_ANGLES = np.concatenate([LIMBS["r_leg"].dofs, LIMBS["l_leg"].dofs])
@@ -38,12 +44,7 @@ def swapped_pose(body: BodyModel, state: np.ndarray, what: Literal["all", "legs"
     """
     points = landmarks(body, state)
     moved, start = points.copy(), state.copy()
-    for index, name in enumerate(LANDMARKS):
-        if name[:2] not in ("l_", "r_"):
-            continue
-        # Hips and shoulders stay where the trunk holds them unless the whole body turns.
-        if what == "all" or name[2:] in _LOOSE[what]:
-            moved[index] = points[LANDMARKS.index(("r_" if name[0] == "l" else "l_") + name[2:])]
+    moved[_EXCHANGED[what]] = points[_OTHER_SIDE][_EXCHANGED[what]]
     if what == "all":
         start[3] += np.pi
         start[4:] = neutral_state("down", body.limits)[4:]

@@ -13,6 +13,7 @@ import numpy as np
 
 from hmc.body.cone_maps import ConeMaps, cone_maps, cones_near, spread, to_cones
 from hmc.body.cones import cone_depth, cone_shapes
+from hmc.body.limbs import CHAIN_OF_PART
 from hmc.body.model import PARTS, BodyModel
 
 __all__ = ["AxisPoints", "axis_points", "depths_placed", "penetration_depth", "penetration_rows"]
@@ -23,12 +24,6 @@ _FROM = {"upper_arm": 0.6, "forearm": 0.25, "thigh": 0.2, "shank": 0.2}
 POINTS_A_CONE = 3
 #: Elements (pairs of a cone and a point x states) worked on at a time: what stays in the second-level cache.
 CHUNK = 16384
-_NEIGHBOURS = {
-    "upper_arm": ("upper_arm", "forearm"),
-    "forearm": ("upper_arm", "forearm"),
-    "thigh": ("thigh", "shank"),
-    "shank": ("thigh", "shank"),
-}
 
 
 @dataclass(frozen=True)
@@ -62,8 +57,7 @@ def axis_points(body: BodyModel) -> AxisPoints:
         kind = name[2:]
         if kind not in _FROM or (cones.start[cone] - cones.end[cone])[2] ** 2 + (cones.start[cone] - cones.end[cone])[1] ** 2 < 1e-3:
             continue  # the trunk, the head; the foot, which lies across its shank
-        own = [PARTS.index(f"{name[:2]}{other}") for other in _NEIGHBOURS[kind]]
-        foes = ~np.isin(cones.part, own)
+        foes = CHAIN_OF_PART[cones.part] != CHAIN_OF_PART[part]
         if kind == "thigh":
             foes &= cones.part != PARTS.index("torso")
         first = cones.part.tolist().index(part) == cone

@@ -7,10 +7,10 @@ from scipy.spatial.transform import Rotation
 
 from hmc.body import reach as module
 from hmc.body.kinematics import segment_transforms
+from hmc.body.limbs import LIMBS
 from hmc.body.model import neutral_state
 from hmc.body.proportions import default_body
 from hmc.body.reach import limb_joint, limb_lengths, reach
-from hmc.pose.steps.limb_search import LIMBS
 
 LOWER = {"r_arm": 4, "l_arm": 6, "r_leg": 8, "l_leg": 10}
 
@@ -30,7 +30,7 @@ def test_ends_come_where_they_were(limb):
     state[:3] = rng.normal(size=3)
     state[3:9] = rng.uniform(-0.4, 0.4, 6)
     states = np.repeat(state[None], n, axis=0)
-    dofs = LIMBS[limb]
+    dofs = LIMBS[limb].dofs
     # Points that the limb can reach, for these poses do.
     states[:, dofs] = rng.uniform(body.limits.low[dofs] * 0.7, body.limits.high[dofs] * 0.7, (n, 4))
     points = ends(body, limb, states)
