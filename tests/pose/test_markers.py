@@ -1,6 +1,7 @@
 """Poses from markers: lookups against brute force, geometry against OpenCV, detectors against what they are told, known poses."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -17,18 +18,20 @@ from hmc.camera.marker_color import ColourSettings, detect_markers, learn_marker
 from hmc.camera.model import Rig, look_at, project
 from hmc.errors import InputError
 from hmc.io.detections import DetectionTable, read_detections, write_detections
+from hmc.io.recording import Recording
 from hmc.landmarks import LANDMARKS
-from hmc.pose.methods import marker_apf as sequence
-from hmc.pose.methods.marker_apf import pose_from_markers
+from hmc.pose.follow import FollowOptions, follow
+from hmc.pose.method import Capture, StepInfo, begin_tracking, make_subject
+from hmc.pose.methods.marker_apf import MarkerRecovery, MarkerStart, marker_method
 from hmc.pose.objectives.epipolar import MarkerLikelihood, marker_cost, project_markers
 from hmc.pose.objectives.marker_points import find_points, triangulate
 from hmc.pose.objectives.nearest_detections import nearest_detections
-from hmc.pose.steps.annealed import pose_init
-from hmc.pose.steps.marker_filter import MarkerPreset, make_marker_filter, marker_preset, marker_step
+from hmc.pose.steps.marker_filter import TIPS, MarkerPreset, marker_frame, marker_preset, on_markers, with_tips
 from hmc.pose.steps.marker_limbs import explain_all, refine_to_points
 from hmc.pose.steps.marker_search import left_over, search_near, start_poses
 from hmc.pose.steps.presets import drift
 from hmc.pose.views.markers import marker_views, observe_markers
+from hmc.pose.views.person_view import PersonView
 from hmc.search import AnnealedSettings, truncated_normal
 from hmc.synthetic.marker_detector import SyntheticDetector, detect_synthetic, marker_visibility, seen_by_ideal_detector
 
@@ -53,6 +56,8 @@ def standing(seed=None):
 
 RIG = ring()
 VIEWS = marker_views(RIG)
+ROOM = np.array([[-2.0, -2.0, 0.0], [2.0, 2.0, 2.5]])
+SUBJECT = make_subject(BODY, Capture(30.0, rig=RIG))
 
 
 def detections(points, false=8, noise=0.0, seed=0):
@@ -60,6 +65,12 @@ def detections(points, false=8, noise=0.0, seed=0):
     uv, _ = project(RIG, points)
     uv = uv + noise * rng.standard_normal(uv.shape)
     return [np.concatenate([one, rng.uniform(one.min(0), one.max(0), (false, 2))]) for one in uv]
+
+
+def followed(table, n, preset, method=None, height_m=1.75):
+    """The poses of a person of known stature in n frames of a table, markers at the joints."""
+    recording = Recording(Path("markers"), "markers", 30.0, RIG, ROOM, n, 0, 1, ())
+    return follow(recording, None, method or marker_method(preset, skin=False), FollowOptions(height_m=height_m, detections=table))
 
 
 def test_placed_tips_are_the_landmarks():
@@ -186,7 +197,7 @@ def test_markers_of_two_people_are_refused():
     cameras = np.repeat(RIG.names, 30)
     table = DetectionTable(np.repeat(np.arange(4), len(uv)), np.tile(cameras, 4), np.tile(uv, (4, 1)))
     with pytest.raises(InputError, match="more than one person seems to wear markers"):
-        pose_from_markers(RIG, table, range(4), 30.0, marker_preset("default"), height_m=1.75, skin=False)
+        followed(table, 4, marker_preset("default"))
 
 
 def test_learnt_markers_are_where_they_were_worn():
@@ -290,12 +301,12 @@ LEAN = MarkerPreset("lean", "for tests", annealed=AnnealedSettings(2, 150, 0.1, 
 def test_a_step_finds_the_pose_and_repeats_itself():
     truth = standing(2)
     seen = observe_markers(VIEWS, detections(landmarks(BODY, truth), noise=1.0), LEAN.likelihood.gate_px)
-    filt = make_marker_filter(BODY, LEAN, 30)
     start = truncated_normal(np.random.default_rng(9), truth, 0.3 * drift(30), BODY.limits.low, BODY.limits.high)
-    (state, info), (again, _) = (marker_step(np.random.default_rng(1), filt, pose_init(start), seen) for _ in range(2))
-    np.testing.assert_array_equal(state.state, again.state)
+    begun = begin_tracking(SUBJECT, start)
+    (one, info), (again, _) = (marker_frame(np.random.default_rng(1), begun, seen, LEAN) for _ in range(2))
+    np.testing.assert_array_equal(one.state, again.state)
     assert info.status == "fitted" and np.isfinite(info.cost)
-    assert np.linalg.norm(landmarks(BODY, state.state) - landmarks(BODY, truth), axis=1).mean() < 0.02
+    assert np.linalg.norm(landmarks(BODY, one.state) - landmarks(BODY, truth), axis=1).mean() < 0.02
 
 
 def test_exchanged_limbs_are_put_right_and_one_gone_astray_is_found():
@@ -313,7 +324,7 @@ def test_exchanged_limbs_are_put_right_and_one_gone_astray_is_found():
         np.testing.assert_array_equal(choice.states[choice.costs.argmin()], better)
 
 
-def test_limbs_are_told_apart_over_the_whole_motion(monkeypatch):
+def test_limbs_are_told_apart_over_the_whole_motion():
     """A filter that now and then ends with exchanged legs; the motion before and after says which they are."""
     frames = list(range(16))
     states = np.repeat(standing()[None], len(frames), axis=0)
@@ -327,44 +338,114 @@ def test_limbs_are_told_apart_over_the_whole_motion(monkeypatch):
         for uv in seen
     ]
     table = DetectionTable(*(np.array(column) for column in zip(*rows, strict=True)))
-    real = sequence.marker_step
+    method = marker_method(marker_preset("default"), skin=False)
 
-    def confused(rng, filt, pose, seen):
-        pose, info = real(rng, filt, pose, seen)
-        if int(rng.integers(3)) or info.choice is None:
-            return pose, info
-        return replace(pose, state=info.choice.states[1]), info
+    def confused(rng, tracked, view):
+        tracked, info = method.step(rng, tracked, view)
+        if int(rng.integers(3)) or info.alternatives is None:
+            return tracked, info
+        return replace(tracked, state=info.alternatives.states[1]), info
 
-    monkeypatch.setattr(sequence, "marker_step", confused)
-    found = pose_from_markers(RIG, table, frames, 30.0, marker_preset("default"), height_m=1.75, skin=False)
+    found = followed(table, len(frames), marker_preset("default"), replace(method, step=confused))
     off = np.linalg.norm(found.poses.positions - points, axis=2)
     assert off.mean() < 0.03 and off.max() < 0.15
 
 
 def test_without_markers_the_pose_stays():
-    filt, start = make_marker_filter(BODY, marker_preset("canton2009"), 30), pose_init(standing())
-    state, info = marker_step(np.random.default_rng(0), filt, start, observe_markers(VIEWS, [np.zeros((0, 2))] * 5, GATE))
-    np.testing.assert_array_equal(state.state, start.state)
-    assert "fewer than two views" in info.status
+    step, start = on_markers(marker_preset("canton2009")), begin_tracking(SUBJECT, standing(), np.ones(27), {TIPS: BODY.tips})
+    nothing = PersonView(0, markers=observe_markers(VIEWS, [np.zeros((0, 2))] * 5, GATE))
+    for view, why in ((nothing, "fewer than two views"), (PersonView(0), "no detections in this frame")):
+        tracked, info = step(np.random.default_rng(0), start, view)
+        np.testing.assert_array_equal(tracked.state, start.state)
+        assert not tracked.velocity.any() and tracked.memory == start.memory
+        assert why in info.status and np.isnan(info.cost)
     with pytest.raises(InputError, match="two cameras"):
         marker_views(Rig(RIG.cameras[:1]))
     with pytest.raises(InputError, match="no preset of markers named 'best'"):
         marker_preset("best")
 
 
-def test_a_moving_person_from_a_table():
-    frames = np.arange(8)
+def walking_table(n=8, unseen=(5,)):
+    """A person who moves aside and lowers an arm; the true landmarks, and detections in all frames but some."""
+    frames = np.arange(n)
     states = np.array([standing() for _ in frames])
     states[:, 0] += 0.04 * frames
     states[:, dof_index("l_shoulder_x")] += 0.06 * frames[:, None]
     truth = landmarks(BODY, states)
     rows = [(frame, RIG.names[view], uv) for frame in frames for view, one in enumerate(detections(truth[frame], 2)) for uv in one]
-    rows = [row for row in rows if row[0] != 5]  # nothing was seen in frame 5
-    table = DetectionTable(np.array([r[0] for r in rows]), np.array([r[1] for r in rows]), np.array([r[2] for r in rows]))
-    people = pose_from_markers(RIG, table, frames.tolist(), 30, LEAN, height_m=1.75, skin=False)
+    rows = [row for row in rows if row[0] not in unseen]
+    return DetectionTable(np.array([r[0] for r in rows]), np.array([r[1] for r in rows]), np.array([r[2] for r in rows])), truth
+
+
+def test_a_moving_person_from_a_table():
+    table, truth = walking_table()
+    people = followed(table, 8, LEAN)
     errors = np.linalg.norm(people.poses.positions - truth, axis=-1)
     assert np.isnan(errors[5]).all() and np.isnan(people.costs[5])
     assert np.delete(errors, 5, 0).mean() < 0.02
-    assert people.notes == ("1 frame without a pose: markers in fewer than two views",)
-    with pytest.raises(InputError, match="6 markers or more"):
-        pose_from_markers(RIG, DetectionTable(np.zeros(0, int), np.zeros(0, str), np.zeros((0, 2))), [0, 1], 30, LEAN)
+    assert people.notes == ("person 0: 1 frame without a pose: markers in fewer than two views",)
+
+
+def test_a_table_in_which_nobody_is_gives_no_pose_and_says_so():
+    people = followed(DetectionTable(np.zeros(0, int), np.zeros(0, str), np.zeros((0, 2))), 2, LEAN)
+    assert np.isnan(people.poses.positions).all() and not people.states.bodies
+    assert len(people.notes) == 1 and people.notes[0].startswith("person 0: 2 frames without a pose: ")
+
+
+def views_from(table, n):
+    return [PersonView(k, markers=observe_markers(VIEWS, table.in_frame(k, RIG.names), LEAN.likelihood.gate_px)) for k in range(n)]
+
+
+def test_what_is_learnt_of_the_markers_places_is_remembered_from_frame_to_frame():
+    """Markers worn elsewhere than the body has its joints: the start learns where, the steps keep it and the body stays."""
+    frames, worn = np.arange(6), with_skin_markers(BODY)
+    states = np.array([standing(seed) for seed in (2, 2, 2, 2, 2, 2)])
+    states[:, 0] += 0.02 * frames
+    rows = [
+        (frame, RIG.names[view], uv)
+        for frame, points in zip(frames, landmarks(worn, states), strict=True)
+        for view, seen in enumerate(detections(points, 0))
+        for uv in seen
+    ]
+    views = views_from(DetectionTable(*(np.array(column) for column in zip(*rows, strict=True))), 6)
+
+    def rng(k):
+        return np.random.default_rng([0, k])
+
+    capture = Capture(30.0, room=ROOM, rig=RIG)
+    started, at_joints = (MarkerStart(LEAN, skin)(rng, views, capture, 1.75) for skin in (True, False))
+    learnt = started.memory[TIPS]
+    assert learnt.shape == (15, 3) and np.linalg.norm(learnt - BODY.tips, axis=1).mean() > 0.01
+    np.testing.assert_array_equal(at_joints.memory[TIPS], BODY.tips)
+    np.testing.assert_array_equal(started.subject.body.tips, BODY.tips)
+    tracked = begin_tracking(started.subject, started.state, memory=started.memory)
+    after, info = on_markers(LEAN)(rng(started.anchor), tracked, views[started.anchor])
+    assert info.status == "fitted" and "particles" in after.memory
+    np.testing.assert_array_equal(after.memory[TIPS], learnt)
+    np.testing.assert_array_equal(with_tips(after).tips, learnt)
+    np.testing.assert_array_equal(with_tips(begin_tracking(SUBJECT, standing())).tips, BODY.tips)
+    # The next frame differs without it: it is all of the past that a step reads beside pose and velocity.
+    forgetful = replace(after, memory={name: values for name, values in after.memory.items() if name != TIPS})
+    on, off = (marker_frame(rng(9), one, views[1].markers, LEAN)[0].state for one in (after, forgetful))
+    assert np.abs(on - off).max() > 1e-3
+
+
+def test_a_pose_that_has_been_without_markers_for_long_is_begun_anew():
+    table, truth = walking_table(1, unseen=())
+    (view,) = views_from(table, 1)
+    recover = MarkerRecovery()
+    astray = standing()
+    astray[:2] += 1.2
+    now, starts = begin_tracking(SUBJECT, astray, memory={TIPS: BODY.tips, **recover.first(np.ones(1))}), []
+    for _ in range(12):
+        before, stepped = now, (replace(now), StepInfo("too few markers where the body should have them"))
+        now, _ = recover(np.random.default_rng([1, 2]), before, stepped, view)
+        starts.append(np.linalg.norm(landmarks(BODY, now.state) - truth[0], axis=1).mean())
+    assert min(starts[:9]) > 1 and max(starts[9:]) < 0.05
+    np.testing.assert_array_equal(now.memory[TIPS], BODY.tips)
+    # One frame with a pose between, and the count begins anew.
+    now = begin_tracking(SUBJECT, astray, memory=recover.first(np.ones(1)))
+    for k in range(14):
+        info = StepInfo() if k == 7 else StepInfo("markers in fewer than two views")
+        now, _ = recover(np.random.default_rng([1, 2]), now, (now, info), view)
+        np.testing.assert_array_equal(now.state, astray)
