@@ -1,86 +1,140 @@
-"""Decided rows through a journal on disk and back, with and without a start, and the particles beside it."""
+"""Decided rows through a journal on disk and back, with and without a start, and what a method remembers beside it."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 from numpy.testing import assert_array_equal
 
 from hmc.body.joints import N_DOF
 from hmc.body.proportions import default_body
 from hmc.io.journal import append_journal, open_journal
-from hmc.pose.person import Decided
-from hmc.pose.records import from_record, keep_particles, kept_particles, to_record
-from hmc.pose.steps.annealed import PoseState, pose_init
-from hmc.pose.steps.presets import PRESETS
-from hmc.search.filters import ParticleState
+from hmc.pose.method import Capture, StepInfo, Tracked, begin_tracking, make_subject
+from hmc.pose.person import Decided, PoseTask
+from hmc.pose.records import from_record, keep_decided, kept_decided, to_record
+from hmc.pose.registry import pose_method
+
+TASK = PoseTask(pose_method("apf"), Capture())
+SUBJECT = make_subject(default_body(1.69), TASK.capture)
+
+
+def through(tmp_path, rows: Decided) -> Decided:
+    """Rows that were written and read."""
+    journal = tmp_path / "journal"
+    open_journal(journal, "run")
+    append_journal(journal, to_record(rows))
+    return from_record(open_journal(journal, "run")[0], TASK)
 
 
 def test_rows_come_back_to_the_last_digit(tmp_path):
     rng = np.random.default_rng(0)
     states = rng.standard_normal((3, N_DOF))
-    pose = pose_init(states[-1] + 0.01, rng.standard_normal(N_DOF) / 3)
-    missing = rng.random((3, N_DOF)) < 0.3
-    rows = Decided(4, (7, 8, 10), states, (1e-4, np.nan, 1 / 3e4), ("fitted", "no hull", "fitted"), pose, default_body(1.69), missing)
-    journal = tmp_path / "journal"
-    open_journal(journal, "run")
-    append_journal(journal, to_record(rows))
-    back = from_record(open_journal(journal, "run")[0], PRESETS["default"])
-    assert (back.person, back.frames, back.status) == (rows.person, rows.frames, rows.status)
+    missing = rng.random(N_DOF) < 0.3
+    told = {"error_m": 1 / 7, "started": True, "doubts": "a leg is missing; legs touch"}
+    infos = (StepInfo(cost=1e-4, missing=missing), StepInfo("no hull"), StepInfo(cost=1 / 3e4, details=told))
+    tracked = begin_tracking(SUBJECT, states[-1] + 0.01, rng.standard_normal(N_DOF) / 3)
+    rows = Decided(4, (7, 8, 10), states, infos, tracked, SUBJECT.body)
+    back = through(tmp_path, rows)
+    assert (back.person, back.frames) == (rows.person, rows.frames)
+    assert [info.status for info in back.infos] == ["fitted", "no hull", "fitted"]
+    assert_array_equal([info.cost for info in back.infos], [1e-4, np.nan, 1 / 3e4])
+    assert_array_equal(back.infos[0].missing, missing)
+    assert back.infos[1].missing is None and back.infos[2].missing is None
+    assert [dict(info.details) for info in back.infos] == [{}, {}, told]
     assert_array_equal(back.states, rows.states)
-    assert_array_equal(back.costs, rows.costs)
-    assert_array_equal(back.pose.state, pose.state)
-    assert_array_equal(back.pose.velocity, pose.velocity)
-    assert_array_equal(back.missing, missing)
     assert back.body.dimensions == rows.body.dimensions
     assert_array_equal(back.body.offsets, rows.body.offsets)
 
 
 def test_rows_without_a_start_come_back_as_nothing(tmp_path):
-    rows = Decided(0, (1, 2), np.full((2, N_DOF), np.nan), (np.nan, np.nan), ("no hull", "no hull"))
+    back = through(tmp_path, Decided(0, (1, 2), np.full((2, N_DOF), np.nan), (StepInfo("no hull"),) * 2))
+    assert back.frames == (1, 2) and back.states.shape == (2, N_DOF) and np.isnan(back.states).all()
+    assert back.tracked is None and back.body is None
+
+
+def tracked(value: float) -> Tracked:
+    """A pose and what is remembered beside it: arrays of any kind and shape."""
+    memory = {"particles": np.full((5, N_DOF), value), "active": np.array([value > 0, False]), "count": np.array(int(value))}
+    return begin_tracking(SUBJECT, np.full(N_DOF, value), np.full(N_DOF, value / 3), memory)
+
+
+def rows_of(frame: int, value: float, person: int = 2) -> Decided:
+    return Decided(person, (frame,), np.full((1, N_DOF), value), (StepInfo(cost=1.0),), tracked(value), SUBJECT.body)
+
+
+def kept(journal: Path, person: int = 2) -> Tracked:
+    """What a person goes on from."""
+    return [one for one in kept_decided(journal, "run", TASK) if one.person == person][-1].tracked
+
+
+def check(found: Tracked, value: float) -> None:
+    expected = tracked(value)
+    assert_array_equal(found.state, expected.state)
+    assert_array_equal(found.velocity, expected.velocity)
+    assert set(found.memory) == set(expected.memory)
+    for name, values in expected.memory.items():
+        assert_array_equal(found.memory[name], values)
+        assert found.memory[name].dtype == values.dtype
+
+
+def test_a_run_goes_on_from_the_last_row_of_each_person(tmp_path):
     journal = tmp_path / "journal"
     open_journal(journal, "run")
-    append_journal(journal, to_record(rows))
-    back = from_record(open_journal(journal, "run")[0], PRESETS["default"])
-    assert back.frames == (1, 2) and back.states.shape == (2, N_DOF) and np.isnan(back.states).all()
-    assert back.pose is None and back.body is None
-
-
-def particles(value: float) -> PoseState:
-    of = ParticleState(np.full((5, N_DOF), value), np.zeros(5))
-    return pose_init(np.zeros(N_DOF), particles=of, memory={"active": np.array([value > 0, False])})
-
-
-def kept(journal: Path, person: int, frame: int) -> np.ndarray:
-    """Numbers of the particles that are kept; their memory must be the same frame's."""
-    of, memory = kept_particles(journal, person, frame)
-    assert_array_equal(memory["active"], [of.particles[0, 0] > 0, False])
-    return of.particles
-
-
-def test_particles_of_the_last_record_outlive_the_next_ones_until_those_are_recorded(tmp_path):
-    journal = tmp_path / "journal"
     before = -1
     for frame in (3, 4, 6, 7):
-        keep_particles(journal, 2, frame, before, particles(frame))
-        for number in (frame, before):
-            if number >= 0:
-                assert_array_equal(kept(journal, 2, number), number)
+        keep_decided(journal, rows_of(frame, frame), before)
+        keep_decided(journal, rows_of(frame, -frame, person=5), before)
+        check(kept(journal), frame)
+        check(kept(journal, 5), -frame)
         before = frame
-    # The run died after the particles of frame 9, before its record, and goes on after frame 7.
-    keep_particles(journal, 2, 9, 7, particles(9))
-    assert_array_equal(kept(journal, 2, 7), 7)
-    keep_particles(journal, 2, 9, 7, particles(9.5))
-    assert_array_equal(kept(journal, 2, 9), 9.5)
-    assert kept_particles(journal, 2, 3) is None and kept_particles(journal, 1, 9) is None
-    assert len(list(tmp_path.iterdir())) == 2
+    again = list(kept_decided(journal, "run", TASK))
+    assert [(one.person, one.frames) for one in again] == [(person, (frame,)) for frame in (3, 4, 6, 7) for person in (2, 5)]
+    assert [one.tracked is None for one in again] == [True] * 6 + [False] * 2
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["journal", *(f"journal.{p}.{k}.npz" for p in (2, 5) for k in (0, 1))]
 
 
-def test_particles_of_an_earlier_run_are_not_taken_for_this_one_s(tmp_path):
+def test_memory_of_the_last_record_outlives_the_next_one_until_that_is_recorded(tmp_path, monkeypatch):
+    """The run dies after the memory was written, before its record: it goes on from the record before."""
     journal = tmp_path / "journal"
-    keep_particles(journal, 0, 3, -1, particles(-3))
-    keep_particles(journal, 0, 4, 3, particles(-4))
+    open_journal(journal, "run")
+    keep_decided(journal, rows_of(6, 6), -1)
+    keep_decided(journal, rows_of(7, 7), 6)
+
+    def dies(*given):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr("hmc.pose.records.append_journal", dies)
+        for value in (9, 9.5):  # and once more, as it is taken up and dies again
+            with pytest.raises(KeyboardInterrupt):
+                keep_decided(journal, rows_of(9, value), 7)
+            check(kept(journal), 7)
+    keep_decided(journal, rows_of(9, 9.5), 7)
+    check(kept(journal), 9.5)
+    assert len(list(tmp_path.iterdir())) == 3
+
+
+def test_memory_of_an_earlier_run_is_not_taken_for_this_one_s(tmp_path):
+    journal = tmp_path / "journal"
+    open_journal(journal, "another run")
+    keep_decided(journal, rows_of(3, -3), -1)
+    keep_decided(journal, rows_of(4, -4), 3)
+    assert list(kept_decided(journal, "run", TASK)) == []
     before = -1
     for frame in (3, 4, 5):  # begun anew
-        keep_particles(journal, 0, frame, before, particles(frame))
-        assert_array_equal(kept(journal, 0, frame), frame)
+        keep_decided(journal, rows_of(frame, frame), before)
+        check(kept(journal), frame)
         before = frame
+
+
+def test_without_a_memory_there_is_no_file_beside_the_journal_and_without_a_journal_none_at_all(tmp_path):
+    journal = tmp_path / "journal"
+    open_journal(journal, "run")
+    rows = rows_of(1, 1)
+    rows = replace(rows, tracked=replace(rows.tracked, memory={}))
+    keep_decided(journal, rows, -1)
+    assert not kept(journal).memory
+    keep_decided(None, rows, -1)
+    assert list(kept_decided(None, "run", TASK)) == []
+    assert [path.name for path in tmp_path.iterdir()] == ["journal"]
