@@ -4,6 +4,9 @@
 `hmc.camera.rig_picture` draws the rig and its views.
 """
 
+from hmc.callable_package import make_callable
 from hmc.check.findings import Finding, Inspection, check_recording, inspect_recording
 
 __all__ = ["Finding", "Inspection", "check_recording", "inspect_recording"]
+
+make_callable(__name__)

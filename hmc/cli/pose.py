@@ -16,7 +16,7 @@ from hmc.cli.common import (
     was_finished,
     whole_number,
 )
-from hmc.cli.pose_markers import add_marker_options, read_markers
+from hmc.cli.pose_markers import MARKERS_JOURNAL, add_marker_options, read_markers
 from hmc.cli.track import JOURNAL, add_tracker_options, selected_tracker
 from hmc.pose.registry import INITS, METHODS, pose_method
 
@@ -90,6 +90,7 @@ def run(args: argparse.Namespace) -> int:
     """Run the command."""
     from hmc.errors import InputError
     from hmc.io.files import to_toml
+    from hmc.io.fits import write_fits
     from hmc.io.results import write_joints, write_pose, write_run, write_tracks
     from hmc.pose.follow import FollowOptions, RunOptions, follow
     from hmc.pose.smoothing import smooth_people
@@ -157,13 +158,9 @@ def run(args: argparse.Namespace) -> int:
     write_joints(paths["joints.csv"], people.poses)
     write_pose(paths["pose.npz"], people.states)
     if any(people.details):
-        from hmc.pose.methods.pso import write_fits
-
-        write_fits(args.out / "fits.csv", people)
-    if markers is not None:
-        markers.write(args)
+        write_fits(args.out / "fits.csv", people.frames, people.persons, people.status, people.details)
     write_run(paths["run.toml"], args.method, parameters, args.seed, **source, problems=list(dict.fromkeys(problems)))
-    for name in (JOURNAL, POSE_JOURNAL, MASKS):
+    for name in (JOURNAL, POSE_JOURNAL, MARKERS_JOURNAL, MASKS):
         for file in args.out.glob(f"{name}*"):
             file.unlink()
     _tell(people, recording, paths["joints.csv"])

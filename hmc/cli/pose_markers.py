@@ -9,12 +9,12 @@ from typing import Any
 
 from hmc.cli.common import progress
 
-__all__ = ["Markers", "add_marker_options", "read_markers"]
+__all__ = ["MARKERS_JOURNAL", "Markers", "add_marker_options", "read_markers"]
 
 #: Found in the recording's folder where no option says otherwise.
 DETECTIONS, LABELS = Path("markers/detections.csv"), Path("markers/labels.csv")
 #: Detections of a run that is not finished.
-JOURNAL = ".markers.journal"
+MARKERS_JOURNAL = ".markers.journal"
 #: Frames of the empty scene of which the median is taken.
 BACKGROUND_FRAMES = 15
 
@@ -77,12 +77,13 @@ class Markers:
         """The detections of the recording's selection; learnt and looked for in the images where there are only labels."""
         from hmc.camera.marker_color import ColourSettings
         from hmc.errors import InputError
+        from hmc.io.detections import write_detections
 
         if self.ready:
             table = _read(self.used, self.recording)
         else:
-            table = _detect(args, self.recording, self.used, ColourSettings(), args.out / JOURNAL, key, problems)
-            write_detections_of(args.out, table)
+            table = _detect(args, self.recording, self.used, ColourSettings(), args.out / MARKERS_JOURNAL, key, problems)
+            write_detections(args.out / "detections.csv", table)
         if not len(table.frames):
             raise InputError(f"{self.used}: no marker in these frames; check the labelled points or the detections")
         return table
@@ -96,17 +97,6 @@ class Markers:
                 f"{self.used}: in no frame do enough markers appear in enough views at places that agree; check the detections and the "
                 "calibration"
             )
-
-    def write(self, args: argparse.Namespace) -> None:
-        """Remove what is no longer needed."""
-        (args.out / JOURNAL).unlink(missing_ok=True)
-
-
-def write_detections_of(folder: Path, table) -> None:
-    """Write what was detected beside the result."""
-    from hmc.io.detections import write_detections
-
-    write_detections(folder / "detections.csv", table)
 
 
 def read_markers(args: argparse.Namespace, recording) -> Markers:

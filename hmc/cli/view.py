@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import functools
-from collections.abc import Iterable
 from pathlib import Path
 
 from hmc.cli.common import add_selection_options, open_selected, positive_float, print_problems, progress, whole_number
 from hmc.errors import InputError
 
 __all__ = ["add_parser", "run"]
-
-PICTURES, VIDEOS = (".png", ".jpg", ".jpeg"), (".mp4", ".avi")
 
 
 def add_parser(subparsers) -> None:
@@ -36,17 +32,11 @@ def add_parser(subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Draw and write."""
-    import cv2
-    import numpy as np
-
-    from hmc.io.files import atomic_write
     from hmc.io.results import run_selection
-    from hmc.view.mosaic import read_result, stream_mosaics
+    from hmc.view.mosaic import read_result
+    from hmc.view.write import VIDEOS, write_view
 
-    suffix = args.out.suffix.lower()
-    if suffix not in PICTURES + VIDEOS:
-        raise InputError(f"{args.out}: must end in .png (a picture) or .mp4 (a video)")
-    if args.frame and suffix in VIDEOS:
+    if args.frame and args.out.suffix.lower() in VIDEOS:
         raise InputError("--frame is for pictures; a video shows the frames of --start and --frames")
     if not args.directory.is_dir():
         raise InputError(f"{args.directory}: no such folder; a result is the folder that `hmc pose` or `hmc track` wrote")
@@ -54,68 +44,15 @@ def run(args: argparse.Namespace) -> int:
     if not args.start and args.frames is None:
         args.start, args.frames = run_selection(args.directory)
     recording = open_selected(args)
-    frames = choose_frames(args.frame, recording.start, recording.n_frames, result.frames)
     problems = list(recording.problems)
-    draw = functools.partial(
-        stream_mosaics,
+    write_view(
+        args.out,
         recording,
         result,
-        voxel_size_m=None if args.no_voxels else args.voxel,
-        outlines=not args.no_outlines,
-        on_problem=problems.append,
+        args.frame or (),
+        None if args.no_voxels else args.voxel,
+        not args.no_outlines,
+        (problems.append, lambda pictures, total: progress(pictures, total, "view", args.quiet)),
     )
-    if suffix in PICTURES:
-        mosaics = [next(draw(first=frame, last=frame + 1)) for frame in frames]
-        pictures = [picture for _, picture in mosaics]
-        with atomic_write(args.out, "wb") as file:
-            file.write(cv2.imencode(suffix, np.concatenate(pictures))[1].tobytes())
-    else:
-        stream = (picture for _, picture in draw())
-        write_video(args.out, progress(stream, recording.n_frames, "view", args.quiet), recording.fps)
     print_problems(problems)
     return 0
-
-
-def choose_frames(asked: list[int] | None, start: int, n_frames: int, known) -> list[int]:
-    """The frames of a picture: those asked for, else the middle one of those with a result, else of the selection.
-
-    Raises
-    ------
-    InputError
-        When a frame is not in the selection.
-    """
-    for frame in asked or []:
-        if not start <= frame < start + n_frames:
-            raise InputError(f"frame {frame} is not among the selected frames {start} to {start + n_frames - 1}")
-    inside = [int(frame) for frame in known if start <= frame < start + n_frames]
-    return asked or [inside[len(inside) // 2] if inside else start + n_frames // 2]
-
-
-def write_video(path: Path, pictures: Iterable, fps: float) -> None:
-    """Write pictures of one size as a video that appears under its name when it is complete.
-
-    Raises
-    ------
-    InputError
-        When the file cannot be written.
-    """
-    import cv2
-
-    from hmc.io.files import sibling
-
-    codec = "mp4v" if path.suffix.lower() == ".mp4" else "MJPG"
-    writer = None
-    with sibling(path) as temporary:
-        try:
-            for picture in pictures:
-                if writer is None:
-                    height, width = picture.shape[:2]
-                    writer = cv2.VideoWriter(str(temporary), cv2.VideoWriter.fourcc(*codec), fps, (width, height))
-                    if not writer.isOpened():
-                        raise InputError(f"{path}: cannot be written as a video")
-                writer.write(picture)
-        finally:
-            if writer is not None:
-                writer.release()
-        if writer is None:
-            raise InputError(f"{path}: there are no frames to show")

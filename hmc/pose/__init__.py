@@ -1,1 +1,5 @@
-"""What pose each body takes: the body model, the annealed filters that fit it, and their start."""
+"""Pose estimation; ``hmc.pose(recording)`` estimates poses (`hmc.api.pose`)."""
+
+from hmc.callable_package import make_callable
+
+make_callable(__name__)

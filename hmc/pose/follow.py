@@ -20,7 +20,7 @@ from hmc.errors import InputError
 from hmc.io.detections import DetectionTable
 from hmc.io.masks import MaskStep, kept_masks
 from hmc.io.recording import Recording, iterate_frames
-from hmc.io.results import PoseStates, PoseTable, TrackTable
+from hmc.io.results import PoseStates, PoseTable, TrackTable, write_joints, write_pose
 from hmc.landmarks import LANDMARKS
 from hmc.pose.method import Capture, PoseMethod
 from hmc.pose.person import Decided, PersonState, PersonTrack, PoseTask, person_step, taken_up
@@ -63,6 +63,44 @@ class PosedPeople:
     notes: tuple[str, ...]
     details: tuple[Mapping[str, object], ...] = ()
     status: tuple[str, ...] = ()
+
+    @property
+    def frames(self) -> np.ndarray:
+        """Absolute frame number of each row, shape (n,)."""
+        return self.poses.frames
+
+    @property
+    def persons(self) -> np.ndarray:
+        """Person of each row, shape (n,)."""
+        return self.poses.persons
+
+    @property
+    def positions(self) -> np.ndarray:
+        """Landmarks, world, metres, shape (n, 15, 3), in the order of `hmc.landmarks.LANDMARKS`."""
+        return self.poses.positions
+
+    @property
+    def angles(self) -> np.ndarray:
+        """Angles of the joints and of the root, radians, shape (n, 24), in the order of `angle_names`."""
+        return self.states.states[:, 3:]
+
+    @property
+    def angle_names(self) -> tuple[str, ...]:
+        """What each angle is called."""
+        return self.states.dof_names[3:]
+
+    def to_frame(self):
+        """A pandas frame with the columns of ``joints.csv``: frame, person, joint, x, y, z; metres."""
+        import pandas as pd
+
+        rows, joints = self.positions.shape[:2]
+        columns = {"frame": np.repeat(self.frames, joints), "person": np.repeat(self.persons, joints), "joint": list(LANDMARKS) * rows}
+        return pd.DataFrame(columns | dict(zip("xyz", self.positions.reshape(-1, 3).T, strict=True)))
+
+    def save(self, folder: str | Path) -> None:
+        """Write ``joints.csv`` and ``pose.npz``, as `hmc pose` does."""
+        write_joints(Path(folder) / "joints.csv", self.poses)
+        write_pose(Path(folder) / "pose.npz", self.states)
 
 
 @dataclass(frozen=True)

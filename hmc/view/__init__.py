@@ -1,1 +1,5 @@
-"""Pictures and videos of a result over its recording: people drawn into every camera's image, and a 3-D panel. OpenCV only."""
+"""Pictures and videos of results; ``hmc.view(people, recording, out)`` writes one (`hmc.api.view`)."""
+
+from hmc.callable_package import make_callable
+
+make_callable(__name__)

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 
@@ -14,8 +12,6 @@ from hmc.body.inverse import fit_landmarks
 from hmc.body.model import neutral_state
 from hmc.body.spin_skeleton import model_of_body, skeleton_landmarks, thesis_body
 from hmc.errors import InputError
-from hmc.io.files import atomic_write
-from hmc.pose.follow import PosedPeople
 from hmc.pose.legs import LegSettings, TellLegs
 from hmc.pose.method import Capture, FrameRng, PoseMethod, Started
 from hmc.pose.recovery import Recovery
@@ -28,7 +24,7 @@ from hmc.pose.steps.swarm.step import SwarmPreset, read_view, swarm_memory, swar
 from hmc.pose.steps.swarm.temporal import SwarmSettings, swarm_step
 from hmc.pose.views.person_view import PersonView
 
-__all__ = ["SWARM_PRESETS", "ReadingStart", "pso_method", "swarm_preset", "write_fits"]
+__all__ = ["SWARM_PRESETS", "ReadingStart", "pso_method", "swarm_preset"]
 
 #: Frames of the first window in which a start is tried.
 ANCHORS = 3
@@ -129,22 +125,3 @@ def pso_method(preset: SwarmPreset, house: PosePreset | None = None) -> PoseMeth
         legs=LegSettings(),
         settings={"swarm": preset, "house": house},
     )
-
-
-def write_fits(path: str | Path, people: PosedPeople) -> None:
-    """Write what became of every frame: frame, person, status, error_m, started, turned, doubts.
-
-    Parameters
-    ----------
-    path : path
-    people : PosedPeople
-        Of this method.
-    """
-    with atomic_write(path) as file:
-        out = csv.writer(file, lineterminator="\n")
-        out.writerow(["frame", "person", "status", "error_m", "started", "turned", "doubts"])
-        for frame, person, status, told in zip(people.poses.frames, people.poses.persons, people.status, people.details, strict=True):
-            error = told.get("error_m")
-            shown = f"{error:.4f}" if isinstance(error, float) and np.isfinite(error) else ""
-            flags = [int(bool(told.get(name))) for name in ("started", "turned")]
-            out.writerow([frame, person, status, shown, *flags, told.get("doubts", "")])

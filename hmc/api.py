@@ -1,0 +1,311 @@
+"""The public face: each stage of the chain as one function, with the choices that most users make.
+
+Recordings are opened with `hmc.open_recording`. The stages can be had apart: images to silhouettes, silhouettes to hulls, hulls to tracks,
+hulls and tracks to what each frame shows of each person, and that to poses; each is a plain function over arrays, streamed frame by frame.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from hmc.errors import InputError
+from hmc.io.masks import MaskStep
+from hmc.io.recording import Recording, open_recording
+from hmc.io.results import TrackTable, read_centroids, read_joints
+from hmc.voxels.hulls import HullStep, stream_hulls, stream_masks
+
+if TYPE_CHECKING:
+    from hmc.check import Finding
+    from hmc.metrics.mot import MotScores
+    from hmc.metrics.scores.poses import PoseEvaluation
+    from hmc.pose.follow import PosedPeople
+    from hmc.pose.method import PoseMethod
+    from hmc.pose.views.person_view import PersonView
+    from hmc.tracking.trackers import Tracker
+
+__all__ = ["check", "evaluate", "hulls", "pose", "silhouettes", "track", "view", "views"]
+
+#: Sides of a voxel, metres: for poses and hulls, for tracks, and in pictures.
+POSE_VOXEL_M, TRACK_VOXEL_M = 0.03, 0.05
+#: Under which the silhouettes of a call are kept between tracking and poses.
+_KEY = "api"
+
+
+def check(recording: Recording | str | Path) -> list[Finding]:
+    """What is wrong with a recording, errors first: to be asked before anything else.
+
+    Parameters
+    ----------
+    recording : Recording or path
+
+    Returns
+    -------
+    list of Finding
+        Each with a severity ("error", "warning", "note") and a line that says what to do; empty where there is nothing to say.
+
+    Examples
+    --------
+    >>> import hmc
+    >>> [finding.severity for finding in hmc.check("data/synthetic/tiny")]
+    []
+    """
+    from hmc.check.findings import check_recording
+
+    return check_recording(recording.path if isinstance(recording, Recording) else recording)
+
+
+def silhouettes(recording: Recording) -> Iterator[MaskStep]:
+    """The silhouettes of every frame, in order: `index`, `images` and `masks`, one entry a camera.
+
+    Parameters
+    ----------
+    recording : Recording
+
+    Examples
+    --------
+    >>> import hmc
+    >>> recording = hmc.open_recording("data/synthetic/tiny", frames=1)
+    >>> [mask.shape for mask in next(hmc.silhouettes(recording)).masks[:2]]
+    [(240, 320), (240, 320)]
+    """
+    return stream_masks(recording)
+
+
+def hulls(recording: Recording, voxel_size_m: float = POSE_VOXEL_M, masks: Iterable[MaskStep] | None = None) -> Iterator[HullStep]:
+    """The visual hulls of every frame, in order: `strict`, `tolerant` and `loose`, bool, shape (nx, ny, nz), beside the silhouettes.
+
+    Parameters
+    ----------
+    recording : Recording
+    voxel_size_m : float
+        Side of a voxel, metres.
+    masks : iterable of MaskStep, optional
+        Silhouettes of these frames; made here where left out.
+
+    Examples
+    --------
+    >>> import hmc
+    >>> recording = hmc.open_recording("data/synthetic/tiny", frames=1)
+    >>> hull = next(hmc.hulls(recording, 0.05))
+    >>> bool(0.04 < hull.strict.sum() * 0.05**3 < 0.2)  # cubic metres: one person
+    True
+    """
+    from hmc.tracking.resumable import person_grid
+
+    return stream_hulls(recording, person_grid(recording, voxel_size_m), masks=masks)
+
+
+def track(
+    recording: Recording | str | Path, tracker: str | Tracker = "sparse", seed: int = 0, voxel_size_m: float = TRACK_VOXEL_M
+) -> TrackTable:
+    """Where everybody is in every frame.
+
+    Parameters
+    ----------
+    recording : Recording or path
+    tracker : str or Tracker
+        A key of `hmc.TRACKERS`, or a tracker.
+    seed : int
+        The same seed gives the same result.
+    voxel_size_m : float
+        Side of a voxel, metres.
+
+    Returns
+    -------
+    TrackTable
+        `frames`, `persons`, `positions` and `heads`; metres.
+
+    Raises
+    ------
+    InputError
+        When the voxels are too coarse, or there is no such tracker.
+
+    Examples
+    --------
+    >>> import hmc
+    >>> tracks = hmc.track(hmc.open_recording("data/synthetic/tiny", frames=8))
+    >>> sorted(set(tracks.persons.tolist())), tracks.positions.shape
+    ([0], (8, 3))
+    """
+    return _tracked(_opened(recording), tracker, seed, voxel_size_m)
+
+
+def views(recording: Recording, tracks: TrackTable, needs: Sequence[str] = ("hulls",)) -> Iterator[dict[int, PersonView]]:
+    """What each frame shows of each person: what pose methods work on.
+
+    Parameters
+    ----------
+    recording : Recording
+    tracks : TrackTable
+        As from `track`.
+    needs : sequence of str
+        What is to be there: "hulls", "skin", "voxels" (`hmc.pose.views.person_view`).
+
+    Examples
+    --------
+    >>> import hmc
+    >>> recording = hmc.open_recording("data/synthetic/tiny", frames=8)
+    >>> first = next(hmc.views(recording, hmc.track(recording)))
+    >>> first[0].target.surface.shape[1]  # points of the strict hull's surface
+    3
+    """
+    from hmc.pose.views.person_view import check_needs, views_of
+    from hmc.tracking.resumable import person_grid
+
+    grid, wanted = person_grid(recording, POSE_VOXEL_M), check_needs(needs)
+    return (views_of(recording, grid, tracks, hull, wanted) for hull in stream_hulls(recording, grid))
+
+
+def pose(
+    recording: Recording | str | Path,
+    tracks: TrackTable | None = None,
+    method: str | PoseMethod = "apf",
+    seed: int = 0,
+    height_m: float | None = None,
+    smooth_s: float = 0.0,
+    on_frame: Callable[[int, int], None] | None = None,
+) -> PosedPeople:
+    """The pose of everybody in every frame.
+
+    Parameters
+    ----------
+    recording : Recording or path
+    tracks : TrackTable, optional
+        As from `track`; made here where left out.
+    method : str or PoseMethod
+        A key of `hmc.METHODS`, or a method, such as ``hmc.pose_method("smd", preset="kehl2006")``.
+    seed : int
+        The same seed gives the same result.
+    height_m : float, optional
+        Stature of everybody; where left out what the recording says of a single person, else estimated for each.
+    smooth_s : float
+        Time over which finished poses are smoothed, seconds; 0: they are not.
+    on_frame : callable, optional
+        Called with the number of frames that are done and that of all.
+
+    Returns
+    -------
+    PosedPeople
+        `positions`, shape (n, 15, 3), metres; `angles`, radians; `frames`, `persons`; `to_frame()` as a pandas frame.
+
+    Raises
+    ------
+    InputError
+        When there is no such method, or what it needs is not there.
+
+    Examples
+    --------
+    >>> import hmc
+    >>> people = hmc.pose(hmc.open_recording("data/synthetic/tiny", frames=8))
+    >>> list(people.to_frame().columns)
+    ['frame', 'person', 'joint', 'x', 'y', 'z']
+    """
+    from hmc.pose.follow import FollowOptions, RunOptions, follow
+    from hmc.pose.registry import pose_method
+    from hmc.pose.smoothing import smooth_people
+
+    recording, method = _opened(recording), pose_method(method) if isinstance(method, str) else method
+    if "detections" in method.needs:
+        raise InputError(f"method {method.name} works on detections; use `hmc.pose.follow.follow`, or `hmc pose` from the command line")
+    if height_m is None and len(recording.subject_height_m) == 1 and recording.persons in (None, 1):
+        height_m = recording.subject_height_m[0]
+
+    def counted(steps: Iterable[HullStep], total: int) -> Iterator[HullStep]:
+        for n, step in enumerate(steps, start=1):
+            yield step
+            if on_frame is not None:
+                on_frame(n, total)
+
+    with tempfile.TemporaryDirectory() as folder:
+        masks = None
+        if tracks is None:
+            masks = Path(folder) / "masks"
+            tracks = _tracked(recording, "sparse", seed, TRACK_VOXEL_M, masks)
+        run = RunOptions(masks=masks, key=_KEY, progress=counted)
+        people = follow(recording, tracks, method, FollowOptions(POSE_VOXEL_M, seed, height_m), run)
+    return smooth_people(people, method.limits, recording.fps, smooth_s) if smooth_s else people
+
+
+def evaluate(found: PosedPeople | TrackTable, recording: Recording) -> PoseEvaluation | MotScores:
+    """The errors of poses or tracks against the truth in a recording's folder.
+
+    Parameters
+    ----------
+    found : PosedPeople or TrackTable
+    recording : Recording
+        With ``truth/joints.csv``, or ``truth/centroids.csv`` for tracks.
+
+    Returns
+    -------
+    PoseEvaluation or MotScores
+        Of poses, `summary` has plain numbers by name, such as ``mean_mm`` and ``mmta_at_50mm``.
+
+    Raises
+    ------
+    InputError
+        When there is no truth.
+
+    Examples
+    --------
+    >>> import hmc
+    >>> recording = hmc.open_recording("data/synthetic/tiny", frames=8)
+    >>> bool(hmc.evaluate(hmc.pose(recording), recording).summary["mean_mm"] < 40)
+    True
+    """
+    from hmc.metrics.scores import evaluate_pose, evaluate_tracks
+
+    path = recording.path / "truth" / ("centroids.csv" if isinstance(found, TrackTable) else "joints.csv")
+    if not path.is_file():
+        raise InputError(f"{path}: no such file; there is no truth to evaluate against")
+    first, last = recording.start, recording.start + recording.n_frames
+    if isinstance(found, TrackTable):
+        centroids = read_centroids(path)
+        return evaluate_tracks(found, centroids.where((centroids.frames >= first) & (centroids.frames < last)))
+    truth = read_joints(path)
+    return evaluate_pose(found.poses, truth.where((truth.frames >= first) & (truth.frames < last)))
+
+
+def view(found: PosedPeople | TrackTable, recording: Recording, out: str | Path, frames: Sequence[int] = ()) -> None:
+    """Write poses or tracks drawn over every camera: a picture (.png, .jpg) of some frames, or a video (.mp4) of all.
+
+    Parameters
+    ----------
+    found : PosedPeople or TrackTable
+    recording : Recording
+    out : path
+    frames : sequence of int
+        Of a picture; by default one in the middle.
+
+    Examples
+    --------
+    >>> import hmc, pathlib, tempfile
+    >>> recording = hmc.open_recording("data/synthetic/tiny", frames=8)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     hmc.view(hmc.track(recording), recording, f"{folder}/tracks.png")
+    ...     pathlib.Path(folder, "tracks.png").is_file()
+    True
+    """
+    from hmc.body.proportions import make_body
+    from hmc.view.mosaic import Result
+    from hmc.view.write import write_view
+
+    result = Result(tracks=found) if isinstance(found, TrackTable) else None
+    if result is None:
+        dimensions = {person: {name: float(value) for name, value in body.items()} for person, body in found.states.bodies.items()}
+        result = Result(found.poses, None, found.states, {person: make_body(one) for person, one in dimensions.items()})
+    write_view(out, recording, result, frames)
+
+
+def _opened(recording: Recording | str | Path) -> Recording:
+    return recording if isinstance(recording, Recording) else open_recording(recording)
+
+
+def _tracked(recording: Recording, tracker: str | Tracker, seed: int, voxel_size_m: float, masks: Path | None = None) -> TrackTable:
+    from hmc.tracking.resumable import track_recording
+    from hmc.tracking.trackers import make_tracker
+
+    chosen = make_tracker(tracker) if isinstance(tracker, str) else tracker
+    return track_recording(recording, voxel_size_m, chosen, seed=seed, masks=masks, key=_KEY)

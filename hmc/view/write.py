@@ -1,0 +1,109 @@
+"""Overlay pictures and videos as files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from hmc.errors import InputError
+from hmc.io.files import atomic_write, sibling
+from hmc.io.recording import Recording
+from hmc.view.mosaic import Result, stream_mosaics
+
+__all__ = ["PICTURES", "VIDEOS", "choose_frames", "write_video", "write_view"]
+
+#: Endings of pictures, and of videos.
+PICTURES, VIDEOS = (".png", ".jpg", ".jpeg"), (".mp4", ".avi")
+
+
+def write_view(
+    path: str | Path,
+    recording: Recording,
+    result: Result,
+    frames: Sequence[int] = (),
+    voxel_size_m: float | None = 0.04,
+    outlines: bool = True,
+    how: tuple[Callable[[str], None] | None, Callable[[Iterable, int], Iterable] | None] = (None, None),
+) -> None:
+    """Draw a result over the images of a recording.
+
+    Parameters
+    ----------
+    path : path
+        A picture (.png, .jpg) of some frames, or a video (.mp4, .avi) of all.
+    recording : Recording
+    result : Result
+    frames : sequence of int
+        Of a picture; by default the middle one of those with a result.
+    voxel_size_m : float or None
+        Of the voxels in the panel; None: none are shown, and nothing is segmented.
+    outlines : bool
+        Draw the outline of the flesh.
+    how : tuple
+        Called with every problem; and what shows progress, ``progress(pictures, total)``. Each None: nothing.
+
+    Raises
+    ------
+    InputError
+        When the ending is of neither, a frame is not in the selection, or the file cannot be written.
+    """
+    path, (report, progress) = Path(path), how
+    suffix = path.suffix.lower()
+    if suffix not in PICTURES + VIDEOS:
+        raise InputError(f"{path}: must end in .png (a picture) or .mp4 (a video)")
+
+    def draw(**selection):
+        return stream_mosaics(recording, result, voxel_size_m=voxel_size_m, outlines=outlines, on_problem=report, **selection)
+
+    if suffix in PICTURES:
+        wanted = choose_frames(list(frames), recording.start, recording.n_frames, result.frames)
+        pictures = [next(draw(first=frame, last=frame + 1))[1] for frame in wanted]
+        with atomic_write(path, "wb") as file:
+            file.write(cv2.imencode(suffix, np.concatenate(pictures))[1].tobytes())
+        return
+    stream: Iterable = (picture for _, picture in draw())
+    write_video(path, progress(stream, recording.n_frames) if progress else stream, recording.fps)
+
+
+def choose_frames(asked: list[int], start: int, n_frames: int, known) -> list[int]:
+    """The frames of a picture: those asked for, else the middle one of those with a result, else of the selection.
+
+    Raises
+    ------
+    InputError
+        When a frame is not in the selection.
+    """
+    for frame in asked:
+        if not start <= frame < start + n_frames:
+            raise InputError(f"frame {frame} is not among the selected frames {start} to {start + n_frames - 1}")
+    inside = [int(frame) for frame in known if start <= frame < start + n_frames]
+    return asked or [inside[len(inside) // 2] if inside else start + n_frames // 2]
+
+
+def write_video(path: Path, pictures: Iterable, fps: float) -> None:
+    """Write pictures of one size as a video that appears under its name when it is complete.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be written.
+    """
+    codec = "mp4v" if path.suffix.lower() == ".mp4" else "MJPG"
+    writer = None
+    with sibling(path) as temporary:
+        try:
+            for picture in pictures:
+                if writer is None:
+                    height, width = picture.shape[:2]
+                    writer = cv2.VideoWriter(str(temporary), cv2.VideoWriter.fourcc(*codec), fps, (width, height))
+                    if not writer.isOpened():
+                        raise InputError(f"{path}: cannot be written as a video")
+                writer.write(picture)
+        finally:
+            if writer is not None:
+                writer.release()
+        if writer is None:
+            raise InputError(f"{path}: there are no frames to show")

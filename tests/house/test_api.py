@@ -1,0 +1,61 @@
+"""The public face: its examples run, its names are all there, and asking for hmc alone loads next to nothing."""
+
+import doctest
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import hmc
+import hmc.api
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def examples() -> list:
+    finder, found = doctest.DocTestFinder(recurse=False), []
+    for name in ("__init__", *hmc.api.__all__):
+        found += finder.find(hmc if name == "__init__" else getattr(hmc.api, name), f"hmc.{name}", globs={})
+    return found
+
+
+@pytest.mark.parametrize("example", examples(), ids=lambda example: example.name)
+def test_examples_run(example, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    assert example.examples, f"{example.name} has no example"
+    results = doctest.DocTestRunner().run(example)
+    assert results.failed == 0
+
+
+def test_every_name_is_there():
+    for name in hmc.__all__:
+        assert callable(getattr(hmc, name)) or isinstance(getattr(hmc, name), dict), name
+    assert set(hmc.__all__) <= set(dir(hmc))
+    with pytest.raises(AttributeError, match="no attribute 'poses'"):
+        hmc.poses  # noqa: B018
+
+
+def test_a_package_that_is_called_stays_a_package():
+    import hmc.pose.person
+    from hmc.pose.registry import METHODS
+
+    assert callable(hmc.pose) and hmc.pose.person is sys.modules["hmc.pose.person"]
+    assert hmc.METHODS is METHODS
+
+
+def test_importing_hmc_loads_nothing_heavy():
+    program = "import sys, hmc; print(*sorted({'numpy', 'scipy', 'cv2', 'sklearn', 'pandas', 'matplotlib'} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=ROOT, check=True)
+    assert done.stdout.split() == []
+
+
+def test_what_cannot_be_done_is_said(tmp_path):
+    recording = hmc.open_recording(ROOT / "data" / "synthetic" / "tiny", frames=2)
+    with pytest.raises(hmc.InputError, match="no pose method named 'magic'; there are apf"):
+        hmc.pose(recording, method="magic")
+    with pytest.raises(hmc.InputError, match="works on detections"):
+        hmc.pose(recording, method="marker-apf")
+    tracks = hmc.track(recording)
+    with pytest.raises(hmc.InputError, match=r"must end in \.png"):
+        hmc.view(tracks, recording, tmp_path / "picture.txt")
