@@ -22,8 +22,6 @@ from hmc.tracking.update import Filter, Rule, begin_update
 
 __all__ = ["advance", "finish", "init", "original_number"]
 
-#: Share of the room beyond which what is occupied cannot be people: a light was switched.
-MOST_FILLED = 0.25
 #: Velocity that a track keeps over a frame that tells nothing.
 WAITING = 0.5
 
@@ -62,17 +60,16 @@ def advance(
     frame : int
         Absolute number; frames come in order.
     observation : Observation or None
-        None where the frame tells nothing: every track waits. So it does when a quarter of the room is occupied. An observation without
-        voxels means that no person is there.
+        None where the frame tells nothing: every track waits. An observation without voxels means that no person is there.
     settings : FollowingSettings
     filter : callable, optional
         Says where each person is. Where left out, each is at the centroid of the voxels that they own.
     rules : iterable of callable
         What is done with the frame, in this order.
     """
-    if observation is None or len(observation.points) * observation.voxel_size_m**3 > MOST_FILLED * np.ptp(observation.room, axis=0).prod():
+    if observation is None:
         waiting = tuple(replace(track, last_frame=track.last_frame + 1, velocity=track.velocity * WAITING) for track in state.tracks)
-        return replace(state, tracks=waiting), StepInfo((), np.full(0 if observation is None else len(observation.points), -1))
+        return replace(state, tracks=waiting), StepInfo(())
     update = reduce(lambda update, rule: rule(update, settings), rules, begin_update(state, frame, observation, filter))
     return update.after(), update.info()
 

@@ -1,4 +1,4 @@
-"""People whom no track owns yet, among the voxels of a frame: pieces put together, crowds taken apart.
+"""People whom no track owns yet, among the voxels of a frame: pieces put together, pairs taken apart.
 
 What makes one a person is decided by `hmc.tracking.likeness.looks_like_person`. Source: Canton (2009), section 4.2.3.
 """
@@ -14,7 +14,6 @@ from hmc.tracking.blobs import Blobs, Observation, blob_features
 from hmc.tracking.joined import cut_between
 from hmc.tracking.likeness import looks_like_person
 from hmc.tracking.settings import LifecycleSettings
-from hmc.voxels.components import label_voxels
 
 __all__ = ["newcomers", "one_or_two", "unowned_blobs"]
 
@@ -63,8 +62,6 @@ def unowned_blobs(observation: Observation, owners: np.ndarray, settings: Lifecy
 def newcomers(observation: Observation, owners: np.ndarray, settings: LifecycleSettings) -> list[np.ndarray]:
     """Sets of voxels that look like a person and that no track owns.
 
-    Where people stand so close that the tolerant hull joins them, the strict hull's parts are taken apart.
-
     Parameters
     ----------
     observation : Observation
@@ -78,17 +75,7 @@ def newcomers(observation: Observation, owners: np.ndarray, settings: LifecycleS
         Rows of the observation's voxels, a set each.
     """
     labels, blobs = unowned_blobs(observation, owners, settings)
-    likely = looks_like_person(blobs, settings)
-    large = blobs.volume_m3 > settings.least_joined_m3
-    sets = []
-    for b in np.flatnonzero(likely | large):
-        rows = np.flatnonzero(labels == b)
-        parts = _strict_parts(observation, rows[observation.certain[rows]], settings) if large[b] else []
-        if len(parts) > 1 or not likely[b]:
-            sets += parts
-        else:
-            sets.append(rows)
-    return sets
+    return [np.flatnonzero(labels == b) for b in np.flatnonzero(looks_like_person(blobs, settings))]
 
 
 def one_or_two(observation: Observation, rows: np.ndarray, settings: LifecycleSettings) -> list[np.ndarray]:
@@ -118,15 +105,3 @@ def one_or_two(observation: Observation, rows: np.ndarray, settings: LifecycleSe
     second = observation.points[:, :2] @ axis > limit
     sides = blob_features(observation.points[sure], second[sure].astype(int), 2, observation.voxel_size_m)
     return [rows[~second[rows]], rows[second[rows]]] if looks_like_person(sides, settings).all() else [rows]
-
-
-def _strict_parts(observation: Observation, rows: np.ndarray, settings: LifecycleSettings) -> list[np.ndarray]:
-    """Components of the voxels in `rows`, each a part of `rows`, that look like people."""
-    if rows.size == 0:
-        return []
-    indices = observation.indices[rows] - observation.indices[rows].min(axis=0)
-    box = np.zeros(indices.max(axis=0) + 1, bool)
-    box[tuple(indices.T)] = True
-    labels = label_voxels(box)[1]  # rows are in C order, and so are these
-    blobs = blob_features(observation.points[rows], labels, int(labels.max()) + 1, observation.voxel_size_m)
-    return [rows[labels == b] for b in np.flatnonzero(looks_like_person(blobs, settings))]

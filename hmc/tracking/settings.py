@@ -32,16 +32,16 @@ class LifecycleSettings:
         A set larger than this may be several people; so may one of which the strict hull is.
     most_side_m, least_side_m : float
         Longest horizontal side (arms stretched out) and least value of the longer side (a ghost is a thin column).
-    keep_volume_m3, keep_top_m : float
+    keep_volume_m3 : float
         What is enough of the strict hull for a person who is tracked already.
     keep_share : float
         And what share of the person's usual volume.
     confirm_s, confirm_frames : float, int
         A candidate becomes a person after this time and at least this many frames.
-    patience_s, edge_patience_s : float
-        A track is deleted after this time without support; the second holds for people who were last seen at the edge of the room.
+    patience_s : float
+        A track is deleted after this time without support.
     edge_m : float
-        Width of that edge.
+        Width of the room's edge, at which people come and go.
     unlike_s : float
         A track is deleted when its voxels have not looked like a person for so long, however many they are: furniture that was left
         behind (Canton, section 4.2.3, third criterion of deletion). A frame in which they do makes up for two in which they do not.
@@ -76,12 +76,10 @@ class LifecycleSettings:
     most_side_m: float = 2.2
     least_side_m: float = 0.25
     keep_volume_m3: float = 0.012
-    keep_top_m: float = 0.4
     keep_share: float = 0.2
     confirm_s: float = 0.3
     confirm_frames: int = 4
     patience_s: float = 1.0
-    edge_patience_s: float = 0.3
     edge_m: float = 0.3
     unlike_s: float = 2.0
     established_s: float = 3.0
@@ -115,10 +113,6 @@ class FollowingSettings:
         Voxels of a person's component count up to this distance, in radii of the region.
     velocity_time_s : float
         Time constant of the velocity's smoothing.
-    most_speed_m_s : float
-        No person is faster.
-    most_reach_m : float
-        A person who was lost is not looked for further away than this.
     shared_gain : float
         Share of the measured correction that is believed while persons share one component, where no filter tells them apart.
     filter_gain : float
@@ -133,8 +127,6 @@ class FollowingSettings:
     exclusion: str = "nearest"
     reach: float = 2.0
     velocity_time_s: float = 0.3
-    most_speed_m_s: float = 4.0
-    most_reach_m: float = 1.2
     shared_gain: float = 0.5
     filter_gain: float = 1.0
     least_certain_m3: float = 0.03

@@ -104,8 +104,6 @@ class FrameUpdate:
         The person's component is another's too.
     parted : dict of int to ndarray of int
         By row of the track, the voxels of a second person whom it held and let go.
-    reacquired : ndarray of bool, shape (k,)
-        Tracks that were lost and found again elsewhere.
     pushed : ndarray of int, shape (n,)
         Row of the track whose person pushes or leans on the object of the voxel, or -1.
     measurement : Measurement
@@ -115,8 +113,6 @@ class FrameUpdate:
         One a track.
     detections : tuple of ndarray of int
         Voxels of person-like sets that no track owns.
-    like_people : ndarray of bool, shape (n,)
-        Voxels of such sets and of ghosts of people.
     births : tuple of TrackRow
         Where those detections are.
     parted_births : tuple of TrackRow
@@ -150,10 +146,8 @@ class FrameUpdate:
     estimate: FilterEstimate
     owners: np.ndarray
     shared: np.ndarray
-    reacquired: np.ndarray
     pushed: np.ndarray
     measurement: Measurement
-    like_people: np.ndarray
     tracks: tuple[Track, ...]
     memories: tuple[PersonMemory, ...]
     candidates: tuple[Candidate, ...]
@@ -224,10 +218,8 @@ def begin_update(state: TrackerState, frame: int, observation: Observation, filt
         estimate=FilterEstimate(positions, persons),
         owners=np.full(n, -1),
         shared=persons,
-        reacquired=persons,
         pushed=np.full(n, -1),
         measurement=Measurement(voxels, no_blobs, no_blobs, no_blobs, persons, persons, persons),
-        like_people=voxels,
         tracks=state.tracks,
         memories=memories,
         candidates=state.candidates,

@@ -69,7 +69,7 @@ def test_a_track_whose_filter_hardly_finds_anything_ends():
 def test_filters_work_well_on_people_and_not_at_all_on_nothing(name, size):
     tracker = make_tracker(name, color=False, particles=size)
     # Nothing else may end the track: not the missing voxels, and not the verdict.
-    lifecycle = replace(tracker.following.lifecycle, patience_s=100.0, edge_patience_s=100.0, unlike_s=100.0)
+    lifecycle = replace(tracker.following.lifecycle, patience_s=100.0, unlike_s=100.0)
     following = replace(tracker.following, lifecycle=lifecycle)
     tracker = tracker.method.tracker(replace(tracker.settings, following=following))
     path = [person(*place) for place in line((-0.8, 0), (0.8, 0), 30)]
@@ -148,7 +148,7 @@ def learnt(observation, people, n, static=None, fps=10.0):
     static = StaticObjects() if static is None else static
     rows = [TrackRow(0, -1, np.array([x, y, 0.6 * z]), np.array([x, y, z])) for x, y, z in people]
     for _ in range(n):
-        static = learn_static(static, observation, rows, np.zeros(len(observation.points), bool), fps)
+        static = learn_static(static, observation, rows, fps)
     return static
 
 

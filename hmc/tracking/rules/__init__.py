@@ -13,7 +13,6 @@ from hmc.tracking.rules.handover import hand_over_tracks
 from hmc.tracking.rules.identity import exchange_identities, learn_appearance, reidentify
 from hmc.tracking.rules.measurement import measure_tracks
 from hmc.tracking.rules.pushed_objects import release_pushed_objects
-from hmc.tracking.rules.reacquisition import reacquire_tracks
 from hmc.tracking.rules.separation import separate_detections, separate_tracks
 from hmc.tracking.rules.state_update import update_tracks
 from hmc.tracking.rules.static_objects import hide_static_objects, learn_static_objects, reject_static_objects
@@ -27,7 +26,6 @@ RULES: tuple[Rule, ...] = (
     filter_tracks,
     associate_voxels,
     separate_tracks,
-    reacquire_tracks,
     release_pushed_objects,
     measure_tracks,
     update_tracks,

@@ -1,7 +1,6 @@
 """Track birth: detections that were seen in enough frames become persons, from the first frame in which each was seen.
 
-Canton (2009), Figure 4.1 and section 4.2.3. Shown by all tests of the trackers; how long it takes by
-`test_a_ghost_of_two_frames_is_nobody`.
+Canton (2009), Figure 4.1 and section 4.2.3. Shown by all tests of the trackers.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 """Detection of people whom no track owns: person-like sets of voxels.
 
-Canton (2009), section 4.2.3. Shown by all tests of the trackers; sets in pieces by `test_a_person_in_pieces_is_one_person`.
+Canton (2009), section 4.2.3. Shown by all tests of the trackers; that fragments which stand close are judged together by
+`test_noise_ghosts_and_furniture_are_nobody`.
 """
 
 from __future__ import annotations

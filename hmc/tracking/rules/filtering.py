@@ -1,7 +1,6 @@
 """Prediction at constant velocity, and what the filter makes of it.
 
-Shown by `test_two_who_cross_side_by_side_keep_their_numbers` and `test_a_light_switch_...` (prediction), `test_two_who_meet_are_followed`
-(filters).
+Shown by all tests of the trackers; filters by `test_two_who_meet_are_followed`.
 """
 
 from __future__ import annotations

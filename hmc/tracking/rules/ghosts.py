@@ -1,8 +1,8 @@
 """Ghosts: places where the silhouettes of other people meet, so that the hull is occupied though nothing is there.
 
 A real person accounts for parts of the silhouettes that nothing else accounts for; a ghost does not. So the detections are projected
-into the views, and one that adds nothing in two views to the people who are known already is left out. Shown by
-`test_a_ghost_is_told_from_the_people_who_cast_it`.
+into the views, and one that adds nothing in two views to the people who are known already is left out. Shown by the recipe
+`meeting_unseen`, where false positives go from 5 to 25 without it (naive tracker).
 """
 
 from __future__ import annotations

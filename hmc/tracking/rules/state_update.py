@@ -1,7 +1,7 @@
 """The update of each track by its measurement: position, velocity and volume, and which rows are told.
 
-The filter's gain and the shared component's are shown by `test_two_who_meet_talk_and_part` and the recipe `hug`; withheld rows by
-`test_what_an_established_person_left_behind_ends_and_who_sits_still_does_not`.
+The gain in a shared component is shown by the recipe `hug`, where the naive tracker's MOTP goes from 39.3 to 70.0 mm without it; withheld
+rows by `test_where_a_thing_was_taken_for_a_person_nothing_begins_while_it_stands_there`.
 """
 
 from __future__ import annotations
@@ -51,11 +51,9 @@ def update_tracks(update: FrameUpdate, settings: FollowingSettings) -> FrameUpda
 
 
 def _corrections(update: FrameUpdate, settings: FollowingSettings) -> list[_Correction]:
-    """The filter's position where it knows the person, else the centroid; of one who was found elsewhere the filter knows nothing, and
-    of one who held another it stands between the two.
-    """
+    """The filter's position where it knows the person, else the centroid; of one who held another it stands between the two."""
     k = len(update.state.tracks)
-    known = update.estimate.seen & ~update.reacquired & ~np.isin(np.arange(k), list(update.parted))
+    known = update.estimate.seen & ~np.isin(np.arange(k), list(update.parted))
     measured = np.where(known[:, None], update.estimate.positions, update.measurement.located.centroid)
     gain = np.where(update.shared, np.where(known, settings.filter_gain, settings.shared_gain), 1.0)
     return [_Correction(*one) for one in zip(measured, gain, known.tolist(), strict=True)]
@@ -83,7 +81,6 @@ def _motion(update: FrameUpdate, k: int, position: np.ndarray, gain: float, sett
     track, fps = update.state.tracks[k], update.state.fps
     blend = gain * (1 - np.exp(-1 / (fps * settings.velocity_time_s)))
     velocity = track.velocity + blend * ((position - track.position) * fps - track.velocity)
-    velocity = velocity * min(1.0, settings.most_speed_m_s / max(float(np.linalg.norm(velocity)), 1e-9))
     volume = float(update.measurement.owned.volume_m3[k])
     if track.volume_m3 > 0:
         volume = track.volume_m3 if update.shared[k] else track.volume_m3 + blend * (min(volume, 2 * track.volume_m3) - track.volume_m3)

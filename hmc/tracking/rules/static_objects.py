@@ -2,8 +2,8 @@
 
 Beyond Canton (2009), whose room is empty when the background is learnt. A chair that was moved is foreground from then on, in both
 places; left with the people's voxels it draws their filters on, joins people to one another and takes their numbers over. Shown by
-`test_a_chair_that_was_pushed_and_left_takes_nobody_over`, `test_where_a_thing_was_taken_for_a_person_...` and the recipes
-`meeting_moved` and `meeting_unseen`.
+`test_a_chair_that_was_pushed_and_left_takes_nobody_over`, `test_where_a_thing_was_taken_for_a_person_nothing_begins_while_it_stands_there`
+and, of who lies, `test_a_person_who_lies_down_and_gets_up_again_keeps_the_number`.
 """
 
 from __future__ import annotations
@@ -41,28 +41,24 @@ HIGHER_M = 0.2
 def hide_static_objects(update: FrameUpdate, settings: FollowingSettings) -> FrameUpdate:
     """The update whose observation has no voxel of a static object."""
     observation, visible = without_static(update.whole, update.state.static, update.state.fps)
-    nothing = np.zeros(len(observation.points), bool)
-    free = np.full(len(nothing), -1)
-    return replace(update, observation=observation, visible=visible, owners=free, pushed=free, like_people=nothing)
+    free = np.full(len(observation.points), -1)
+    return replace(update, observation=observation, visible=visible, owners=free, pushed=free)
 
 
 def reject_static_objects(update: FrameUpdate, settings: FollowingSettings) -> FrameUpdate:
-    """The update without detections that are but more of a static object that they touch, and with the voxels of the others marked."""
+    """The update without detections that are but more of a static object that they touch."""
     standing = _standing(update.state.static, update.state.fps)
-    if standing.size:
-        grid = update.observation.grid
-        places = grid.centres(np.column_stack(np.unravel_index(standing, grid.shape)))
-        update = replace(update, detections=tuple(rows for rows in update.detections if not _is_more_of(update.observation, rows, places)))
-    like_people = np.isin(np.arange(len(update.owners)), np.concatenate([np.zeros(0, int), *update.detections]))
-    return replace(update, like_people=like_people)
+    if standing.size == 0:
+        return update
+    grid = update.observation.grid
+    places = grid.centres(np.column_stack(np.unravel_index(standing, grid.shape)))
+    return replace(update, detections=tuple(rows for rows in update.detections if not _is_more_of(update.observation, rows, places)))
 
 
 def learn_static_objects(update: FrameUpdate, settings: FollowingSettings) -> FrameUpdate:
     """The update with what is known of static objects after the frame."""
-    like_people = np.zeros(len(update.whole.points), bool)
-    like_people[update.visible] = update.like_people
     people: list[Track | TrackRow] = [*update.tracks, *(candidate.rows[-1] for candidate in update.candidates)]
-    return replace(update, static=learn_static(update.state.static, update.whole, people, like_people, update.state.fps))
+    return replace(update, static=learn_static(update.state.static, update.whole, people, update.state.fps))
 
 
 def without_static(observation: Observation, static: StaticObjects, fps: float) -> tuple[Observation, np.ndarray]:
@@ -92,9 +88,7 @@ def without_static(observation: Observation, static: StaticObjects, fps: float) 
     return observe(grid, occupied, certain, observation.views), kept
 
 
-def learn_static(
-    static: StaticObjects, observation: Observation, people: Iterable[Track | TrackRow], like_people: np.ndarray, fps: float
-) -> StaticObjects:
+def learn_static(static: StaticObjects, observation: Observation, people: Iterable[Track | TrackRow], fps: float) -> StaticObjects:
     """What is known of static objects after a frame.
 
     A standing person is where their head is: their centroid may be between them and a chair that they touch.
@@ -106,8 +100,6 @@ def learn_static(
         The whole one.
     people : iterable of Track or TrackRow
         Tracks and candidates.
-    like_people : ndarray of bool, shape (n,)
-        Voxels of the observation that look like a person who has no track.
     fps : float
         Frames a second.
     """
@@ -122,7 +114,7 @@ def learn_static(
         _beside(observation.points, heads, STANCE_M),
         _beside(observation.points, centroids, np.where(heads[:, 2] < LEGS_M, LYING_AWAY_M, AWAY_M)),
     )
-    away = ~near.any(axis=1) & ~like_people
+    away = ~near.any(axis=1)
     places = _places(observation)
     filled = np.isin(static.voxels, places, assume_unique=True)
     voxels = np.union1d(static.voxels, places[away])
