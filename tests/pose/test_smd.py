@@ -23,8 +23,8 @@ from hmc.camera.stacked import project_in, stack_views
 from hmc.errors import InputError
 from hmc.io.recording import open_recording
 from hmc.io.results import TrackTable, read_joints
-from hmc.pose.methods.smd import smd_preset
-from hmc.pose.methods.smd_sequence import SmdTask, pose_by_descent
+from hmc.pose.follow import FollowOptions, follow
+from hmc.pose.methods.smd import smd_method, smd_preset
 from hmc.pose.objectives.color_cue import ColorSettings, color_fits, learn_colors, update_colors
 from hmc.pose.objectives.cue_rows import evaluate, gauss_newton_product, jacobian, leclerc, pose_body
 from hmc.pose.objectives.edge_cue import edge_maps, match_edges, shown_contours
@@ -521,11 +521,11 @@ def test_who_does_not_stand_like_da_vinci_is_found_by_the_spectral_route(monkeyp
     asked = []
 
     def spy(*args, **kwargs):
-        asked.append(args[3])
+        asked.append(args[2])
         return spectral_poses(*args, **kwargs)
 
     monkeypatch.setattr("hmc.pose.starts.window.spectral_poses", spy)
-    found = pose_by_descent(SmdTask(recording, smd_preset("default"), height_m=1.76), tracks, 0.04)
+    found = follow(recording, tracks, smd_method(smd_preset("default")), FollowOptions(0.04, height_m=1.76))
     assert asked
     assert found.notes == ()
     error = np.linalg.norm(found.poses.positions - truth.positions[:3], axis=2)

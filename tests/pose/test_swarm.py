@@ -30,11 +30,9 @@ from hmc.pose.objectives.volume import volume_error
 from hmc.pose.spectral.reading import read_body
 from hmc.pose.spectral.skeleton import equally_spaced
 from hmc.pose.spectral.volume import FARTHEST_M, observe_volume
-from hmc.pose.steps.swarm.first import exchange_legs, is_upright, rest_poses
-from hmc.pose.steps.swarm.fit import PARTS, STAGES, FitSettings, Fitted, fit_cost, fit_flat, fit_hierarchical, rest_state, torso_moves
+from hmc.pose.steps.swarm.fit import STAGES, FitSettings, fit_flat, fit_hierarchical, rest_state, torso_moves
 from hmc.pose.steps.swarm.heading import facing_evidence, heading_of, spin_towards
-from hmc.pose.steps.swarm.lost_limbs import free_limbs
-from hmc.pose.steps.swarm.temporal import SwarmSettings, SwarmState, start_fits, swarm_step
+from hmc.pose.steps.swarm.temporal import SwarmSettings, is_upright, start_fits, swarm_step
 from hmc.search.swarm import PsoSettings, pso_init, pso_run, pso_step
 
 MODEL = model_of_height(1.75)
@@ -349,26 +347,6 @@ def test_a_torso_turns_beneath_its_limbs():
     assert beneath.mean() < 0.5 * with_limbs.mean()
 
 
-def test_lost_limbs_are_found_and_exchanged_legs_put_right():
-    true = standing()
-    true[ANGLE_INDEX["l_hip_y"]], true[ANGLE_INDEX["r_hip_y"]] = -0.5, 0.3
-    true[ANGLE_INDEX["l_hip_x"]], true[ANGLE_INDEX["r_hip_x"]] = 0.15, -0.15
-    observed = observe_curves(MODEL, model_curves(true), 8)
-    lost = true.copy()
-    lost[ANGLE_INDEX["r_knee_y"]], lost[ANGLE_INDEX["l_shoulder_x"]] = MODEL.high[ANGLE_INDEX["r_knee_y"] - 7], -1.3
-    found, _ = free_limbs(np.random.default_rng(0), MODEL, observed, lost)
-    gap = np.linalg.norm(skeleton_landmarks(MODEL, found) - skeleton_landmarks(MODEL, true), axis=1)
-    assert gap.max() < 0.2 < np.linalg.norm(skeleton_landmarks(MODEL, lost) - skeleton_landmarks(MODEL, true), axis=1).max()
-    crossed = true.copy()
-    crossed[list(PARTS[-2])], crossed[list(PARTS[-1])] = true[list(PARTS[-1])], true[list(PARTS[-2])]
-    found, _ = free_limbs(np.random.default_rng(0), MODEL, observed, crossed)
-    np.testing.assert_allclose(found, true)
-    # What is right stays.
-    assert fit_cost(MODEL, free_limbs(np.random.default_rng(1), MODEL, observed, true)[0][None], observed) <= fit_cost(
-        MODEL, true[None], observed
-    )
-
-
 def upside_down():
     """`BODY` as it is misread: the head's curve is a leg's, and the other leg's the head's, the trunk's goes down."""
     reading = read(BODY)
@@ -379,62 +357,33 @@ def upside_down():
 
 
 def test_nobody_begins_on_the_head():
-    """The misread curves alone are fitted upside down; beside the voxels an upright pose begins that lies in them."""
+    """The misread curves are fitted upside down, and in such a frame nobody begins, whether the voxels count beside them or not."""
     reading = upside_down()
     on_head = start_fits(np.random.default_rng(0), MODEL, reading, None, SwarmSettings())[0]
     assert not is_upright(on_head.state)
-    state, info = swarm_step(np.random.default_rng(0), MODEL, None, reading, 30.0)
-    assert info.status == "fitted" and info.started and is_upright(state.state)
-    points = skeleton_landmarks(MODEL, state.state)
-    assert (
-        points[LANDMARKS.index("head_top"), 2] > 1.5 and (points[[LANDMARKS.index("l_ankle"), LANDMARKS.index("r_ankle")], 2] < 0.4).all()
-    )
+    for voxels in (True, False):
+        none, info = swarm_step(np.random.default_rng(0), MODEL, None, reading, 30.0, None, SwarmSettings(voxels=voxels))
+        assert none is None and info.status == "no fit: nobody is upright in the curves"
 
 
-def test_a_first_pose_must_lie_in_the_voxels_and_be_upright():
-    none, info = swarm_step(np.random.default_rng(0), MODEL, None, read(BODY), 30.0, None, SwarmSettings(lost_m=0.001))
-    assert none is None and info.status == "no fit: the nearest pose is too far from the curves"
-    none, info = swarm_step(np.random.default_rng(0), MODEL, None, upside_down(), 30.0, None, SwarmSettings(voxels=False))
-    assert none is None and info.status == "no fit: nobody is upright in the curves or the voxels"
+def test_a_pose_that_is_too_far_from_the_curves_is_no_fit():
+    state, _ = swarm_step(np.random.default_rng(0), MODEL, None, read(BODY), 30.0)
+    after, info = swarm_step(np.random.default_rng(1), MODEL, state, read(BODY), 30.0, None, SwarmSettings(lost_m=0.001))
+    assert info.status == "no fit: the nearest pose is too far from the curves" and after.missed == 1
+    np.testing.assert_array_equal(after.state, state.state)
 
 
-def test_a_body_at_rest_is_led_into_the_voxels():
-    found = rest_poses(np.random.default_rng(0), MODEL, read(BODY), np.array([1.0, 0.0]), 36, 15, FitSettings())
-    assert len(found) == 2 and all(np.linalg.norm(one.state[:3] - standing()[:3]) < 0.2 for one in found)
-    last = standing()
-    (near,) = rest_poses(np.random.default_rng(0), MODEL, read(BODY), None, 36, 15, FitSettings(), last)
-    assert np.linalg.norm(near.state[:3] - last[:3]) < 0.2
-    assert rest_poses(np.random.default_rng(0), MODEL, replace(read(BODY), volume=None), None, 36, 15, FitSettings()) == []
-
-
-def test_exchanged_legs_are_put_right_and_right_ones_stay():
-    true = standing()
-    true[ANGLE_INDEX["l_hip_y"]], true[ANGLE_INDEX["r_hip_y"]] = -0.5, 0.4
-    observed = observe_curves(MODEL, model_curves(true), 8)
-    crossed = true.copy()
-    crossed[list(PARTS[-2])], crossed[list(PARTS[-1])] = true[list(PARTS[-1])], true[list(PARTS[-2])]
-    crossed[6] += 0.4
-    for state in (crossed, true):
-        cost = float(fit_cost(MODEL, state[None], observed)[0])
-        found = exchange_legs(np.random.default_rng(0), MODEL, observed, Fitted(state, cost, cost, {}, 0), FitSettings())
-        gap = np.linalg.norm(skeleton_landmarks(MODEL, found.state) - skeleton_landmarks(MODEL, true), axis=1)
-        assert gap.max() < 0.2 and found.evaluations > 0
-
-
-def test_who_is_followed_badly_is_found_anew():
-    """A pose that is far off and costs as much as usual is left for a fresh one when its turn comes, and not before."""
-    bad = standing()
-    bad[7:] = random_states(5, 1)[0, 7:]
-    slow = SwarmSettings(reach_m_s=0.0, least_reach_m=0.001, reach_rad_s=0.0, least_reach_rad=0.001, lost_m=1.0, doubt_ratio=9.0)
-    # Limbs are freed and tuned in every frame: only the torso is kept from going home.
+def test_who_is_followed_badly_is_started_anew_and_not_where_the_fit_is_good():
+    """The swarm cannot leave the pose in one frame; a start can, and is taken where it is better by the margin."""
+    reading, still = read(BODY), {"reach_m_s": 0.0, "least_reach_m": 0.001, "reach_rad_s": 0.0, "least_reach_rad": 0.001}
+    good, _ = swarm_step(np.random.default_rng(0), MODEL, None, reading, 30.0)
+    kept, info = swarm_step(np.random.default_rng(1), MODEL, good, reading, 30.0)
+    assert not info.started and kept.missed == 0
+    bad = good.state.copy()
     bad[3:6] = bad[:3] + 0.5 * MODEL.torso * np.array([0.8, 0.0, 0.6])
-    reading = replace(read(BODY), curves={}, status="no trunk found")
-    gaps = {}
-    for untried in (0, slow.retry_frames):
-        before = SwarmState(bad, np.zeros_like(bad), 1.0, untried=untried)
-        after, info = swarm_step(np.random.default_rng(0), MODEL, before, reading, 30.0, None, slow)
-        gaps[info.started] = info.cost_m
-        assert after.untried == (1 if untried == 0 else 0)
-    assert gaps[True] < 0.85 * gaps[False]
-    after, info = swarm_step(np.random.default_rng(0), MODEL, replace(before, untried=1), reading, 30.0, None, replace(slow, lost_m=0.001))
-    assert info.status.startswith("no fit") and after.untried == 2  # lost, the turn comes too
+    costs = {}
+    for doubt_m in (0.02, 9.0):
+        settings = SwarmSettings(**still, lost_m=1.0, doubt_m=doubt_m)
+        _, info = swarm_step(np.random.default_rng(1), MODEL, replace(good, state=bad), reading, 30.0, None, settings)
+        costs[info.started] = info.cost_m
+    assert costs[True] < 0.6 * costs[False]
