@@ -1,13 +1,15 @@
 """All pose methods side by side on the five actions, from videos alone: accuracy, frames a second, and what each method draws a frame.
 
-Ours, not a paper's: the table of the README. Every method has the same tracks and silhouettes. Frames a second are those of one
-processor, hulls of the frame included; the median frame counts, so that neither the start nor a rescue does.
+Ours, not a paper's: the table of the README. Every method of the registry that needs no markers takes part, a stranger's too (`--plugin`):
+each with its default preset, and each paper's preset with the first method that has it. All have the same tracks and silhouettes. Frames a
+second are those of one processor, hulls of the frame included; the median frame counts, so that neither the start nor a rescue does.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
 from typing import Any
 
 import matplotlib.pyplot as plt
@@ -16,39 +18,60 @@ import numpy as np
 from hmc.experiments.by_action import pose_scores
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs
+from hmc.experiments.engine.store import digest
 from hmc.experiments.engine.style import COLOURS
 from hmc.experiments.five_actions import action_title
-from hmc.experiments.markerless_runs import FRONTEND, MASKS_KEY, action_sources, tracked
-from hmc.experiments.pose_runs import VOXEL_M, estimate_of, first_truth
-from hmc.io.recording import Recording
-from hmc.io.results import TrackTable
-from hmc.pose.methods.pso import SwarmTask, pose_by_swarm, swarm_preset
-from hmc.pose.methods.scalable import method_preset
-from hmc.pose.methods.smd import smd_preset
-from hmc.pose.methods.smd_sequence import SmdTask, pose_by_descent
-from hmc.pose.sequence import PosedPeople, pose_recording
-from hmc.pose.steps.presets import PosePreset, pose_preset
-from hmc.voxels.hulls import HullStep
+from hmc.experiments.markerless_runs import VOXEL_M, action_sources, pose_results, run_method, tracked
+from hmc.experiments.truth import stature_m
+from hmc.plugins import load_plugins, plugin_files
+from hmc.pose.follow import FollowOptions
+from hmc.pose.method import PoseMethod
+from hmc.pose.registry import BUILT_IN, METHODS, pose_method
+from hmc.pose.steps.descent.tracker import SmdPreset
+from hmc.pose.steps.presets import PosePreset
+from hmc.pose.steps.swarm.step import SwarmPreset
 
-__all__ = ["EXPERIMENT", "METHODS", "effort"]
+__all__ = ["DEFAULT", "EXPERIMENT", "effort", "title", "ways"]
 
-#: Names, the command line's method and preset.
-METHODS = {
-    "APF": ("apf", "default"),
-    "APF, canton2009": ("apf", "canton2009"),
-    "SHBM-APF": ("shbm-apf", "default"),
-    "SHBM-DDM-APF": ("shbm-ddm-apf", "default"),
-    "PSO": ("pso", "default"),
-    "SMD": ("smd", "default"),
-}
+DEFAULT = "default"
+#: Seeds of every method by `plan.quick`, and of the papers' presets.
+SEEDS, PAPER_SEEDS = {False: 3, True: 1}, 1
+
+
+def ways() -> list[tuple[str, str]]:
+    """Methods and presets that take part: each method's default, and each paper's preset with the first method that has it."""
+    load_plugins()
+    found: list[tuple[str, str]] = []
+    for name, entry in METHODS.items():
+        if "detections" in pose_method(name).needs:
+            continue
+        papers = {preset for _, preset in found}
+        found += [(name, preset) for preset in entry.presets if preset == DEFAULT or preset not in papers]
+    return found
+
+
+def title(parameters: Parameters) -> str:
+    """What tables call a cell's method."""
+    name, preset = parameters["method"], parameters["preset"]
+    return name if preset == DEFAULT else f"{name} {preset}"
 
 
 def grid(plan: Plan) -> list[dict]:
-    """Every method on every action, by the actors in turn (in full: by both)."""
+    """Every method with every seed on every action, by both actors (quick: by the actors in turn)."""
     sources = action_sources(plan)
     if not plan.recordings and plan.quick:
         sources = [source for k, source in enumerate(sources) if k % 4 in (0, 3)]
-    return [{"recording": source.label, "method": method} for method in METHODS for source in sources]
+    return [
+        {"recording": source.label, "method": name, "preset": preset, "repeat": repeat} | _version_of(name)
+        for name, preset in ways()
+        for source in sources
+        for repeat in range(SEEDS[plan.quick] if preset == DEFAULT else PAPER_SEEDS)
+    ]
+
+
+def _version_of(name: str) -> dict[str, str]:
+    """Of a stranger's method, a digest of the files that it may be in: after a change it is computed again."""
+    return {} if name in BUILT_IN else {"plugins": digest([Path(path).read_text(encoding="utf-8") for path in plugin_files()], 8)}
 
 
 def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Results:
@@ -57,64 +80,48 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
     Parameters
     ----------
     parameters : mapping
-        ``recording``, ``method`` (a key of `METHODS`).
+        ``recording``, ``method`` (of the registry), ``preset``, ``repeat``.
     inputs : Inputs
     rng : numpy.random.Generator
     """
-    recording, tracks, masks = tracked(inputs, parameters["recording"], 0)
-    truth, ticks = first_truth(recording), []
+    seen, ticks = tracked(inputs, parameters["recording"], 0), []
 
-    def timed(steps: Iterable[HullStep], total: int) -> Iterator[HullStep]:
+    def timed(steps: Iterable, total: int) -> Iterator:
         for step in steps:
             ticks.append(time.process_time())
             yield step
 
-    run = _way(parameters["method"], recording, tracks, int(rng.integers(2**31)))
-    people = run(frontend=FRONTEND, masks=masks, key=MASKS_KEY, on_problem=lambda line: None, progress=timed)
-    return {
-        "frames": truth.frames,
-        "fps": recording.fps,
-        "estimate_m": estimate_of(truth, people.poses),
-        "truth_m": truth.positions,
-        "frame_s": float(np.median(np.diff(ticks))) if len(ticks) > 1 else None,
-    }
+    options = FollowOptions(VOXEL_M, int(rng.integers(2**31)), stature_m(seen.recording))
+    people = run_method(seen, pose_method(parameters["method"], parameters["preset"]), options, timed)
+    return pose_results(seen.recording, people) | {"frame_s": float(np.median(np.diff(ticks))) if len(ticks) > 1 else None}
 
 
-def _way(name: str, recording: Recording, tracks: TrackTable, seed: int) -> Callable[..., PosedPeople]:
-    """What runs a method."""
-    method, preset = METHODS[name]
-    height = float(recording.subject_height_m[0]) if recording.subject_height_m else None
-    if method == "pso":
-        swarm = SwarmTask(recording, swarm_preset(preset), seed, height)
-        return lambda **passed: pose_by_swarm(swarm, tracks, VOXEL_M, **passed)[0]
-    if method == "smd":
-        descent = SmdTask(recording, smd_preset(preset), seed, height)
-        return lambda **passed: pose_by_descent(descent, tracks, VOXEL_M, **passed)
-    filtered = method_preset(pose_preset(preset), method)
-    return lambda **passed: pose_recording(recording, tracks, VOXEL_M, filtered, seed, height_m=height, **passed)
-
-
-def effort(name: str) -> str:
-    """What a method draws a frame, in words."""
-    method, preset = METHODS[name]
-    if method == "pso":
-        swarm = swarm_preset(preset).swarm
-        return f"{swarm.particles} particles, {swarm.iterations} iterations"
-    if method == "smd":
-        cues = smd_preset(preset).cues
-        return f"{sum(cues.surface_points)} surface points, {cues.voxel_points} voxels, contours in {cues.views} views"
-    filtered: PosePreset = method_preset(pose_preset(preset), method)
-    if filtered.models:
-        return f"{filtered.structural.gamma:g} particles an angle, {filtered.structural.layers} inner layers"
-    return f"{filtered.annealed.layers} layers of {filtered.annealed.particles} particles"
+def effort(method: PoseMethod) -> str:
+    """What a method draws a frame, in words; empty where its settings do not tell."""
+    told = method.settings if isinstance(method.settings, dict) else {"": method.settings}
+    for settings in told.values():
+        if isinstance(settings, SwarmPreset):
+            return f"{settings.swarm.particles} particles, {settings.swarm.iterations} iterations"
+        if isinstance(settings, SmdPreset):
+            cues = settings.cues
+            return f"{sum(cues.surface_points)} surface points, {cues.voxel_points} voxels, contours in {cues.views} views"
+        if isinstance(settings, PosePreset) and settings.models:
+            return f"{settings.structural.gamma:g} particles an angle, {settings.structural.layers} inner layers"
+        if isinstance(settings, PosePreset):
+            return f"{settings.annealed.layers} layers of {settings.annealed.particles} particles"
+    return ""
 
 
 def report(cells: Sequence[Cell], plan: Plan) -> Report:
     """A row a method, and one for each action."""
-    rows, each = [], []
-    for name in METHODS:
-        own = [one for one in cells if one.parameters["method"] == name]
-        rows.append({"method": name} | _scores(own) | {"a frame": effort(name)})
+    methods: dict[str, list[Cell]] = {}
+    for one in cells:
+        methods.setdefault(title(one.parameters), []).append(one)
+    rows: list[dict[str, Any]] = []
+    each: list[dict[str, Any]] = []
+    for name, own in methods.items():
+        method = pose_method(own[0].parameters["method"], own[0].parameters["preset"])
+        rows.append({"method": name} | _scores(own) | {"a frame": effort(method)})
         for action in dict.fromkeys(action_title(one.parameters["recording"]) for one in own):
             part = [one for one in own if action_title(one.parameters["recording"]) == action]
             each.append({"method": name, "action": action} | _scores(part))
@@ -127,30 +134,37 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
         ),
     )
     caption = (
-        "All pose methods on the five actions, from videos alone: frames without a pose count as misses; frames a second of one processor, "
-        "hulls included."
+        "All pose methods on the five actions, from videos alone, and the spread over seeds; the papers' presets have one seed. Frames "
+        "without a pose count as misses; frames a second of one processor, hulls included."
     )
     tables = (Table("all-methods", caption, rows), Table("all-methods-actions", f"{caption} Action by action.", each))
     return Report(tables, {"all-methods": _draw(each)}, claims)
 
 
 def _scores(cells: Sequence[Cell]) -> dict[str, Any]:
-    scores = pose_scores(cells)
+    """Means over the seeds, their spread where there are several, and frames a second."""
+    seeds = dict.fromkeys(one.parameters["repeat"] for one in cells)
+    scores = [pose_scores([one for one in cells if one.parameters["repeat"] == seed]) for seed in seeds]
     seconds = [one.results["frame_s"] for one in cells if one.results["frame_s"]]
-    return {
-        "mean_mm": scores["mean_mm"],
-        "MMTP_mm": scores["MMTP_mm"],
-        "MMTA_percent": scores["MMTA_percent"],
-        "MMTA_50_percent": scores["MMTA_50_percent"],
-        "frames_per_s": float(1 / np.mean(seconds)) if seconds else None,
-    }
+    columns: dict[str, Any] = {}
+    for name, spread in (
+        ("mean_mm", "mean_spread_mm"),
+        ("MMTP_mm", ""),
+        ("MMTA_percent", "MMTA_spread_percent"),
+        ("MMTA_50_percent", "MMTA_50_spread_percent"),
+    ):
+        values = [score[name] for score in scores]
+        columns[name] = float(np.mean(values))
+        if spread:
+            columns[spread] = float(np.std(values, ddof=1)) if len(values) > 1 else None
+    return columns | {"seeds": len(seeds), "frames_per_s": float(1 / np.mean(seconds)) if seconds else None}
 
 
 def _draw(rows: Sequence[dict[str, Any]]) -> plt.Figure:
     """Mean error and frames a second, a mark an action."""
     figure, axes = plt.subplots(figsize=(5.2, 3.4))
     colours = list(dict.fromkeys(COLOURS.values()))
-    for k, name in enumerate(METHODS):
+    for k, name in enumerate(dict.fromkeys(row["method"] for row in rows)):
         own = [row for row in rows if row["method"] == name and row["frames_per_s"]]
         speed, error = [row["frames_per_s"] for row in own], [row["mean_mm"] for row in own]
         axes.scatter(speed, error, s=18, color=colours[k % len(colours)], label=name)
@@ -159,4 +173,4 @@ def _draw(rows: Sequence[dict[str, Any]]) -> plt.Figure:
     return figure
 
 
-EXPERIMENT = Experiment("all-methods", "all pose methods side by side", "ours; README.md", grid, cell, report, version=2)
+EXPERIMENT = Experiment("all-methods", "all pose methods side by side", "ours; README.md", grid, cell, report, version=3)

@@ -9,7 +9,7 @@ import numpy as np
 
 from hmc.experiments.engine.experiment import Cell
 from hmc.experiments.five_actions import action_title
-from hmc.experiments.pose_runs import estimates
+from hmc.experiments.truth import estimates
 from hmc.metrics.angles import angular_errors, score_angles
 from hmc.metrics.landmarks import landmark_errors, score
 

@@ -78,5 +78,5 @@ def _draw(axes, estimate: np.ndarray, truth: np.ndarray, errors: np.ndarray) -> 
 
 
 EXPERIMENT = Experiment(
-    "fig-5.3", "metrics on a good and on a poor estimate", "Canton, Figure 5.3", runs.grid, runs.cell, report, runs.FAMILY
+    "fig-5.3", "metrics on a good and on a poor estimate", "Canton, Figure 5.3", runs.grid, runs.cell, report, runs.FAMILY, runs.VERSION
 )

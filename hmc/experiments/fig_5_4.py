@@ -54,4 +54,6 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     return Report((Table("fig-5.4", caption, rows),), {"fig-5.4": figure}, (claim,))
 
 
-EXPERIMENT = Experiment("fig-5.4", "error histograms and quantile plots", "Canton, Figure 5.4", runs.grid, runs.cell, report, runs.FAMILY)
+EXPERIMENT = Experiment(
+    "fig-5.4", "error histograms and quantile plots", "Canton, Figure 5.4", runs.grid, runs.cell, report, runs.FAMILY, runs.VERSION
+)

@@ -64,5 +64,5 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
 
 
 EXPERIMENT = Experiment(
-    "fig-5.6", "choice of the threshold, by both tests", "Canton, Figure 5.6", runs.grid, runs.cell, report, runs.FAMILY
+    "fig-5.6", "choice of the threshold, by both tests", "Canton, Figure 5.6", runs.grid, runs.cell, report, runs.FAMILY, runs.VERSION
 )

@@ -62,5 +62,5 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
 
 
 EXPERIMENT = Experiment(
-    "fig-5.7", "angles on one reference body: elbow and knee", "Canton, Figure 5.7", runs.grid, runs.cell, report, runs.FAMILY
+    "fig-5.7", "angles on one reference body: elbow and knee", "Canton, Figure 5.7", runs.grid, runs.cell, report, runs.FAMILY, runs.VERSION
 )

@@ -22,13 +22,12 @@ from hmc.body.proportions import canton_body
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs
 from hmc.experiments.engine.style import COLOURS
-from hmc.experiments.filter_runs import HEIGHT_M
 from hmc.experiments.markerless_runs import FRONTEND, MASKS_KEY, action_sources, tracked
-from hmc.experiments.pose_runs import first_truth, standing_state
+from hmc.experiments.truth import HEIGHT_M, first_truth, standing_state, stature_m
 from hmc.io.masks import kept_masks
 from hmc.io.results import TrackTable
 from hmc.pose.objectives.four_scores import SCORES, ScoreVariances, log_likelihood_factorised, make_score_table, observe, scores
-from hmc.pose.sequence import targets_of
+from hmc.pose.views.person_view import views_of
 from hmc.tracking.resumable import person_grid
 from hmc.voxels.grid import VoxelGrid
 from hmc.voxels.hulls import stream_hulls
@@ -60,7 +59,8 @@ def grid(plan: Plan) -> list[dict]:
 
 def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Results:
     """The four scores of every part over the map, as log-likelihoods by panel; degrees."""
-    recording, _, masks = tracked(inputs, parameters["recording"], 0)
+    seen = tracked(inputs, parameters["recording"], 0)
+    recording, masks = seen.recording, seen.masks
     truth = first_truth(recording)
     k = int(parameters["at"] * len(truth.frames))
     frame, points = int(truth.frames[k]), truth.positions[k]
@@ -68,10 +68,10 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
     kept = kept_masks(masks, MASKS_KEY, frame, frame + 1)
     hull = next(iter(stream_hulls(recording, room_grid, FRONTEND, first=frame, last=frame + 1, masks=kept, on_problem=lambda line: None)))
     where = TrackTable(np.array([frame]), np.array([0]), points.mean(axis=0)[None])
-    target = targets_of(recording, room_grid, where, hull)[0]
+    target = views_of(recording, room_grid, where, hull)[0].target
     if target is None:
         return {"degrees": [], "log_likelihood": [], "true_degrees": []}
-    body = canton_body(float(recording.subject_height_m[0]) if recording.subject_height_m else HEIGHT_M)
+    body = canton_body(stature_m(recording) or HEIGHT_M)
     state, _ = fit_landmarks(body, points, standing_state(body, points))
     places = [DOF_NAMES.index(name) for name in ANGLES]
     axes = [np.linspace(body.limits.low[place], body.limits.high[place], SIDE) for place in places]

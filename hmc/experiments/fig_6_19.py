@@ -13,9 +13,9 @@ import numpy as np
 from hmc.experiments import markerless_runs as runs
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
 from hmc.experiments.engine.style import COLOURS
-from hmc.experiments.pose_runs import estimates
 from hmc.experiments.table_6_4 import PRESETS
 from hmc.experiments.table_6_4 import grid as table_grid
+from hmc.experiments.truth import estimates
 from hmc.landmarks import LANDMARKS
 
 __all__ = ["EXPERIMENT"]

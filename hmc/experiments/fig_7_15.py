@@ -17,11 +17,9 @@ from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameter
 from hmc.experiments.engine.inputs import Inputs, rendered
 from hmc.experiments.hiding import ENDS, hidden_and_shown, limb_views, rest_of, waits
 from hmc.experiments.markerless_runs import tracked
-from hmc.experiments.pose_runs import estimates, first_truth
+from hmc.experiments.truth import estimates
 from hmc.landmarks import landmark_index
 from hmc.metrics.landmarks import landmark_errors
-from hmc.pose.methods.scalable import method_preset
-from hmc.pose.steps.presets import pose_preset
 
 __all__ = ["EXPERIMENT"]
 
@@ -43,10 +41,7 @@ def grid(plan: Plan) -> list[dict]:
 def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Results:
     """Poses from videos alone by the preset `default`, and how much of every true limb the recording shows."""
     label = parameters["recording"]
-    recording, tracks, masks = tracked(inputs, label, 0)
-    name, models = runs.METHODS[parameters["method"]]
-    preset = method_preset(pose_preset("default"), name, models)
-    results = runs.chain(recording, tracks, masks, first_truth(recording), preset, int(rng.integers(2**31)))
+    results = runs.chain(tracked(inputs, label, 0), parameters["method"], rng)
     views = limb_views(inputs, label)
     return results | {"occupancy": views.occupancy, "cameras": views.cameras}
 

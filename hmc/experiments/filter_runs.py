@@ -23,13 +23,13 @@ from hmc.camera.model import Rig
 from hmc.experiments.engine.experiment import Parameters, Results
 from hmc.experiments.engine.inputs import Inputs, once, read_hulls, write_hulls
 from hmc.experiments.markerless_runs import FRONTEND, MASKS_KEY, tracked
-from hmc.experiments.pose_runs import first_truth, standing_state
+from hmc.experiments.truth import HEIGHT_M, first_truth, standing_state, stature_m, truth_track
 from hmc.io.masks import MaskStep, kept_masks
-from hmc.io.results import TrackTable
-from hmc.pose.sequence import targets_of
-from hmc.pose.steps.annealed import make_filter, pose_init
+from hmc.pose.method import Capture, begin_tracking
+from hmc.pose.methods.annealed import annealed_pose_step
+from hmc.pose.steps.annealed import DRIFT, annealed_subject
 from hmc.pose.steps.presets import PosePreset, pose_preset
-from hmc.pose.steps.scalable import step_of
+from hmc.pose.views.person_view import PersonView, views_of
 from hmc.tracking.resumable import person_grid
 from hmc.voxels.hulls import HullStep, stream_hulls, stream_masks
 
@@ -38,8 +38,6 @@ __all__ = ["ANNEALING", "FAMILY", "VERSION", "action_drift", "cell", "filter_pre
 FAMILY = "markerless-filter"
 #: Ways of annealing, and the presets that they are taken from.
 ANNEALING = {"printed": "canton2009", "strong": "default"}
-#: Stature where a recording does not say it, metres.
-HEIGHT_M = 1.75
 #: Of the cells that follow from the true first pose.
 VERSION = 2
 #: The largest variation is that which so many frames do not exceed: inverse kinematics now and then jumps.
@@ -122,38 +120,38 @@ def follow_from_truth(
     Results
         As of `cell`; an estimate is NaN where its limb is missing.
     """
-    recording, _, masks = tracked(inputs, parameters["recording"], parameters["cameras"])
+    kept = tracked(inputs, parameters["recording"], parameters["cameras"])
+    recording, masks = kept.recording, kept.masks
     truth = every_frame = first_truth(recording)
     if parameters["frames"]:
         truth = truth.where(truth.frames < truth.frames[0] + parameters["frames"])
     voxel_m = parameters["voxel_mm"] / 1000
     grid = person_grid(recording, voxel_m)
-    body = canton_body(float(recording.subject_height_m[0]) if recording.subject_height_m else HEIGHT_M)
-    filt = make_filter(body, preset, recording.fps, voxel_m, recording.room)
-    filt = replace(filt, drift=preset.drift_scale * action_drift(filt.body, every_frame.positions))
+    body = canton_body(stature_m(recording) or HEIGHT_M)
+    subject = annealed_subject(body, Capture(recording.fps, voxel_m, recording.room, recording.rig), preset)
+    subject = replace(subject, extras={DRIFT: action_drift(body, every_frame.positions)})
     state, _ = fit_landmarks(body, truth.positions[0], standing_state(body, truth.positions[0]))
-    pose = pose_init(state)
-    where = TrackTable(truth.frames, np.zeros(len(truth.frames), int), truth.positions.mean(axis=1))
+    pose, where = begin_tracking(subject, state), truth_track(truth)
     first, last = int(truth.frames[0]), int(truth.frames[-1]) + 1
-    kept = kept_masks(masks, MASKS_KEY, first, last)
+    silhouettes = kept_masks(masks, MASKS_KEY, first, last)
 
-    def hulls(silhouettes: Iterable[MaskStep] | None) -> Iterator[HullStep]:
-        return stream_hulls(recording, grid, FRONTEND, first=first, last=last, masks=silhouettes, on_problem=lambda line: None)
+    def hulls(steps: Iterable[MaskStep] | None) -> Iterator[HullStep]:
+        return stream_hulls(recording, grid, FRONTEND, first=first, last=last, masks=steps, on_problem=lambda line: None)
 
     if change is None:  # the same for every cell, and dearer than the filter
         name = f"hulls-{len(recording.rig)}-cameras-{parameters['voxel_mm']:g}mm-{first}-{last}"
-        seen = read_hulls(once(masks.with_name(name), lambda part: write_hulls(part, hulls(kept))), grid, recording)
+        seen = read_hulls(once(masks.with_name(name), lambda part: write_hulls(part, hulls(silhouettes))), grid, recording)
     else:
-        steps = stream_masks(recording, FRONTEND, first=first, last=last, on_problem=lambda line: None) if kept is None else kept
+        steps = silhouettes or stream_masks(recording, FRONTEND, first=first, last=last, on_problem=lambda line: None)
         joints = dict(zip(truth.frames.tolist(), truth.positions, strict=True))
         seen = hulls(change(one, recording.rig, joints[one.index]) for one in steps if one.index in joints)
-    step, movers = step_of(preset), landmark_masks(body)
+    step, movers = annealed_pose_step(preset), landmark_masks(body)
     estimates, seconds = {}, 0.0
     for hull in seen:
-        target = targets_of(recording, grid, where, hull).get(0)
+        view = views_of(recording, grid, where, hull).get(0, PersonView(hull.index))
         before = thread_time()
         if hull.index > first:
-            pose, info = step(rng, filt, pose, target)
+            pose, info = step(rng, pose, view)
         seconds += thread_time() - before
         estimates[hull.index] = landmarks(body, pose.state)
         if hull.index > first and info.missing is not None:

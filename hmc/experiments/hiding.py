@@ -20,18 +20,18 @@ from hmc.body.proportions import default_body
 from hmc.body.scalable_models import UNITIVE_PIECES
 from hmc.camera.model import project
 from hmc.experiments.engine.inputs import Inputs, once
-from hmc.experiments.filter_runs import HEIGHT_M
-from hmc.experiments.markerless_runs import FRONTEND, MASKS_KEY, tracked
-from hmc.experiments.pose_runs import VOXEL_M, first_truth, standing_state
+from hmc.experiments.markerless_runs import FRONTEND, MASKS_KEY, VOXEL_M, tracked
+from hmc.experiments.truth import HEIGHT_M, first_truth, standing_state, stature_m, truth_track
 from hmc.io.masks import kept_masks
-from hmc.io.results import TrackTable
 from hmc.landmarks import LANDMARKS, landmark_index
+from hmc.pose.method import Capture
 from hmc.pose.methods.scalable import method_preset
-from hmc.pose.sequence import targets_of
-from hmc.pose.steps.annealed import make_filter, score_maps
+from hmc.pose.objectives.four_scores import ScoreTable
+from hmc.pose.steps.annealed import annealed_subject
 from hmc.pose.steps.hidden.shown import limb_signs, place_flesh
 from hmc.pose.steps.presets import pose_preset
-from hmc.pose.steps.restrict import part_mask
+from hmc.pose.steps.restrict import part_mask, score_maps
+from hmc.pose.views.person_view import views_of
 from hmc.tracking.resumable import person_grid
 from hmc.voxels.hulls import HullStep, stream_hulls
 
@@ -79,22 +79,25 @@ def limb_views(inputs: Inputs, label: str) -> LimbViews:
 
 
 def _limb_views(inputs: Inputs, label: str) -> LimbViews:
-    recording, _, masks = tracked(inputs, label, 0)
+    seen = tracked(inputs, label, 0)
+    recording, masks = seen.recording, seen.masks
     truth = first_truth(recording)
-    body = default_body(float(recording.subject_height_m[0]) if recording.subject_height_m else HEIGHT_M)
+    body = default_body(stature_m(recording) or HEIGHT_M)
     preset = method_preset(pose_preset("default"), "ddm-apf")
-    table = make_filter(body, preset, recording.fps, VOXEL_M, recording.room).table
+    table: ScoreTable | None = annealed_subject(body, Capture(recording.fps, VOXEL_M, recording.room), preset).flesh
     limbs, whole = UNITIVE_PIECES.limbs, part_mask(UNITIVE_PIECES.unions[-1].model.parts)
     occupancy, cameras = np.full((2, len(truth.frames), len(limbs)), np.nan)
     first, last = int(truth.frames[0]), int(truth.frames[-1]) + 1
     grid = person_grid(recording, VOXEL_M)
-    where = TrackTable(truth.frames, np.zeros(len(truth.frames), int), truth.positions.mean(axis=1))
+    where = truth_track(truth)
     kept = kept_masks(masks, MASKS_KEY, first, last)
     state = standing_state(body, truth.positions[0])
     for hull in stream_hulls(recording, grid, FRONTEND, first=first, last=last, masks=kept, on_problem=lambda line: None):
         row = np.flatnonzero(truth.frames == hull.index)
-        target = targets_of(recording, grid, where, hull).get(0)
-        if not len(row) or target is None or table is None:
+        if not len(row) or table is None:
+            continue
+        target = views_of(recording, grid, where, hull)[0].target
+        if target is None:
             continue
         state, _ = fit_landmarks(body, truth.positions[row[0]], state)
         maps, transforms = score_maps(target, recording.room), segment_transforms(body, state)

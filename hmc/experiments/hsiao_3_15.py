@@ -15,7 +15,7 @@ import numpy as np
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs
 from hmc.experiments.hsiao_runs import VOXEL_M, limbs_apart, person_hulls, scene_of, sequences
-from hmc.experiments.pose_runs import first_truth
+from hmc.experiments.truth import first_truth
 from hmc.pose.spectral.parts import PART_NAMES
 from hmc.pose.spectral.segmentation import baseline_segmentation, segment_body
 from hmc.pose.spectral.skeleton import baseline_skeletons, extract_skeletons

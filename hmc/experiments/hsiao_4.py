@@ -15,7 +15,7 @@ from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Rep
 from hmc.experiments.engine.style import COLOURS
 from hmc.experiments.hsiao_runs import pose_cell, sequences
 from hmc.experiments.nine_actions import NINE_ACTIONS, QUICK_SUFFIX
-from hmc.experiments.pose_runs import estimates
+from hmc.experiments.truth import estimates
 from hmc.metrics.landmarks import landmark_errors
 
 __all__ = ["EXPERIMENT"]
@@ -65,4 +65,4 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     return Report((Table("hsiao-4", "Nine actions by spectral skeletons and swarms.", rows),), {"hsiao-4": figure}, claims)
 
 
-EXPERIMENT = Experiment("hsiao-4", "nine actions by the whole method", "Hsiao, chapter 4", grid, pose_cell, report)
+EXPERIMENT = Experiment("hsiao-4", "nine actions by the whole method", "Hsiao, chapter 4", grid, pose_cell, report, version=2)

@@ -18,7 +18,7 @@ from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameter
 from hmc.experiments.engine.inputs import Inputs
 from hmc.experiments.engine.style import COLOURS
 from hmc.experiments.hsiao_runs import VOXEL_M, person_hulls, sequences
-from hmc.experiments.pose_runs import first_truth
+from hmc.experiments.truth import HEIGHT_M, first_truth, stature_m
 from hmc.pose.objectives.curves import curves_of, observe_curves, skeleton_error
 from hmc.pose.spectral.reading import read_body
 from hmc.pose.steps.swarm.fit import FitSettings, Prior, bounds_around, fit_cost, fit_flat, fit_hierarchical, rest_state
@@ -45,7 +45,7 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
     """Every optimiser on some frames whose parts were all found."""
     recording = inputs.recording(parameters["recording"])
     truth = first_truth(recording)
-    height = float(recording.subject_height_m[0]) if recording.subject_height_m else 1.75
+    height = stature_m(recording) or HEIGHT_M
     model = model_of_height(height)
     rows = []
     for step, grid_, voxels, votes in person_hulls(recording):

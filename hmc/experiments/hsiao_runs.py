@@ -9,22 +9,20 @@ import numpy as np
 from hmc.errors import InputError
 from hmc.experiments.engine.experiment import Parameters, Plan, Results, Source
 from hmc.experiments.engine.inputs import Inputs, rendered
+from hmc.experiments.markerless_runs import FRONTEND, VOXEL_M, pose_results, run_method, tracked
 from hmc.experiments.nine_actions import NINE_ACTIONS, QUICK_SUFFIX, nine_recipes
-from hmc.experiments.pose_runs import estimate_of, first_truth
+from hmc.experiments.truth import stature_m
 from hmc.io.recording import Recording
 from hmc.landmarks import LANDMARKS
-from hmc.pose.methods.pso import SwarmTask, pose_by_swarm
+from hmc.pose.follow import FollowOptions
+from hmc.pose.registry import pose_method
 from hmc.pose.spectral.graph import color_votes, face_neighbours
 from hmc.synthetic.scene import Scene, build_scene
-from hmc.tracking.resumable import track_recording
 from hmc.voxels.components import components
 from hmc.voxels.grid import VoxelGrid
-from hmc.voxels.hulls import FrontendSettings, HullStep, stream_hulls
+from hmc.voxels.hulls import HullStep, stream_hulls
 
 __all__ = ["VOXEL_M", "limbs_apart", "person_hulls", "pose_cell", "scene_of", "sequences"]
-
-VOXEL_M, TRACK_VOXEL_M = 0.03, 0.05
-_FRONTEND = FrontendSettings(threads=1)
 
 
 def sequences(plan: Plan, names: tuple[str, ...] = tuple(NINE_ACTIONS)) -> tuple[Source, ...]:
@@ -50,7 +48,7 @@ def scene_of(label: str) -> Scene:
 def person_hulls(recording: Recording, voxel_size_m: float = VOXEL_M) -> Iterator[tuple[HullStep, VoxelGrid, np.ndarray, tuple]]:
     """Every frame's strict hull of the only person, voxels (n, 3), with the frame, the grid and the colour votes."""
     grid = VoxelGrid.from_room(recording.room, voxel_size_m, len(recording.rig))
-    for step in stream_hulls(recording, grid, _FRONTEND, on_problem=lambda line: None):
+    for step in stream_hulls(recording, grid, FRONTEND, on_problem=lambda line: None):
         blobs = components(step.strict, grid, 20)
         if not len(blobs):
             continue
@@ -79,18 +77,16 @@ def limbs_apart(points: np.ndarray) -> bool:
 
 def pose_cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Results:
     """The whole method on a recording, from videos alone but for the stature, which the thesis knows beforehand."""
-    recording = inputs.recording(parameters["recording"])
-    truth = first_truth(recording)
-    seed = int(rng.integers(2**31))
-    tracks = track_recording(recording, TRACK_VOXEL_M, seed=seed, on_problem=lambda line: None)
-    height = float(recording.subject_height_m[0]) if recording.subject_height_m else None
-    people, rows = pose_by_swarm(SwarmTask(recording, seed=seed, height_m=height), tracks, VOXEL_M, on_problem=lambda line: None)
+    seen = tracked(inputs, parameters["recording"], 0)
+    options = FollowOptions(VOXEL_M, int(rng.integers(2**31)), stature_m(seen.recording))
+    people = run_method(seen, pose_method("pso"), options)
+    results = pose_results(seen.recording, people)
     return {
-        "estimate_m": estimate_of(truth, people.poses),
-        "truth_m": truth.positions,
-        "frames": len(truth.frames),
-        "restarts": sum(row.info.started for row in rows),
-        "turned": sum(row.info.turned for row in rows),
-        "without_fit": sum(row.info.status != "fitted" for row in rows),
-        "error_mm": [1000 * row.info.error_m for row in rows if np.isfinite(row.info.error_m)],
+        "estimate_m": results["estimate_m"],
+        "truth_m": results["truth_m"],
+        "frames": len(results["frames"]),
+        "restarts": sum(bool(told.get("started")) for told in people.details),
+        "turned": sum(bool(told.get("turned")) for told in people.details),
+        "without_fit": sum(status != "fitted" for status in people.status),
+        "error_mm": [1000 * error for told in people.details if isinstance(error := told.get("error_m"), float) and np.isfinite(error)],
     }

@@ -21,7 +21,7 @@ from hmc.experiments import kehl_runs
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs, rendered
 from hmc.experiments.engine.style import COLOURS
-from hmc.experiments.pose_runs import first_truth, standing_state
+from hmc.experiments.truth import HEIGHT_M, first_truth, standing_state, stature_m
 from hmc.landmarks import LANDMARKS
 from hmc.pose.steps.descent.tracker import make_scene, make_tracker, optimise
 
@@ -51,7 +51,7 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
     *_, (_, seen, _) = kehl_runs.observations(recording, frame + 1)
     if seen is None:
         return {"distance_m": {name: [] for name in METHODS}, "degrees": []}
-    skeleton = default_body(float(recording.subject_height_m[0]) if recording.subject_height_m else 1.75)
+    skeleton = default_body(stature_m(recording) or HEIGHT_M)
     points = truth.positions[int(np.searchsorted(truth.frames, recording.start + frame))]
     state, _ = fit_landmarks(skeleton, points, standing_state(skeleton, points))
     state[dof_index("torso_x", "torso_y", "torso_z")] = 0.0

@@ -19,12 +19,11 @@ from hmc.errors import InputError
 from hmc.experiments.engine.experiment import Cell, Parameters, Results, Source
 from hmc.experiments.engine.inputs import Inputs, rendered
 from hmc.experiments.engine.style import COLOURS
-from hmc.experiments.pose_runs import first_truth
+from hmc.experiments.truth import first_truth, stature_m
 from hmc.io.recording import Recording
 from hmc.landmarks import BONES, LANDMARKS
 from hmc.metrics.landmarks import landmark_errors
 from hmc.pose.methods.smd import smd_preset
-from hmc.pose.methods.smd_sequence import WINDOW_S
 from hmc.pose.starts.da_vinci import find_da_vinci
 from hmc.pose.starts.settle import FirstPose, begin
 from hmc.pose.steps.descent.levenberg import LmSettings
@@ -40,6 +39,8 @@ __all__ = ["FAMILY", "VARIANTS", "cell", "cell_grid", "errors_mm", "observations
 
 FAMILY = "kehl"
 VOXEL_M = 0.03
+#: How long the person is watched before the body is fitted, seconds.
+WINDOW_S = 1.5
 _SURFACE = {"edge_weight": 0.0, "colors": None}
 #: The descent along the parameters themselves, with the settings found best for that.
 ALONG_PARAMETERS = SmdSettings(first_step=0.5, meta_step=3e-4, iterations=25, by_curvature=False, averaged=False)
@@ -116,7 +117,7 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
     """
     recording = inputs.recording(parameters["recording"])
     truth = first_truth(recording)
-    height = float(recording.subject_height_m[0]) if recording.subject_height_m else None
+    height = stature_m(recording)
     preset = preset_of(parameters["variant"])
     wanted = {round(second * recording.fps) for second in parameters["shown_s"]} if parameters["repeat"] == 0 else set()
     window = max(3, round(WINDOW_S * recording.fps))

@@ -7,6 +7,7 @@ hand, while the person goes on moving; the hull has no arm then. After that the 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,13 +19,13 @@ from hmc.camera.model import Camera, Rig, project
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Source, Table
 from hmc.experiments.engine.inputs import Inputs, once, rendered
 from hmc.experiments.engine.style import COLOURS
-from hmc.experiments.markerless_runs import FRONTEND, MASKS_KEY, tracked
-from hmc.experiments.pose_runs import VOXEL_M, estimate_of, first_truth
+from hmc.experiments.markerless_runs import MASKS_KEY, VOXEL_M, run_method, tracked
+from hmc.experiments.truth import estimate_of, first_truth
 from hmc.io.masks import MaskStep, keep_masks, kept_masks
 from hmc.io.results import PoseTable
 from hmc.landmarks import landmark_index
-from hmc.pose.sequence import pose_recording
-from hmc.pose.steps.presets import pose_preset
+from hmc.pose.follow import FollowOptions
+from hmc.pose.registry import pose_method
 
 __all__ = ["EXPERIMENT", "taken_back", "without_arm"]
 
@@ -98,8 +99,8 @@ def taken_back(errors: np.ndarray) -> int | None:
 
 def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Results:
     """Errors of elbow and wrist in every frame, metres, and the frames in which the arm is gone."""
-    recording, tracks, masks = tracked(inputs, parameters["recording"], 0)
-    truth = first_truth(recording)
+    seen = tracked(inputs, parameters["recording"], 0)
+    recording, masks, truth = seen.recording, seen.masks, first_truth(seen.recording)
     arm = [landmark_index(f"{parameters['arm']}_{part}") for part in ("shoulder", "elbow", "wrist")]
     gone = [recording.start + round(second * recording.fps) for second in GONE_S]
     end = recording.start + recording.n_frames
@@ -111,10 +112,7 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
             pass
 
     holes = once(masks.with_name(f"masks-without-{parameters['arm']}-arm"), make)
-    poses = pose_recording(
-        recording, tracks, VOXEL_M, pose_preset("default"), int(rng.integers(2**31)), frontend=FRONTEND, masks=holes, key=MASKS_KEY,
-        on_problem=lambda line: None,
-    ).poses  # fmt: skip
+    poses = run_method(replace(seen, masks=holes), pose_method("apf"), FollowOptions(VOXEL_M, int(rng.integers(2**31)))).poses
     errors = np.linalg.norm(estimate_of(truth, poses)[:, arm[1:]] - truth.positions[:, arm[1:]], axis=-1).max(axis=1)
     return {"frames": truth.frames, "errors_m": errors, "gone": gone}
 

@@ -17,15 +17,16 @@ from hmc.camera.model import Rig
 from hmc.errors import InputError
 from hmc.experiments.engine.experiment import Parameters, Results
 from hmc.experiments.engine.inputs import Inputs
-from hmc.experiments.filter_runs import HEIGHT_M
-from hmc.experiments.pose_runs import estimate_of, first_truth, standing_state, synthetic_detections
+from hmc.experiments.pose_runs import synthetic_detections
+from hmc.experiments.truth import HEIGHT_M, estimate_of, first_truth, standing_state, stature_m, truth_track
 from hmc.io.detections import DetectionTable
 from hmc.io.recording import Recording
 from hmc.io.results import PoseTable
-from hmc.pose.methods.marker_apf import pose_from_markers, seen_in_frame
-from hmc.pose.steps.annealed import pose_init
-from hmc.pose.steps.marker_filter import MarkerPreset, make_marker_filter, marker_preset, marker_step
-from hmc.pose.views.markers import marker_views
+from hmc.pose.follow import FollowOptions, follow
+from hmc.pose.method import Capture, begin_tracking, make_subject
+from hmc.pose.methods.marker_apf import marker_method
+from hmc.pose.steps.marker_filter import MarkerPreset, marker_frame, marker_preset
+from hmc.pose.views.markers import marker_views, seen_in_frame
 from hmc.synthetic.marker_detector import SyntheticDetector
 
 __all__ = ["FAMILY", "QUICK_FRAMES", "cell"]
@@ -65,13 +66,12 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
         truth, estimate = truth.where(np.arange(1, len(truth.frames))), estimate[1:]
     else:
         estimate = np.full(truth.positions.shape, np.nan)
+        options = FollowOptions(seed=seed, height_m=stature_m(recording), detections=table)
         try:
-            frames, height = truth.frames.tolist(), _height_m(recording)
-            poses = pose_from_markers(
-                recording.rig, table, frames, recording.fps, preset, seed, height_m=height, skin=False, room=recording.room
-            ).poses
-            estimate = estimate_of(truth, poses)
-        except InputError as error:  # nothing to begin with: no pose at all, which is what such a detector is worth
+            people = follow(recording, truth_track(truth), marker_method(preset, skin=False), options)
+            estimate = estimate_of(truth, people.poses)
+            problem = "" if "fitted" in people.status else "; ".join(people.notes)
+        except InputError as error:  # so many false positives that they look like other people: such a detector is worth no pose
             problem = str(error)
     return {"frames": truth.frames, "fps": recording.fps, "estimate_m": estimate, "truth_m": truth.positions, "problem": problem}
 
@@ -80,20 +80,16 @@ def _from_the_truth(
     recording: Recording, truth: PoseTable, table: DetectionTable, preset: MarkerPreset, rng: np.random.Generator
 ) -> np.ndarray:
     """Landmarks of every frame, by the filter alone from the true pose of the first; (n, 15, 3), metres."""
-    height = _height_m(recording) or HEIGHT_M
+    height = stature_m(recording) or HEIGHT_M
     body = canton_body(height) if preset.body == "canton" else default_body(height)
-    filt, views = make_marker_filter(body, preset, recording.fps), marker_views(recording.rig)
+    subject, views = make_subject(body, Capture(recording.fps)), marker_views(recording.rig)
     state, _ = fit_landmarks(body, truth.positions[0], standing_state(body, truth.positions[0]))
-    pose, estimate = pose_init(state), [landmarks(body, state)]
+    pose, estimate = begin_tracking(subject, state), [landmarks(body, state)]
     for frame in truth.frames[1:].tolist():
         seen = seen_in_frame(recording.rig, views, table.in_frame(frame, recording.rig.names), preset.likelihood.gate_px)
-        pose, _ = marker_step(rng, filt, pose, seen)
+        pose, _ = marker_frame(rng, pose, seen, preset)
         estimate.append(landmarks(body, pose.state))
     return np.array(estimate)
-
-
-def _height_m(recording: Recording) -> float | None:
-    return float(recording.subject_height_m[0]) if recording.subject_height_m else None
 
 
 def _preset(parameters: Parameters) -> MarkerPreset:

@@ -6,7 +6,7 @@ Tracks and silhouettes are made once for all cells of a recording and its camera
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -14,49 +14,80 @@ import numpy as np
 from hmc.experiments.engine.experiment import Parameters, Plan, Results, Source
 from hmc.experiments.engine.inputs import Inputs, once, rendered
 from hmc.experiments.five_actions import ACTIONS, ACTORS, action_name
-from hmc.experiments.pose_runs import TRACK_VOXEL_M, VOXEL_M, estimate_of, first_truth
+from hmc.experiments.truth import estimate_of, first_truth
 from hmc.io.recording import Recording, open_recording
 from hmc.io.results import TrackTable, read_tracks, write_tracks
-from hmc.pose.person import FollowSettings
-from hmc.pose.sequence import pose_recording
+from hmc.pose.follow import FollowOptions, PosedPeople, RunOptions, follow
+from hmc.pose.method import PoseMethod
+from hmc.pose.methods.annealed import annealed_method
 from hmc.pose.steps.presets import PosePreset, pose_preset
 from hmc.pose.steps.refine import RefineSettings
 from hmc.tracking.resumable import track_recording
 from hmc.voxels.hulls import FrontendSettings, HullStep
 
 __all__ = [
-    "EVERYTHING", "FAMILY", "FRONTEND", "MASKS_KEY", "SWITCHES", "Way", "action_sources", "cell", "opened", "pose_results",
-    "tracked",
+    "EVERYTHING", "FAMILY", "FRONTEND", "MASKS_KEY", "SWITCHES", "TRACK_VOXEL_M", "VOXEL_M", "TrackedRecording", "Way",
+    "action_sources", "cell", "change_hulls", "opened", "pose_results", "run_method", "tracked",
 ]  # fmt: skip
 
 FAMILY = "markerless"
+#: Of poses, and of tracks, metres.
+VOXEL_M, TRACK_VOXEL_M = 0.03, 0.05
 #: One thread: workers share the cores.
 FRONTEND = FrontendSettings(threads=1)
 MASKS_KEY = "experiments"
 EVERYTHING = ""
-#: A preset, settings, and a change of every frame's hulls.
-Way = tuple[PosePreset, FollowSettings, Callable[[HullStep], HullStep]]
+#: Passes the frames of a run on, and may change their hulls.
+Progress = Callable[[Iterable, int], Iterable]
 
 
-def _same(step: HullStep) -> HullStep:
-    return step
+@dataclass(frozen=True)
+class TrackedRecording:
+    """A recording, the tracks of its people, and the file in which its silhouettes are kept under `MASKS_KEY`."""
+
+    recording: Recording
+    tracks: TrackTable
+    masks: Path
+
+
+@dataclass(frozen=True)
+class Way:
+    """One way to do it.
+
+    Parameters
+    ----------
+    method : PoseMethod
+    change : callable, optional
+        Changes every frame's hulls.
+    """
+
+    method: PoseMethod
+    change: Callable[[HullStep], HullStep] | None = None
 
 
 def _preset(**changes) -> Callable[[PosePreset], Way]:
-    return lambda preset: (replace(preset, **changes), FollowSettings(), _same)
+    return lambda preset: Way(annealed_method(replace(preset, **changes)))
 
 
-#: What can be switched off, and how: to a preset, settings and a change of every frame's hulls.
+def _method(**changes) -> Callable[[PosePreset], Way]:
+    return lambda preset: Way(replace(annealed_method(preset), **changes))
+
+
+def _hulls(change: Callable[[HullStep], HullStep]) -> Callable[[PosePreset], Way]:
+    return lambda preset: Way(annealed_method(preset), change)
+
+
+#: What can be switched off, and how: in a preset, in the method made of it, or in every frame's hulls.
 SWITCHES: dict[str, Callable[[PosePreset], Way]] = {
     EVERYTHING: _preset(),
     "silhouette rays": lambda preset: _preset(symmetric=replace(preset.symmetric, ray_share=0.0))(preset),
-    "tolerant hull": lambda preset: (preset, FollowSettings(), lambda step: replace(step, tolerant=step.strict, loose=step.strict)),
-    "strict hull": lambda preset: (preset, FollowSettings(), lambda step: replace(step, strict=step.tolerant, loose=step.tolerant)),
+    "tolerant hull": _hulls(lambda step: replace(step, tolerant=step.strict, loose=step.strict)),
+    "strict hull": _hulls(lambda step: replace(step, strict=step.tolerant, loose=step.tolerant)),
     "refinement": _preset(refine=RefineSettings(iterations=0)),
     "limb search": _preset(search=None),
     "body fit": _preset(fit_body=None),
     "several starts": _preset(start="neutral"),
-    "legs told apart": lambda preset: (preset, FollowSettings(legs=None), _same),
+    "legs told apart": _method(legs=None, choose=None),
 }
 
 
@@ -75,8 +106,8 @@ def opened(inputs: Inputs, label: str, cameras: int) -> Recording:
     return open_recording(folder, [names[k * len(names) // cameras] for k in range(cameras)])
 
 
-def tracked(inputs: Inputs, label: str, cameras: int) -> tuple[Recording, TrackTable, Path]:
-    """A recording with so many cameras, its tracks, and the file in which its silhouettes are kept under `MASKS_KEY`."""
+def tracked(inputs: Inputs, label: str, cameras: int) -> TrackedRecording:
+    """A recording with so many cameras (0: all), tracked once for all that ask for it."""
     recording = opened(inputs, label, cameras)
 
     def make(part: Path) -> None:
@@ -87,7 +118,7 @@ def tracked(inputs: Inputs, label: str, cameras: int) -> tuple[Recording, TrackT
         write_tracks(part / "tracks.csv", tracks)
 
     folder = once(inputs.folder / label / f"tracks-{len(recording.rig)}-cameras", make)
-    return recording, read_tracks(folder / "tracks.csv"), folder / "masks"
+    return TrackedRecording(recording, read_tracks(folder / "tracks.csv"), folder / "masks")
 
 
 def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Results:
@@ -101,28 +132,39 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
     rng : numpy.random.Generator
     """
     way = SWITCHES[parameters["without"]](pose_preset(parameters["preset"]))
-    return pose_results(tracked(inputs, parameters["recording"], parameters["cameras"]), way, rng)
+    seen = tracked(inputs, parameters["recording"], parameters["cameras"])
+    options = FollowOptions(VOXEL_M, int(rng.integers(2**31)))
+    return pose_results(seen.recording, run_method(seen, way.method, options, change_hulls(way.change)))
 
 
-def pose_results(seen: tuple[Recording, TrackTable, Path], way: Way, rng: np.random.Generator) -> Results:
-    """Estimate the first person's poses in one way; landmarks and truth, metres.
-
-    Parameters
-    ----------
-    seen : tuple
-        As from `tracked`.
-    way : Way
-    rng : numpy.random.Generator
-    """
-    recording, tracks, masks = seen
-    truth = first_truth(recording)
-    preset, settings, change = way
+def change_hulls(change: Callable[[HullStep], HullStep] | None) -> Progress | None:
+    """What changes every frame's hulls, as a run's `progress`."""
+    if change is None:
+        return None
 
     def changed(steps: Iterable[HullStep], total: int) -> Iterator[HullStep]:
         return map(change, steps)
 
-    poses = pose_recording(
-        recording, tracks, VOXEL_M, preset, int(rng.integers(2**31)), settings=settings, frontend=FRONTEND, masks=masks, key=MASKS_KEY,
-        on_problem=lambda line: None, progress=changed,
-    ).poses  # fmt: skip
-    return {"frames": truth.frames, "fps": recording.fps, "estimate_m": estimate_of(truth, poses), "truth_m": truth.positions}
+    return changed
+
+
+def run_method(seen: TrackedRecording, method: PoseMethod, options: FollowOptions, progress: Progress | None = None) -> PosedPeople:
+    """Everybody's poses in a tracked recording by any method.
+
+    Parameters
+    ----------
+    seen : TrackedRecording
+    method : PoseMethod
+        As from `hmc.pose.registry.pose_method`, or a change of one.
+    options : FollowOptions
+    progress : callable, optional
+        ``progress(steps, total)`` passes the frames on.
+    """
+    run = RunOptions(FRONTEND, masks=seen.masks, key=MASKS_KEY, on_problem=lambda line: None, progress=progress)
+    return follow(seen.recording, seen.tracks, method, options, run)
+
+
+def pose_results(recording: Recording, people: PosedPeople) -> Results:
+    """Estimated landmarks of the first person and true ones, metres."""
+    truth = first_truth(recording)
+    return {"frames": truth.frames, "fps": recording.fps, "estimate_m": estimate_of(truth, people.poses), "truth_m": truth.positions}

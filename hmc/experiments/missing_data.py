@@ -14,7 +14,7 @@ import numpy as np
 from hmc.experiments import scalable_runs as runs
 from hmc.experiments.by_action import pose_scores
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
-from hmc.experiments.pose_runs import estimates
+from hmc.experiments.truth import estimates
 
 __all__ = ["EXPERIMENT"]
 

@@ -6,7 +6,7 @@ walk on: no camera has silhouettes then. Smoothing is applied to the estimates o
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -18,12 +18,14 @@ from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameter
 from hmc.experiments.engine.inputs import Inputs, rendered
 from hmc.experiments.engine.style import COLOURS
 from hmc.experiments.five_actions import LONG_SUFFIX, action_name, action_title
-from hmc.experiments.markerless_runs import Way, action_sources, pose_results, tracked
-from hmc.experiments.pose_runs import estimates
+from hmc.experiments.markerless_runs import VOXEL_M, action_sources, change_hulls, pose_results, run_method, tracked
+from hmc.experiments.truth import estimates
 from hmc.metrics.landmarks import landmark_errors
-from hmc.pose.person import FollowSettings
+from hmc.pose.follow import FollowOptions
+from hmc.pose.method import PoseMethod
+from hmc.pose.methods.annealed import annealed_method
 from hmc.pose.smoothing import smooth_landmarks
-from hmc.pose.steps.presets import PosePreset, pose_preset
+from hmc.pose.steps.presets import pose_preset
 from hmc.voxels.hulls import HullStep
 
 __all__ = ["EXPERIMENT", "hidden", "jitter_mm"]
@@ -43,21 +45,17 @@ WINDOWS_S = (0.0, 0.2, 0.3, 0.5, 0.7)
 DEFAULT, NO_RECOVERY = "default", "without recovery"
 
 
-def _same(step: HullStep) -> HullStep:
-    return step
-
-
-def _preset(**changes) -> Callable[[PosePreset], tuple[PosePreset, FollowSettings]]:
-    return lambda preset: (replace(preset, **changes), FollowSettings())
+def _preset(**changes) -> PoseMethod:
+    return annealed_method(replace(pose_preset("default"), **changes))
 
 
 #: What is in place of what `default` has.
-WAYS: dict[str, Callable[[PosePreset], tuple[PosePreset, FollowSettings]]] = {
+WAYS: dict[str, PoseMethod] = {
     DEFAULT: _preset(),
     "motion: smooth": _preset(motion="smooth"),
     "motion: none": _preset(motion="none"),
     "start: spectral": _preset(start="spectral"),
-    NO_RECOVERY: lambda preset: (preset, FollowSettings(loss=None)),
+    NO_RECOVERY: replace(_preset(), recover=None),
 }
 
 
@@ -97,9 +95,11 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
     rng : numpy.random.Generator
     """
     seen = tracked(inputs, parameters["recording"], parameters["cameras"])
-    gone = [seen[0].start + round(second * seen[0].fps) for second in parameters["gone_s"]]
-    way: Way = (*WAYS[parameters["way"]](pose_preset("default")), (lambda step: hidden(step, *gone)) if gone else _same)
-    return pose_results(seen, way, rng) | {"gone": gone}
+    recording = seen.recording
+    gone = [recording.start + round(second * recording.fps) for second in parameters["gone_s"]]
+    change = change_hulls(lambda step: hidden(step, *gone)) if gone else None
+    people = run_method(seen, WAYS[parameters["way"]], FollowOptions(VOXEL_M, int(rng.integers(2**31))), change)
+    return pose_results(recording, people) | {"gone": gone}
 
 
 def jitter_mm(errors: np.ndarray) -> float:

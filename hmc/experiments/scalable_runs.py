@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,13 +20,11 @@ from hmc.experiments.engine.experiment import Cell, Parameters, Plan, Results
 from hmc.experiments.engine.inputs import Inputs
 from hmc.experiments.filter_grids import QUICK_FRAMES
 from hmc.experiments.filter_runs import ANNEALING, filter_preset, follow_from_truth
-from hmc.experiments.markerless_runs import FRONTEND, MASKS_KEY, action_sources, tracked
-from hmc.experiments.pose_runs import VOXEL_M, estimate_of, first_truth
+from hmc.experiments.markerless_runs import VOXEL_M, TrackedRecording, action_sources, pose_results, run_method, tracked
 from hmc.experiments.removal import remover
-from hmc.io.recording import Recording
-from hmc.io.results import PoseTable, TrackTable
+from hmc.pose.follow import FollowOptions
 from hmc.pose.methods.scalable import method_preset
-from hmc.pose.sequence import pose_recording
+from hmc.pose.registry import pose_method
 from hmc.pose.steps.presets import PosePreset, pose_preset
 from hmc.search.structural import StructuralSettings
 
@@ -104,21 +101,18 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
     if parameters["method"] == MARKERS:
         return marker_runs.cell(dict(parameters) | _MARKERS, inputs, rng)
     if parameters["method"] in CHAINS:
-        recording, tracks, masks = tracked(inputs, parameters["recording"], parameters["cameras"])
-        truth = first_truth(recording)
-        name, models = METHODS[CHAINS[parameters["method"]]]
-        return chain(recording, tracks, masks, truth, method_preset(pose_preset("default"), name, models), int(rng.integers(2**31)))
+        seen = tracked(inputs, parameters["recording"], parameters["cameras"])
+        return chain(seen, CHAINS[parameters["method"]], rng)
     # What is removed must not depend on the method.
     change = remover(parameters["removed"], parameters["removed_percent"] / 100, parameters["repeat"]) if parameters["removed"] else None
     return follow_from_truth(run_preset(parameters), parameters, inputs, rng, change)
 
 
-def chain(recording: Recording, tracks: TrackTable, masks: Path, truth: PoseTable, preset: PosePreset, seed: int) -> Results:
-    """Poses of the first person from videos alone; landmarks and truth, metres."""
-    poses = pose_recording(
-        recording, tracks, VOXEL_M, preset, seed, frontend=FRONTEND, masks=masks, key=MASKS_KEY, on_problem=lambda line: None
-    ).poses
-    return {"frames": truth.frames, "fps": recording.fps, "estimate_m": estimate_of(truth, poses), "truth_m": truth.positions}
+def chain(seen: TrackedRecording, method: str, rng: np.random.Generator) -> Results:
+    """Poses of the first person from videos alone by the preset `default` of one of `METHODS`; landmarks and truth, metres."""
+    name, models = METHODS[method]
+    people = run_method(seen, pose_method(name, models=models), FollowOptions(VOXEL_M, int(rng.integers(2**31))))
+    return pose_results(seen.recording, people)
 
 
 def method_grid(

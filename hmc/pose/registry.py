@@ -15,11 +15,12 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from hmc.errors import InputError
+from hmc.plugins import load_plugins
 
 if TYPE_CHECKING:
     from hmc.pose.method import PoseMethod
 
-__all__ = ["INITS", "METHODS", "MethodChoice", "MethodEntry", "pose_method", "register"]
+__all__ = ["BUILT_IN", "INITS", "METHODS", "MethodChoice", "MethodEntry", "pose_method", "register"]
 
 #: Where a start takes its candidates from.
 INITS = ("hypotheses", "spectral")
@@ -84,6 +85,7 @@ def pose_method(name: str, preset: str = "default", models: Sequence[str] = (), 
     InputError
         When there is no such method or preset, or the method has no use for what is said.
     """
+    load_plugins()
     if name not in METHODS:
         raise InputError(f"no pose method named {name!r}; there are {', '.join(METHODS)}")
     entry = METHODS[name]
@@ -165,3 +167,5 @@ METHODS: dict[str, MethodEntry] = {
         MethodEntry("marker-apf", "annealed particle filter on markers", ("default", "canton2009"), _markers, needs_tracks=False),
     )
 }
+#: Of these, the ones that come with the package.
+BUILT_IN = frozenset(METHODS)

@@ -8,6 +8,7 @@
 from __future__ import annotations
 
 from hmc.errors import InputError
+from hmc.plugins import load_plugins
 from hmc.tracking import naive, particle, sparse
 from hmc.tracking.method import Tracker, TrackerMethod
 
@@ -52,6 +53,7 @@ def make_tracker(name: str = DEFAULT, *, color: bool | None = None, particles: i
     InputError
         When there is no such tracker or preset, or when it has no use for colors or particles.
     """
+    load_plugins()
     if name not in TRACKERS:
         raise InputError(f"there is no tracker `{name}`; choose one of {', '.join(TRACKERS)}")
     method = TRACKERS[name]

@@ -17,7 +17,7 @@ from hmc.experiments.engine.experiment import Cell
 from hmc.experiments.engine.inputs import rendered
 from hmc.experiments.engine.style import house_style
 from hmc.experiments.five_actions import ACTIONS, ACTORS, action_name, action_recipes, action_title
-from hmc.experiments.pose_runs import estimate_of, first_truth, standing_state
+from hmc.experiments.truth import estimate_of, first_truth, standing_state
 from hmc.io.results import PoseTable
 from hmc.pose.steps.presets import pose_preset
 
