@@ -239,6 +239,15 @@ def test_tracks_that_do_badly_for_long_die(bad, good):
     assert judge_track(track, bad, [], 10.0, limits) is None
 
 
+def test_the_younger_of_two_tracks_in_one_place_ends():
+    limits = LifecycleSettings(same_place_s=0.5)
+    older, younger = (Track(k, np.array([0.1 * k, 0, 0.9]), np.zeros(3), np.zeros(3), 0.08, 0, 10) for k in range(2))
+    for _ in range(5):
+        younger = judge_track(younger, TrackVerdict(like_person=True), [older], 10.0, limits)
+    assert judge_track(younger, TrackVerdict(like_person=True), [], 10.0, limits).crowded == 0  # apart again
+    assert judge_track(younger, TrackVerdict(like_person=True), [older], 10.0, limits) is None
+
+
 def test_table_of_a_recording(recording_folder):
     with pytest.raises(InputError, match=r"centroids\.csv: there is no such file"):
         feature_table(open_recording(recording_folder))

@@ -8,12 +8,14 @@ from test_tracking_naive import FPS, GRID, box, follow, line, nothing, person
 
 from hmc.tracking.blobs import observe
 from hmc.tracking.following import advance, init
+from hmc.tracking.rules.gating import associate_voxels
+from hmc.tracking.rules.pushed_objects import release_pushed_objects
 from hmc.tracking.rules.static_objects import learn_static, without_static
 from hmc.tracking.settings import FollowingSettings, LifecycleSettings
-from hmc.tracking.state import PersonMemory, StaticObjects, TrackRow
+from hmc.tracking.state import PersonMemory, StaticObjects, Track, TrackerState, TrackRow
 from hmc.tracking.trackers import make_tracker
 from hmc.tracking.tracks import run
-from hmc.tracking.update import FilterEstimate
+from hmc.tracking.update import FilterEstimate, begin_update
 
 CHAIR = box((-0.3, -0.25, 0), (0.25, 0.25, 0.8))
 
@@ -170,3 +172,18 @@ def test_a_chair_beside_somebody_who_stands_is_known_though_their_centroid_is_ne
     legs = observe(GRID, box((-0.3, -0.15, 0), (0.3, 0.15, 0.9)) | box((-0.9, -0.1, 1.2), (0.9, 0.1, 1.4)))
     assert len(learnt(legs, [(0, 0, 1.6)], 20).voxels) == np.count_nonzero(np.abs(legs.points[:, 0]) > 0.5)  # arms held out for 2 s
     assert len(learnt(chair, [(0.1, 0, 0.9)], 20).voxels) < len(chair.points)  # the feet of somebody who sits
+
+
+def test_what_somebody_who_stands_pushes_is_released_and_their_own_voxels_are_not():
+    pushed = box((0.25, -0.3, 0), (1.1, 0.3, 0.8))
+    observation = observe(GRID, person(0, 0) | pushed)
+    track = Track(0, np.array([0, 0, 0.87]), np.array([0, 0, 1.65]), np.zeros(3), 0.1, 0, 0)
+    update = begin_update(TrackerState(FPS, (track,)), 1, observation, None)
+    for rule in (associate_voxels, release_pushed_objects):
+        update = rule(update, FollowingSettings())
+    far = observation.points[:, 0] > 0.6
+    assert (update.owners[far] == -1).all() and (update.owners[observation.points[:, 0] < 0.25] == 0).all()
+    assert (update.claimed[update.pushed >= 0] == 0).all() and (update.pushed >= 0).sum() > 100
+    low = replace(update, observation=observe(GRID, box((-0.3, -0.25, 0), (1.1, 0.25, 0.8))))  # nobody stands here: nothing is released
+    low = release_pushed_objects(replace(low, owners=np.zeros(len(low.observation.points), int)), FollowingSettings())
+    assert (low.owners == 0).all()
