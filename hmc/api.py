@@ -292,8 +292,9 @@ def view(found: PosedPeople | TrackTable, recording: Recording, out: str | Path,
     from hmc.view.mosaic import Result
     from hmc.view.write import write_view
 
-    result = Result(tracks=found) if isinstance(found, TrackTable) else None
-    if result is None:
+    if isinstance(found, TrackTable):
+        result = Result(tracks=found)
+    else:
         dimensions = {person: {name: float(value) for name, value in body.items()} for person, body in found.states.bodies.items()}
         result = Result(found.poses, None, found.states, {person: make_body(one) for person, one in dimensions.items()})
     write_view(out, recording, result, frames)

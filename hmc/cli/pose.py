@@ -158,7 +158,7 @@ def run(args: argparse.Namespace) -> int:
     write_joints(paths["joints.csv"], people.poses)
     write_pose(paths["pose.npz"], people.states)
     if any(people.details):
-        write_fits(args.out / "fits.csv", people.frames, people.persons, people.status, people.details)
+        write_fits(args.out / "fits.csv", people.frames.tolist(), people.persons.tolist(), people.status, people.details)
     write_run(paths["run.toml"], args.method, parameters, args.seed, **source, problems=list(dict.fromkeys(problems)))
     for name in (JOURNAL, POSE_JOURNAL, MARKERS_JOURNAL, MASKS):
         for file in args.out.glob(f"{name}*"):

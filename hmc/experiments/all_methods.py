@@ -57,15 +57,19 @@ def title(parameters: Parameters) -> str:
 
 
 def grid(plan: Plan) -> list[dict]:
-    """Every method with every seed on every action, by both actors (quick: by the actors in turn)."""
+    """Every method with every seed on every action, by both actors (quick: by the actors in turn).
+
+    Seed after seed, so that a run that is stopped holds all methods.
+    """
     sources = action_sources(plan)
     if not plan.recordings and plan.quick:
         sources = [source for k, source in enumerate(sources) if k % 4 in (0, 3)]
     return [
         {"recording": source.label, "method": name, "preset": preset, "repeat": repeat} | _version_of(name)
+        for repeat in range(SEEDS[plan.quick])
         for name, preset in ways()
+        if repeat < PAPER_SEEDS or preset == DEFAULT
         for source in sources
-        for repeat in range(SEEDS[plan.quick] if preset == DEFAULT else PAPER_SEEDS)
     ]
 
 

@@ -265,4 +265,5 @@ def taken_up(task: PoseTask, state: PersonState, decided: Decided) -> PersonStat
     if decided.body is None:
         return replace(state, done_to=done_to)
     tracked = decided.tracked
-    return PersonState(tracked and tracked.subject, tracked, context=_context(task, state.context, decided), done_to=done_to)
+    subject = None if tracked is None else tracked.subject
+    return PersonState(subject, tracked, context=_context(task, state.context, decided), done_to=done_to)

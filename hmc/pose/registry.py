@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal, cast, get_args
 
 from hmc.errors import InputError
 from hmc.plugins import load_plugins
@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 __all__ = ["BUILT_IN", "INITS", "METHODS", "MethodChoice", "MethodEntry", "pose_method", "register"]
 
 #: Where a start takes its candidates from.
-INITS = ("hypotheses", "spectral")
+Init = Literal["hypotheses", "spectral"]
+INITS = get_args(Init)
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,7 @@ class MethodChoice:
 
     preset: str = "default"
     models: Sequence[str] = ()
-    init: str | None = None
+    init: Init | None = None
     skin: bool = True
 
 
@@ -95,7 +96,7 @@ def pose_method(name: str, preset: str = "default", models: Sequence[str] = (), 
         raise InputError(f"--model {models[0]}: method {name} has no use for a scalable model; shbm-apf, ddm-apf and shbm-ddm-apf have")
     if init is not None and init not in INITS:
         raise InputError(f"--init {init}: use one of {', '.join(INITS)}")
-    return entry.make(MethodChoice(preset, models, init, skin))
+    return entry.make(MethodChoice(preset, models, cast("Init | None", init), skin))
 
 
 def register(method: PoseMethod, help: str = "") -> None:

@@ -77,18 +77,18 @@ class ReadingStart:
                 continue
             # At the start, the feet of the whole window say which way the person faces.
             opening = replace(opening, feet=feet)
-            state, info = swarm_step(frame_rng(k), model, None, opening, capture.fps, views[k].velocity, self.preset.swarm)
-            if state is not None:
-                found.append((info.cost_m, k, state))
+            swarm, info = swarm_step(frame_rng(k), model, None, opening, capture.fps, views[k].velocity, self.preset.swarm)
+            if swarm is not None:
+                found.append((info.cost_m, k, swarm))
         if not found:
             return None
-        _, anchor, swarm = min(found, key=lambda one: one[0])
+        _, anchor, best = min(found, key=lambda one: one[0])
         start = neutral_state("down", body.limits)
-        points = skeleton_landmarks(model, swarm.state)
+        points = skeleton_landmarks(model, best.state)
         across = points[9] - points[12] + points[3] - points[6]
         start[:3], start[3] = points[0], np.arctan2(-across[0], across[1])
         state, _ = fit_landmarks(body, points, start)
-        return Started(swarm_subject(body, capture, self.preset), anchor, state, swarm_memory(swarm))
+        return Started(swarm_subject(body, capture, self.preset), anchor, state, swarm_memory(best))
 
 
 def pso_method(preset: SwarmPreset, house: PosePreset | None = None) -> PoseMethod:

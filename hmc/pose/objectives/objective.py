@@ -135,7 +135,8 @@ class Sum:
     def by_part(self, states: np.ndarray) -> np.ndarray | None:
         """The sum, shape (n, n_parts); None where one of them cannot tell."""
         shares = [one.by_part(states) for one in self.parts]
-        return None if any(share is None for share in shares) else np.sum(shares, axis=0)
+        told = [share for share in shares if share is not None]
+        return np.sum(told, axis=0) if len(told) == len(shares) else None
 
     def linearise(self, state: np.ndarray, near: Any = None) -> Linearised:
         """The residuals of all, one after the other."""

@@ -1,18 +1,21 @@
-"""Local least-squares refinement of a pose: Gauss-Newton steps with damping on an objective's residuals."""
+"""Local least-squares refinement of a pose: damped Gauss-Newton steps (`hmc.search.gauss_newton`) on an objective's residuals."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TypeAlias
 
 import numpy as np
 
 from hmc.body.joints import N_DOF
 from hmc.body.kinematics import landmarks
 from hmc.pose.objectives.objective import Linearised, Objective, Unexplained
+from hmc.search.gauss_newton import GaussNewtonSettings, GaussNewtonState, LeastSquares, gauss_newton_init, gauss_newton_run
 
 __all__ = ["RefineInfo", "RefineSettings", "refine", "refine_all", "refine_best"]
+
+_Trial: TypeAlias = GaussNewtonState[Linearised]
 
 
 @dataclass(frozen=True)
@@ -58,31 +61,6 @@ class RefineInfo:
     unexplained: Unexplained | None
 
 
-@dataclass(frozen=True)
-class _Problem:
-    """What stays the same while a pose descends; `free` and the weights of the hold have shape (27,)."""
-
-    objective: Objective
-    settings: RefineSettings
-    free: np.ndarray
-    hold: np.ndarray
-
-
-@dataclass(frozen=True)
-class _Descent:
-    """How far a pose has come: its distances and costs, the damping of the next step, and what is to be told in the end."""
-
-    state: np.ndarray
-    anchor: np.ndarray
-    found: Linearised
-    cost: float
-    first: float
-    evaluations: int = 1
-    accepted: int = 0
-    damping: float = 1e-2
-    is_done: bool = False
-
-
 def refine(
     objective: Objective,
     state: np.ndarray,
@@ -112,8 +90,8 @@ def refine(
         Within the body's joint limits.
     info : RefineInfo
     """
-    problem = _problem(objective, settings, free, deviation)
-    return _outcome(_descend(problem, _begin(problem, state, anchor), settings.iterations))
+    problem, steps = _problem(objective, settings, free, deviation), _steps(settings)
+    return _outcome(gauss_newton_run(problem, gauss_newton_init(problem, state, steps, anchor), steps))
 
 
 def refine_best(
@@ -144,15 +122,15 @@ def refine_best(
     info : RefineInfo
         Of the best, with the evaluations of all.
     """
-    problem = _problem(objective, settings)
-    trials: list[_Descent] = []
+    problem, steps = _problem(objective, settings), _steps(settings)
+    trials: list[_Trial] = []
     for start in starts:
-        begun = _begin(problem, start, anchor, trials[-1].found.near if trials else None)
-        trials.append(_descend(problem, begun, trial_steps))
+        begun = gauss_newton_init(problem, start, steps, anchor, trials[-1].found.near if trials else None)
+        trials.append(gauss_newton_run(problem, begun, steps, trial_steps))
     best = min(trials, key=lambda trial: trial.cost)
     before = sum(trial.evaluations for trial in trials) - best.evaluations
-    if is_hopeless is None or not is_hopeless(best.state, best.cost):
-        best = _descend(problem, best, settings.iterations)
+    if is_hopeless is None or not is_hopeless(best.x, best.cost):
+        best = gauss_newton_run(problem, best, steps)
     state, info = _outcome(best)
     return state, replace(info, evaluations=info.evaluations + before)
 
@@ -182,80 +160,35 @@ def refine_all(
     list of tuple
         As from `refine`, start by start.
     """
-    problem = _problem(objective, settings)
-    ended: list[_Descent] = []
+    problem, steps = _problem(objective, settings), _steps(settings)
+    ended: list[_Trial] = []
     places: list[np.ndarray] = []
     for start in starts:
-        trial = _descend(problem, _begin(problem, start, anchor, ended[-1].found.near if ended else None), trial_steps)
-        here = landmarks(objective.body, trial.state)
+        begun = gauss_newton_init(problem, start, steps, anchor, ended[-1].found.near if ended else None)
+        trial = gauss_newton_run(problem, begun, steps, trial_steps)
+        here = landmarks(objective.body, trial.x)
         if all(np.linalg.norm(here - there, axis=1).max() > same_m for there in places):
-            trial = _descend(problem, trial, settings.iterations)
-            here = landmarks(objective.body, trial.state)
+            trial = gauss_newton_run(problem, trial, steps)
+            here = landmarks(objective.body, trial.x)
         ended.append(trial)
         places.append(here)
     return [_outcome(trial) for trial in ended]
 
 
-def _problem(objective: Objective, settings: RefineSettings, free=None, deviation=None) -> _Problem:
+def _problem(
+    objective: Objective, settings: RefineSettings, free: np.ndarray | None = None, deviation: np.ndarray | None = None
+) -> LeastSquares[Linearised]:
     """All angles free, and held by .1 m and .5 rad, where nothing else is said."""
-    free = np.ones(N_DOF, bool) if free is None else free
     deviation = np.r_[np.full(3, 0.1), np.full(N_DOF - 3, 0.5)] if deviation is None else deviation
-    return _Problem(objective, settings, free, settings.stay_weight / deviation**2)
+    limits = objective.body.limits
+    return LeastSquares(objective.linearise, limits.low, limits.high, settings.stay_weight / deviation**2, free)
 
 
-def _outcome(descent: _Descent) -> tuple[np.ndarray, RefineInfo]:
-    found = descent.found
+def _steps(settings: RefineSettings) -> GaussNewtonSettings:
+    return GaussNewtonSettings(settings.iterations, tolerance=settings.tolerance)
+
+
+def _outcome(trial: _Trial) -> tuple[np.ndarray, RefineInfo]:
+    found = trial.found
     cost = float(found.residuals @ found.residuals)
-    return descent.state, RefineInfo(descent.first, descent.cost, cost, descent.evaluations, found.unexplained)
-
-
-def _begin(problem: _Problem, state: np.ndarray, anchor: np.ndarray | None, near: Any = None) -> _Descent:
-    state = np.clip(state, problem.objective.body.limits.low, problem.objective.body.limits.high)
-    anchor = state if anchor is None else anchor
-    found, cost = _evaluate(problem, state, anchor, near)
-    return _Descent(state, anchor, found, cost, cost)
-
-
-def _evaluate(problem: _Problem, state: np.ndarray, anchor: np.ndarray, near: Any = None) -> tuple[Linearised, float]:
-    found = problem.objective.linearise(state, near)
-    return found, float(found.residuals @ found.residuals + problem.hold @ (state - anchor) ** 2)
-
-
-def _descend(problem: _Problem, descent: _Descent, accepted: int) -> _Descent:
-    """Go on until so many steps were accepted, or nothing is to be gained."""
-    low, high, hold = problem.objective.body.limits.low, problem.objective.body.limits.high, problem.hold
-    improved = True
-    while descent.accepted < accepted and not descent.is_done:
-        state, found = descent.state, descent.found
-        if improved:
-            pulled, jacobian = found.pulls()
-            gradient = jacobian.T @ found.residuals[pulled] + hold * (state - descent.anchor)
-            normal = jacobian.T @ jacobian + np.diag(hold)
-            # An angle at its limit that wants further out takes no part in this step.
-            stuck = ((state <= low) & (gradient > 0)) | ((state >= high) & (gradient < 0)) | ~problem.free
-            active = np.flatnonzero(~stuck)
-            normal = normal[np.ix_(active, active)]
-        matrix = normal + descent.damping * np.diag(np.diag(normal) + 1e-9)
-        step = np.zeros(N_DOF)
-        step[active] = -np.linalg.solve(matrix, gradient[active])
-        promised = -step[active] @ (2 * gradient[active] + normal @ step[active])
-        if promised < problem.settings.tolerance * descent.cost:
-            return replace(descent, is_done=True)
-        trial = np.clip(state + np.clip(step, -0.5, 0.5), low, high)
-        trial_found, trial_cost = _evaluate(problem, trial, descent.anchor, found.near)
-        improved = trial_cost < descent.cost
-        descent = replace(descent, evaluations=descent.evaluations + 1)
-        if improved:
-            gain = (descent.cost - trial_cost) / max(descent.cost, 1e-12)
-            descent = replace(
-                descent,
-                state=trial,
-                found=trial_found,
-                cost=trial_cost,
-                damping=max(descent.damping * 0.3, 1e-4),
-                accepted=descent.accepted + 1,
-                is_done=gain < problem.settings.tolerance,
-            )
-        else:
-            descent = replace(descent, damping=max(descent.damping * 10, 1e-2))
-    return descent
+    return trial.x, RefineInfo(trial.first_cost, trial.cost, cost, trial.evaluations, found.unexplained)
