@@ -57,7 +57,9 @@ def figures(root: Path) -> dict[str, str]:
         rooms[names[0]] += code_lines(text)
         wide += [f"{'.'.join(names)}.{name}" for name in wide_functions(text)]
     total = sum(rooms.values())
-    everything = sum(code_lines(path.read_text(encoding="utf-8")) for folder in ("tests", "benchmarks") for path in (root / folder).rglob("*.py"))
+    everything = sum(
+        code_lines(path.read_text(encoding="utf-8")) for folder in ("tests", "benchmarks") for path in (root / folder).rglob("*.py")
+    )
     name, size = rooms.most_common(1)[0]
     shown = {f"code lines, {room}": f"{lines:,}" for room, lines in rooms.most_common(10)}
     return shown | {

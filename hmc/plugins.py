@@ -6,6 +6,7 @@ started is told them (`add_plugins`). The lookups of methods and trackers by nam
 
 from __future__ import annotations
 
+import hashlib
 import importlib.util
 import os
 import sys
@@ -14,7 +15,7 @@ from pathlib import Path
 
 from hmc.errors import InputError
 
-__all__ = ["VARIABLE", "add_plugins", "load_plugins", "plugin_files"]
+__all__ = ["VARIABLE", "add_plugins", "load_plugins", "plugin_files", "plugins_version"]
 
 #: Of the environment: files, as in PATH.
 VARIABLE = "HMC_PLUGINS"
@@ -45,6 +46,12 @@ def add_plugins(files: Iterable[str | Path]) -> None:
         _load(path)
     if new:
         os.environ[VARIABLE] = os.pathsep.join(known + new)
+
+
+def plugins_version() -> str:
+    """A digest of the files' text, by which results know whether these have changed; empty where there are none."""
+    files = plugin_files()
+    return hashlib.sha256("\0".join(Path(path).read_text(encoding="utf-8") for path in files).encode()).hexdigest()[:16] if files else ""
 
 
 def load_plugins() -> None:

@@ -9,8 +9,10 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 __all__ = [
+    "add_plugin_option",
     "add_selection_options",
     "camera_names",
+    "load_given_plugins",
     "open_selected",
     "positive_float",
     "print_problems",
@@ -32,6 +34,22 @@ def add_selection_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--frames", type=whole_number, default=None, metavar="N", help="how many frames (default: all)")
     parser.add_argument("--cameras", type=camera_names, default=None, metavar="A,B,...", help="use these cameras only (default: all)")
     parser.add_argument("--quiet", action="store_true", help="no progress bar")
+
+
+def add_plugin_option(parser: argparse.ArgumentParser) -> None:
+    """Add ``--plugin``."""
+    parser.add_argument(
+        "--plugin", type=Path, action="append", default=[], metavar="FILE.py", help="a file that registers methods or trackers of your own"
+    )
+
+
+def load_given_plugins(args: argparse.Namespace) -> dict[str, str]:
+    """Run the files of ``--plugin``; what the parameters of a result say of them: nothing where there are none."""
+    from hmc.plugins import add_plugins, plugins_version
+
+    add_plugins(args.plugin)
+    version = plugins_version()
+    return {"plugins": version} if version else {}
 
 
 def open_selected(args: argparse.Namespace):

@@ -7,7 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from hmc.cli.common import (
+    add_plugin_option,
     add_selection_options,
+    load_given_plugins,
     open_selected,
     positive_float,
     print_problems,
@@ -43,8 +45,12 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     add_selection_options(parser)
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the result")
     parser.add_argument(
-        "--method", choices=tuple(METHODS), default="apf", help="; ".join(f"{entry.name}: {entry.help}" for entry in METHODS.values())
+        "--method",
+        default="apf",
+        metavar="NAME",
+        help="; ".join(f"{entry.name}: {entry.help}" for entry in METHODS.values()) + "; or one of --plugin",
     )
+    add_plugin_option(parser)
     parser.add_argument(
         "--model",
         action="append",
@@ -97,6 +103,7 @@ def run(args: argparse.Namespace) -> int:
     from hmc.tracking.resumable import person_grid
     from hmc.voxels.hulls import FrontendSettings
 
+    plugins = load_given_plugins(args)
     method = pose_method(args.method, args.preset, args.model, args.init, args.markers == "skin")
     recording = open_selected(args)
     if args.out.is_file():
@@ -115,7 +122,7 @@ def run(args: argparse.Namespace) -> int:
         "recovery": getattr(method.recover, "settings", None),
         "legs": method.legs,
         "smooth_s": args.smooth or 0.0,
-    }
+    } | plugins
     if tracked:
         person_grid(recording, args.voxel)  # voxels that will not do are refused before any work is done
         tracker = selected_tracker(args)

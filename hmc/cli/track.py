@@ -7,7 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from hmc.cli.common import (
+    add_plugin_option,
     add_selection_options,
+    load_given_plugins,
     open_selected,
     positive_float,
     print_problems,
@@ -35,6 +37,7 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     add_selection_options(parser)
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the result")
     add_tracker_options(parser)
+    add_plugin_option(parser)
     parser.add_argument("--voxel", type=positive_float, default=0.04, metavar="M", help="side of a voxel, metres (default: 0.04)")
     parser.add_argument("--seed", type=whole_number, default=0, metavar="N", help="seed of the random numbers (default: 0)")
     return parser
@@ -83,7 +86,7 @@ def run(args: argparse.Namespace) -> int:
     from hmc.tracking.resumable import Timing, track_recording
     from hmc.voxels.hulls import FrontendSettings
 
-    recording = open_selected(args)
+    plugins, recording = load_given_plugins(args), open_selected(args)
     tracker, frontend = selected_tracker(args), FrontendSettings()
     tracks_path, run_path, journal = args.out / "tracks.csv", args.out / "run.toml", args.out / JOURNAL
     if args.out.is_file():
@@ -99,7 +102,7 @@ def run(args: argparse.Namespace) -> int:
         "fps": recording.fps,
         "tracker": tracker.settings,
         "frontend": frontend,
-    }
+    } | plugins
     source = recording_source(recording)
     depends_on = {"method": tracker.name, "seed": args.seed, **source, "parameters": parameters}
     key = to_toml(depends_on)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Iterator, Sequence
-from pathlib import Path
 from typing import Any
 
 import matplotlib.pyplot as plt
@@ -18,12 +17,11 @@ import numpy as np
 from hmc.experiments.by_action import pose_scores
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs
-from hmc.experiments.engine.store import digest
 from hmc.experiments.engine.style import COLOURS
 from hmc.experiments.five_actions import action_title
 from hmc.experiments.markerless_runs import VOXEL_M, action_sources, pose_results, run_method, tracked
 from hmc.experiments.truth import stature_m
-from hmc.plugins import load_plugins, plugin_files
+from hmc.plugins import load_plugins, plugins_version
 from hmc.pose.follow import FollowOptions
 from hmc.pose.method import PoseMethod
 from hmc.pose.registry import BUILT_IN, METHODS, pose_method
@@ -75,7 +73,7 @@ def grid(plan: Plan) -> list[dict]:
 
 def _version_of(name: str) -> dict[str, str]:
     """Of a stranger's method, a digest of the files that it may be in: after a change it is computed again."""
-    return {} if name in BUILT_IN else {"plugins": digest([Path(path).read_text(encoding="utf-8") for path in plugin_files()], 8)}
+    return {} if name in BUILT_IN else {"plugins": plugins_version()}
 
 
 def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Results:

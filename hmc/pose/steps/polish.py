@@ -5,7 +5,7 @@ The cost and the search are ours (`hmc.pose.objectives.symmetric`, `hmc.pose.ste
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -20,7 +20,7 @@ from hmc.pose.views.hull_target import HullTarget
 from hmc.pose.views.person_view import PersonView
 from hmc.pose.views.rays import points_to_explain
 
-__all__ = ["PolishSettings", "fine_objective", "polish", "polished"]
+__all__ = ["MakeObjective", "PolishSettings", "fine_objective", "polish", "polished"]
 
 
 @dataclass(frozen=True)
@@ -47,6 +47,10 @@ def fine_objective(rng: np.random.Generator, subject: Subject, target: HullTarge
     """The symmetric cost of a person in a frame, at as many points as a refinement takes."""
     asked = points_to_explain(rng, target, settings.hull_points, settings.symmetric.ray_share)
     return Symmetric(subject.body, subject.points, target, asked, settings.symmetric)
+
+
+#: What a refinement minimises: ``make(rng, subject, view)``.
+MakeObjective = Callable[[np.random.Generator, Subject, PersonView], Objective]
 
 
 def polish(
@@ -84,15 +88,27 @@ def polish(
     return estimate, cost, searched, evaluations
 
 
-def polished(propose: Propose, settings: PolishSettings) -> PoseStep:
-    """The step that refines what a search proposes, and the last pose beside it."""
+def polished(propose: Propose, settings: PolishSettings, make_objective: MakeObjective | None = None) -> PoseStep:
+    """The step that refines what a search proposes, and the last pose beside it.
+
+    Parameters
+    ----------
+    propose : callable
+        `hmc.pose.steps.proposal.Propose`.
+    settings : PolishSettings
+    make_objective : callable, optional
+        What is minimised; `fine_objective` by default.
+    """
 
     def step(rng: np.random.Generator, tracked: Tracked, view: PersonView) -> tuple[Tracked, StepInfo]:
         if view.target is None or not shows_enough(view.target):
             return unseen(tracked)
         found = propose(rng, tracked, view)
         starts = [found.best, tracked.state] if found.status == "fitted" else [tracked.state]
-        objective = fine_objective(rng, tracked.subject, view.target, settings)
+        if make_objective is None:
+            objective: Objective = fine_objective(rng, tracked.subject, view.target, settings)
+        else:
+            objective = make_objective(rng, tracked.subject, view)
         estimate, cost, searched, more = polish(rng, objective, starts, tracked.state, settings)
         after = Tracked(tracked.subject, estimate, estimate - tracked.state, found.memory)
         evaluations = found.evaluations + more
