@@ -13,6 +13,7 @@ from hmc.experiments.engine.experiment import Experiment, Plan
 from hmc.experiments.engine.library import EXPERIMENTS, find_experiment
 from hmc.experiments.engine.sweep import plan_for, plan_of, run_experiment, stored_cells
 from hmc.experiments.engine.writing import write_report
+from hmc.plugins import add_plugins
 
 #: What wrong input, a failed cell and an interrupt leave as exit code.
 EXIT_INPUT, EXIT_FAILED, EXIT_INTERRUPTED = 2, 1, 130
@@ -22,6 +23,7 @@ def main(argv: list[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
     args = _make_parser().parse_args(argv)
     try:
+        add_plugins(getattr(args, "plugin", ()))
         return args.act(args)
     except InputError as error:
         _tell(f"hmc.experiments: {error}", sys.stderr)
@@ -59,6 +61,15 @@ def _make_parser() -> argparse.ArgumentParser:
     report.set_defaults(act=_report)
     for action in (run, status, merge, report):
         action.add_argument("--out", type=Path, default=Path("experiments"), metavar="DIR", help="folder of cells, inputs and reports")
+    for action in (run, status, report):
+        action.add_argument(
+            "--plugin",
+            type=Path,
+            action="append",
+            default=[],
+            metavar="FILE.py",
+            help="a file that registers methods or trackers",
+        )
     for action in (run, status):
         action.add_argument("--quick", action="store_true", help="a small grid that shows the shape, in minutes")
         action.add_argument(

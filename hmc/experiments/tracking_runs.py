@@ -18,6 +18,7 @@ from hmc.experiments.engine.style import COLOURS
 from hmc.io.recording import iterate_frames
 from hmc.io.results import TrackTable, read_centroids
 from hmc.metrics.scores import evaluate_tracks
+from hmc.plugins import load_plugins
 from hmc.tracking.following import finish, init
 from hmc.tracking.resumable import Timing, observe_step, person_grid
 from hmc.tracking.state import TrackRow
@@ -76,6 +77,7 @@ def voxel_sizes(plan: Plan) -> tuple[float, ...]:
 
 def methods(preset: str | None = None) -> dict[Method, str]:
     """Each registered tracker without and with color, where it can, and what tables call it; only those that have a preset, if given."""
+    load_plugins()
     return {
         (name, color): (method.label or name) + (f" {'color' if color else 'raw'}" if method.uses_colors else "")
         for name, method in TRACKERS.items()

@@ -79,13 +79,17 @@ def test_nobody_is_seen_in_the_gap(monkeypatch):
     assert seen == [not 40 <= k < 70 for k in range(100)] and full.all()
 
     asked = []
-    monkeypatch.setattr(over_time, "tracked", lambda *rest: (SimpleNamespace(start=5, fps=20.0), None, None))
-    monkeypatch.setattr(over_time, "pose_results", lambda seen, way, rng: asked.append(way) or {})
+    recording = SimpleNamespace(recording=SimpleNamespace(start=5, fps=20.0))
+    monkeypatch.setattr(over_time, "tracked", lambda *rest: recording)
+    monkeypatch.setattr(over_time, "run_method", lambda seen, method, options, progress: asked.append((method, progress)))
+    monkeypatch.setattr(over_time, "pose_results", lambda recording, people: {})
     results = [
         over_time.cell(parameters, None, np.random.default_rng(0))
         for parameters in over_time.EXPERIMENT.grid(Plan(quick=True))
         if parameters["gone_s"]
     ]
     assert all(result["gone"] == [45, 75] for result in results)
-    assert [way[1].loss is None for way in asked] == [False, True] and all(way[0] == pose_preset("default") for way in asked)
-    assert not asked[0][2](steps[50]).strict.any() and asked[0][2](steps[80]) is steps[80]
+    assert [method.recover is None for method, _ in asked] == [False, True]
+    assert all(method.settings == pose_preset("default") for method, _ in asked)
+    shown = list(asked[0][1](steps, len(steps)))
+    assert not shown[50].strict.any() and shown[80] is steps[80]

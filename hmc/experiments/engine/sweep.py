@@ -24,6 +24,7 @@ from hmc.experiments.engine.experiment import Cell, Experiment, Plan, Report
 from hmc.experiments.engine.inputs import Inputs, source_of
 from hmc.experiments.engine.library import find_experiment
 from hmc.experiments.engine.store import cell_key, cell_path, cell_rng, cell_text, read_cell, write_text
+from hmc.plugins import add_plugins, plugin_files
 
 __all__ = ["Outcome", "compute_cells", "plan_for", "plan_of", "run_experiment", "stored_cells"]
 
@@ -146,9 +147,9 @@ def compute_cells(
     """
     if scheduler is not None:
         name = str(Path(name).resolve()) if name.endswith(".py") else name  # workers have folders of their own
-        yield from spread(functools.partial(_compute_cell, name, out.resolve(), dict(folders)), missing, scheduler)
+        yield from spread(functools.partial(_compute_cell, name, _Shared(out.resolve(), dict(folders), plugin_files())), missing, scheduler)
         return
-    task = functools.partial(_compute_and_store, name, out, dict(folders))
+    task = functools.partial(_compute_and_store, name, _Shared(out, dict(folders), plugin_files()))
     if workers <= 1 or len(missing) <= 1:
         yield from map(task, missing)
         return
@@ -180,26 +181,36 @@ def _end_with(parent: int) -> None:
     threading.Thread(target=look, daemon=True).start()
 
 
-def _compute_and_store(name: str, out: Path, folders: dict[str, Path], parameters: dict[str, Any]) -> str:
-    path, text, failure = _compute_cell(name, out, folders, parameters)
+@dataclass(frozen=True)
+class _Shared:
+    """What is the same for all cells of a run: its folder, the user's recordings, and the files of strangers' methods."""
+
+    out: Path
+    folders: dict[str, Path]
+    plugins: tuple[str, ...]
+
+
+def _compute_and_store(name: str, shared: _Shared, parameters: dict[str, Any]) -> str:
+    path, text, failure = _compute_cell(name, shared, parameters)
     if text:
         write_text(path, text)
     return failure
 
 
-def _compute_cell(name: str, out: Path, folders: dict[str, Path], parameters: dict[str, Any]) -> tuple[Path, str, str]:
+def _compute_cell(name: str, shared: _Shared, parameters: dict[str, Any]) -> tuple[Path, str, str]:
     """A cell's file, its text, and what went wrong; the last two exclude each other."""
     import cv2
     from threadpoolctl import threadpool_limits
 
     # One thread each: the processes share the cores, and sums do not depend on how threads divide them.
     cv2.setNumThreads(1)
+    add_plugins(shared.plugins)  # a worker may be older than they are, or on another machine
     experiment = find_experiment(name)
     key = cell_key(experiment, parameters)
-    path = cell_path(out, experiment, key)
+    path = cell_path(shared.out, experiment, key)
     try:
         with threadpool_limits(1):
-            results = experiment.cell(parameters, Inputs(out / "inputs", folders), cell_rng(key))
+            results = experiment.cell(parameters, Inputs(shared.out / "inputs", shared.folders), cell_rng(key))
         return path, cell_text(parameters, results), ""
     except InputError:
         raise
