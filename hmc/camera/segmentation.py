@@ -19,7 +19,7 @@ import cv2
 import numpy as np
 
 from hmc.camera.noise import blur_for, blurred, is_grey, noise_floor
-from hmc.camera.silhouettes import cut_halo, evidence, fill_gaps, in_planes
+from hmc.camera.silhouettes import GapRules, cut_halo, evidence, fill_gaps, in_planes
 from hmc.errors import InputError
 
 __all__ = ["BackgroundModel", "SegmentationSettings", "segment", "segment_views", "train_background"]
@@ -363,17 +363,15 @@ def _complete(
     seeds = cv2.morphologyEx(_enlarged_mask(found[rows, columns], zoom), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
     mean = _enlarged(model.mean[rows, columns], zoom)
     seen = evidence(_enlarged(image[rows, columns], zoom), mean, _enlarged(model.deviation[rows, columns], zoom))
-    part = fill_gaps(
-        seeds,
-        seen,
+    rules = GapRules(
         threshold=settings.gap_threshold,
         reach_threshold=settings.reach_threshold,
         shadow=settings.shadow_factor,
         gap_shadow=settings.gap_shadow_factor,
         least=settings.least_blob_px,
-        scale=scale * zoom,
         sure=SURE,
     )
+    part = fill_gaps(seeds, seen, rules, scale * zoom)
     mask[rows, columns] = _reduced_mask(cut_halo(part, seen, settings.halo_share, scale * zoom), zoom)
     doubtful[rows, columns] |= _reduced_mask(((seen.chroma2 > DOUBT**2) | (np.abs(seen.luma) > DOUBT)).view(np.uint8), zoom)
     return mask, cv2.morphologyEx(doubtful, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))

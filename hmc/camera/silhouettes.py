@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-__all__ = ["Evidence", "cut_halo", "evidence", "fill_gaps", "in_planes"]
+__all__ = ["Evidence", "GapRules", "cut_halo", "evidence", "fill_gaps", "in_planes"]
 
 
 @dataclass(frozen=True)
@@ -38,6 +38,32 @@ class Evidence:
     chroma2: np.ndarray
     lost: np.ndarray
     contrast: np.ndarray
+
+
+@dataclass(frozen=True)
+class GapRules:
+    """How much weaker evidence is enough next to what is sure to be foreground.
+
+    Parameters
+    ----------
+    threshold : float
+        Standard deviations that are enough in gaps and bays of the seeds.
+    reach_threshold : float
+        Standard deviations that are enough outside of them, within reach.
+    shadow, gap_shadow : float
+        Darkening above which a pixel may be shadow: anywhere, and in gaps, where it is rather dark clothes.
+    least : float
+        Pixels of the seeds that a piece must hold, in a 640 x 480 image; others are specks.
+    sure : float
+        Only those pixels of the seeds count for `least` that the evidence puts so many standard deviations off, in luma or in chroma.
+    """
+
+    threshold: float
+    reach_threshold: float
+    shadow: float
+    gap_shadow: float
+    least: float
+    sure: float = 0.0
 
 
 def evidence(image: np.ndarray, mean: np.ndarray, deviation: np.ndarray) -> Evidence:
@@ -81,17 +107,7 @@ def in_planes(array: np.ndarray) -> np.ndarray:
     return np.moveaxis(np.ascontiguousarray(np.moveaxis(array, -1, 0)), 0, -1)
 
 
-def fill_gaps(
-    seeds: np.ndarray,
-    seen: Evidence,
-    threshold: float,
-    reach_threshold: float,
-    shadow: float,
-    gap_shadow: float,
-    least: float,
-    scale: float,
-    sure: float = 0.0,
-) -> np.ndarray:
+def fill_gaps(seeds: np.ndarray, seen: Evidence, rules: GapRules, scale: float) -> np.ndarray:
     """Grow a foreground mask by weaker evidence: inside its gaps, and outwards over a short reach.
 
     Parameters
@@ -99,41 +115,33 @@ def fill_gaps(
     seeds : ndarray of uint8, shape (height, width)
         1 where the mixture sees foreground.
     seen : Evidence
-    threshold : float
-        Standard deviations that are enough in gaps and bays of the seeds.
-    reach_threshold : float
-        Standard deviations that are enough outside of them, within reach.
-    shadow, gap_shadow : float
-        Darkening above which a pixel may be shadow: anywhere, and in gaps, where it is rather dark clothes.
-    least : float
-        Pixels of the seeds that a piece must hold, in a 640 x 480 image; others are specks.
+    rules : GapRules
     scale : float
         Size of the image against 640 x 480.
-    sure : float
-        Only those pixels of the seeds count for `least` that the evidence puts so many standard deviations off, in luma or in chroma.
 
     Returns
     -------
     ndarray of uint8, shape (height, width)
-        Every piece holds `least` pixels of the seeds.
+        Every piece holds `rules.least` pixels of the seeds.
     """
     gap, reach = _square(GAP_PX, scale), _square(REACH_PX, scale)
     near = cv2.dilate(seeds, gap)
     inner = cv2.erode(near, gap).view(bool)
     outer = cv2.dilate(near, reach[len(gap) - 1 :, len(gap) - 1 :]).view(bool)  # two squares in turn reach as far as their sum
-    dark = seen.luma < -threshold
-    weak = (seen.chroma2 > threshold**2) | (seen.luma > threshold) | (dark & (seen.lost > 1 - gap_shadow))
-    reached = (seen.chroma2 > reach_threshold**2) | (seen.luma > reach_threshold) | (dark & (seen.lost > 1 - shadow))
+    dark = seen.luma < -rules.threshold
+    weak = (seen.chroma2 > rules.threshold**2) | (seen.luma > rules.threshold) | (dark & (seen.lost > 1 - rules.gap_shadow))
+    far = rules.reach_threshold
+    reached = (seen.chroma2 > far**2) | (seen.luma > far) | (dark & (seen.lost > 1 - rules.shadow))
     grown = cv2.morphologyEx((reached & outer).view(np.uint8), cv2.MORPH_OPEN, _square(3, scale))
     mask = cv2.bitwise_or(cv2.bitwise_or(seeds, (weak & inner).view(np.uint8)), grown)
     mask = cv2.morphologyEx(mask, cv2.MORPH_OPEN, _square(3, scale))
     mask = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, _disc(CLOSE_PX, scale))
     n, labels = cv2.connectedComponents(mask, connectivity=8)
     told = np.flatnonzero(seeds.view(bool))
-    if sure > 0:
-        told = told[(seen.chroma2.ravel()[told] > sure**2) | (np.abs(seen.luma.ravel()[told]) > sure)]
+    if rules.sure > 0:
+        told = told[(seen.chroma2.ravel()[told] > rules.sure**2) | (np.abs(seen.luma.ravel()[told]) > rules.sure)]
     counts = np.bincount(np.asarray(labels).ravel()[told], minlength=n)
-    kept = (counts >= least * scale**2).view(np.uint8)
+    kept = (counts >= rules.least * scale**2).view(np.uint8)
     if kept[1:].all():
         return mask
     kept[0] = 0

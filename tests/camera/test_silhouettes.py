@@ -6,9 +6,9 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy import ndimage
 
-from hmc.camera.silhouettes import CLOSE_PX, GAP_PX, REACH_PX, Evidence, evidence, fill_gaps
+from hmc.camera.silhouettes import CLOSE_PX, GAP_PX, REACH_PX, Evidence, GapRules, evidence, fill_gaps
 
-RULES = {"threshold": 4.0, "reach_threshold": 5.0, "shadow": 0.6, "gap_shadow": 0.7, "least": 40}
+RULES = GapRules(threshold=4.0, reach_threshold=5.0, shadow=0.6, gap_shadow=0.7, least=40)
 
 
 def scene(seed: int, height: int = 90, width: int = 70) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -54,7 +54,7 @@ def test_filled_gaps_follow_their_definition(seed, scale):
     luma = rng.normal(0, 2, shape) + 9 * blobs(rng, shape, 0.2) - 9 * blobs(rng, shape, 0.2)
     chroma2 = rng.uniform(0, 12, shape) + 40 * blobs(rng, shape, 0.2)
     seen = Evidence(*(a.astype(np.float32) for a in (luma, chroma2, rng.random(shape), np.abs(luma))))
-    found = fill_gaps(seeds.astype(np.uint8), seen, **RULES, scale=scale)
+    found = fill_gaps(seeds.astype(np.uint8), seen, RULES, scale)
     expected = filled(seeds, seen, scale)
     assert_array_equal(found, expected)
     assert 0 < expected.sum() < expected.size
@@ -72,14 +72,14 @@ def filled(seeds: np.ndarray, seen: Evidence, scale: float) -> np.ndarray:
 
     def strong(threshold, shadow):
         bright = (seen.chroma2 > threshold**2) | (seen.luma > threshold)
-        return bright | ((seen.luma < -RULES["threshold"]) & (seen.lost > 1 - shadow))
+        return bright | ((seen.luma < -RULES.threshold) & (seen.lost > 1 - shadow))
 
     three = square(3)
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, square(CLOSE_PX).shape).astype(bool)
-    in_gaps = strong(RULES["threshold"], RULES["gap_shadow"]) & shrink(grow(seeds, square(GAP_PX)), square(GAP_PX))
-    outwards = strong(RULES["reach_threshold"], RULES["shadow"]) & grow(seeds, square(REACH_PX))
+    in_gaps = strong(RULES.threshold, RULES.gap_shadow) & shrink(grow(seeds, square(GAP_PX)), square(GAP_PX))
+    outwards = strong(RULES.reach_threshold, RULES.shadow) & grow(seeds, square(REACH_PX))
     mask = seeds | in_gaps | grow(shrink(outwards, three), three)
     mask = grow(shrink(mask, three), three)
     mask = shrink(grow(mask, disc), disc)
     labels, n = ndimage.label(mask, np.ones((3, 3)))
-    return np.isin(labels, [k for k in range(1, n + 1) if (seeds & (labels == k)).sum() >= RULES["least"] * scale**2])
+    return np.isin(labels, [k for k in range(1, n + 1) if (seeds & (labels == k)).sum() >= RULES.least * scale**2])
