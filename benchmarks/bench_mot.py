@@ -8,6 +8,7 @@ import time
 import motmetrics
 import numpy as np
 
+from hmc.io.results import TrackTable
 from hmc.metrics.mot import clear_mot
 
 THRESHOLD_M = 0.5
@@ -16,30 +17,31 @@ THRESHOLD_M = 0.5
 def make_scene(n_frames: int, n_persons: int, rng: np.random.Generator):
     """Walking persons and noisy estimates of them that are sometimes missing, and whose identities are sometimes exchanged."""
     walk = np.cumsum(rng.normal(0, 0.05, (n_frames, n_persons, 2)), axis=0) * 0.2 + rng.uniform(-2, 2, (n_persons, 2))
+    there = np.pad(walk.reshape(-1, 2), ((0, 0), (0, 1)))  # on the floor
     frames, persons = (grid.ravel() for grid in np.mgrid[:n_frames, :n_persons])
     names = (persons + (frames // 500)) % n_persons + 10
     kept = rng.random(len(frames)) < 0.95
-    noisy = walk.reshape(-1, 2) + rng.normal(0, 0.1, (len(frames), 2))
-    return (frames, persons, walk.reshape(-1, 2)), (frames[kept], names[kept], noisy[kept])
+    noisy = there + np.pad(rng.normal(0, 0.1, (len(frames), 2)), ((0, 0), (0, 1)))
+    return TrackTable(frames, persons, there), TrackTable(frames, names, noisy).where(kept)
 
 
 def theirs(truth, estimate) -> tuple[float, float]:
     """MOTP and MOTA by py-motmetrics from frame-by-frame distance matrices."""
     accumulator = motmetrics.MOTAccumulator(auto_id=False)
-    n_frames = int(truth[0].max()) + 1
-    ends = [np.searchsorted(table[0], np.arange(n_frames + 1)) for table in (truth, estimate)]
+    n_frames = int(truth.frames.max()) + 1
+    ends = [np.searchsorted(table.frames, np.arange(n_frames + 1)) for table in (truth, estimate)]
     for frame in range(n_frames):
         a, b = (slice(end[frame], end[frame + 1]) for end in ends)
-        distances = np.linalg.norm(truth[2][a][:, None] - estimate[2][b][None], axis=-1)
+        distances = np.linalg.norm(truth.positions[a][:, None] - estimate.positions[b][None], axis=-1)
         distances[distances > THRESHOLD_M] = np.nan
-        accumulator.update(truth[1][a], estimate[1][b], distances, frameid=frame)
+        accumulator.update(truth.persons[a], estimate.persons[b], distances, frameid=frame)
     row = motmetrics.metrics.create().compute(accumulator, metrics=["motp", "mota"], name="x").loc["x"]
     return float(row.motp), float(row.mota)
 
 
 def ours(truth, estimate) -> tuple[float, float]:
     """MOTP and MOTA by this package."""
-    scores = clear_mot(*truth, *estimate, threshold_m=THRESHOLD_M)
+    scores = clear_mot(truth, estimate, threshold_m=THRESHOLD_M)
     return scores.motp, scores.mota
 
 

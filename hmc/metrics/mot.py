@@ -13,6 +13,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from hmc.errors import InputError
+from hmc.io.results import TrackTable
 
 __all__ = ["MotScores", "clear_mot", "clear_mot_distances"]
 
@@ -54,25 +55,12 @@ class MotScores:
         return 1 - (self.misses + self.false_positives + self.mismatches) / self.objects if self.objects else float("nan")
 
 
-def clear_mot(
-    truth_frames: np.ndarray,
-    truth_persons: np.ndarray,
-    truth_positions: np.ndarray,
-    frames: np.ndarray,
-    persons: np.ndarray,
-    positions: np.ndarray,
-    threshold_m: float = THRESHOLD_M,
-    plane: bool = True,
-) -> MotScores:
+def clear_mot(truth: TrackTable, estimate: TrackTable, threshold_m: float = THRESHOLD_M, plane: bool = True) -> MotScores:
     """Score tracks against truth by position.
 
     Parameters
     ----------
-    truth_frames, truth_persons : ndarray of int, shape (n,)
-    truth_positions : ndarray, shape (n, d)
-        Metres.
-    frames, persons, positions : ndarray, shape (m,), (m,), (m, d)
-        The estimate.
+    truth, estimate : TrackTable
     threshold_m : float
         Largest distance of a match.
     plane : bool
@@ -84,13 +72,13 @@ def clear_mot(
         Distances in metres. A row with NaN in its position matches nothing.
     """
     columns = slice(0, 2 if plane else None)
-    truth_points, points = np.asarray(truth_positions, float)[:, columns], np.asarray(positions, float)[:, columns]
+    truth_points, points = truth.positions[:, columns], estimate.positions[:, columns]
 
     def distance(truth_rows: np.ndarray, rows: np.ndarray) -> np.ndarray:
         values = np.linalg.norm(truth_points[truth_rows] - points[rows], axis=-1)
         return np.where(values <= threshold_m, values, np.nan)
 
-    return clear_mot_distances(truth_frames, truth_persons, frames, persons, distance)
+    return clear_mot_distances(truth.frames, truth.persons, estimate.frames, estimate.persons, distance)
 
 
 def clear_mot_distances(

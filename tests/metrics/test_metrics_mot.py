@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import motmetrics
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hmc.errors import InputError
+from hmc.io.results import TrackTable
 from hmc.metrics.mot import clear_mot, clear_mot_distances
 
 
@@ -18,7 +21,7 @@ def scene(seed: int, n_frames: int = 120, n_persons: int = 4, noise: float = 0.2
     walk = np.cumsum(rng.normal(0, 0.08, (n_frames, n_persons, 3)), axis=0) + rng.uniform(-1, 1, (n_persons, 3))
     there = rng.random((n_frames, n_persons)) < 0.9
     frames, persons = np.nonzero(there)
-    truth = frames, persons, walk[there]
+    truth = TrackTable(frames, persons, walk[there])
     names = np.stack([rng.permutation(n_persons) if rng.random() < 0.05 else np.arange(n_persons) for _ in range(n_frames)])
     kept = there & (rng.random(there.shape) < 0.85)
     est_frames, columns = np.nonzero(kept)
@@ -27,17 +30,17 @@ def scene(seed: int, n_frames: int = 120, n_persons: int = 4, noise: float = 0.2
     est_frames = np.r_[est_frames, np.flatnonzero(extra)]
     ids = np.r_[names[kept.nonzero()[0], columns] + 10, np.full(extra.sum(), 99)]
     positions = np.r_[positions, rng.uniform(-2, 2, (extra.sum(), 3))]
-    return truth, (est_frames, ids, positions)
+    return truth, TrackTable(est_frames, ids, positions)
 
 
 def oracle(truth, estimate, threshold: float):
     """py-motmetrics on our own distance matrices."""
     accumulator = motmetrics.MOTAccumulator(auto_id=False)
-    for frame in np.union1d(truth[0], estimate[0]):
-        a, b = truth[0] == frame, estimate[0] == frame
-        distances = np.linalg.norm(truth[2][a][:, None, :2] - estimate[2][b][None, :, :2], axis=-1)
+    for frame in np.union1d(truth.frames, estimate.frames):
+        a, b = truth.where(truth.frames == frame), estimate.where(estimate.frames == frame)
+        distances = np.linalg.norm(a.positions[:, None, :2] - b.positions[None, :, :2], axis=-1)
         distances[distances > threshold] = np.nan
-        accumulator.update(truth[1][a], estimate[1][b], distances, frameid=int(frame))
+        accumulator.update(a.persons, b.persons, distances, frameid=int(frame))
     return summary(accumulator)
 
 
@@ -59,7 +62,7 @@ def test_equals_motmetrics_on_random_scenes(seed):
     theirs = oracle(truth, estimate, threshold)
     if seed == 11:
         assert theirs.num_switches > 0  # the scenes do hold what is to be counted
-    assert_equal(clear_mot(*truth, *estimate, threshold_m=threshold), theirs)
+    assert_equal(clear_mot(truth, estimate, threshold_m=threshold), theirs)
 
 
 def test_real_tracks_give_their_published_figures(shared_data):
@@ -77,8 +80,8 @@ def test_real_tracks_give_their_published_figures(shared_data):
     by_iou = clear_mot_distances(*ids, iou_distance)
     np.testing.assert_allclose([by_iou.mota, by_iou.motp], [0.526462, 0.277201], atol=1e-6)
     assert (by_iou.false_positives, by_iou.misses, by_iou.mismatches) == (13, 150, 7)
-    centres = [boxes[:, 2:4] + boxes[:, 4:6] / 2 for boxes in (truth, estimate)]
-    by_centre = clear_mot(ids[0], ids[1], centres[0], ids[2], ids[3], centres[1], threshold_m=50)
+    centres = [np.pad(boxes[:, 2:4] + boxes[:, 4:6] / 2, ((0, 0), (0, 1))) for boxes in (truth, estimate)]
+    by_centre = clear_mot(TrackTable(*ids[:2], centres[0]), TrackTable(*ids[2:], centres[1]), threshold_m=50)
     np.testing.assert_allclose([by_centre.mota, by_centre.motp], [0.571031, 13.2596], atol=1e-4)
     assert (by_centre.false_positives, by_centre.misses, by_centre.mismatches) == (5, 142, 7)
 
@@ -87,11 +90,11 @@ def test_real_tracks_give_their_published_figures(shared_data):
 @given(seed=st.integers(0, 10_000), shuffle=st.integers(0, 10_000))
 def test_names_and_order_of_rows_do_not_matter(seed, shuffle):
     truth, estimate = scene(seed, n_frames=25, n_persons=3)
-    before = clear_mot(*truth, *estimate)
+    before = clear_mot(truth, estimate)
     rng = np.random.default_rng(shuffle)
-    new_truth_names, new_names = rng.permutation(1000)[truth[1]], rng.permutation(1000)[estimate[1]]
-    order = rng.permutation(len(estimate[0]))
-    after = clear_mot(truth[0], new_truth_names, truth[2], estimate[0][order], new_names[order], estimate[2][order])
+    new_truth_names, new_names = rng.permutation(1000)[truth.persons], rng.permutation(1000)[estimate.persons]
+    order = rng.permutation(len(estimate.frames))
+    after = clear_mot(replace(truth, persons=new_truth_names), replace(estimate, persons=new_names).where(order))
     assert (after.misses, after.false_positives, after.mismatches) == (before.misses, before.false_positives, before.mismatches)
     np.testing.assert_allclose([after.mota, after.motp], [before.mota, before.motp], atol=1e-12)
 
@@ -100,46 +103,48 @@ def test_names_and_order_of_rows_do_not_matter(seed, shuffle):
 @given(seed=st.integers(0, 10_000), threshold=st.floats(0.05, 2.0))
 def test_counts_add_up_and_matches_are_near(seed, threshold):
     truth, estimate = scene(seed, n_frames=25, n_persons=3)
-    scores = clear_mot(*truth, *estimate, threshold_m=threshold)
-    assert scores.misses + len(scores.matched) == scores.objects == len(truth[0])
-    assert scores.false_positives + len(scores.matched) == len(estimate[0])
+    scores = clear_mot(truth, estimate, threshold_m=threshold)
+    assert scores.misses + len(scores.matched) == scores.objects == len(truth.frames)
+    assert scores.false_positives + len(scores.matched) == len(estimate.frames)
     rows, columns = scores.matched.T
-    assert (truth[0][rows] == estimate[0][columns]).all()
+    assert (truth.frames[rows] == estimate.frames[columns]).all()
     assert len(np.unique(rows)) == len(rows) and len(np.unique(columns)) == len(columns)
     assert (scores.distances <= threshold).all() and scores.mota <= 1
 
 
 def test_a_match_is_kept_while_it_is_near_enough():
     # In the second frame the other estimate is nearer to each person, yet the first match stands.
-    truth = np.array([0, 0, 1, 1]), np.array([0, 1, 0, 1]), np.array([[0, 0], [0.3, 0], [0, 0], [0.3, 0.0]])
-    estimate = np.array([0, 0, 1, 1]), np.array([5, 6, 5, 6]), np.array([[0, 0], [0.3, 0], [0.29, 0], [0.01, 0]])
-    scores = clear_mot(*truth, *estimate)
+    truth_x, x = [0, 0.3, 0, 0.3], [0, 0.3, 0.29, 0.01]
+    frames, flat = np.array([0, 0, 1, 1]), np.zeros((4, 2))
+    truth = TrackTable(frames, np.array([0, 1, 0, 1]), np.column_stack([truth_x, flat]))
+    estimate = TrackTable(frames, np.array([5, 6, 5, 6]), np.column_stack([x, flat]))
+    scores = clear_mot(truth, estimate)
     assert scores.mismatches == 0 and scores.mota == 1
     np.testing.assert_allclose(scores.motp, (0 + 0 + 0.29 + 0.29) / 4)
 
 
 def test_perfect_tracks_empty_tracks_and_no_truth():
-    (frames, persons, positions), _ = scene(3)
-    perfect = clear_mot(frames, persons, positions, frames, persons + 7, positions)
+    truth, _ = scene(3)
+    perfect = clear_mot(truth, replace(truth, persons=truth.persons + 7))
     assert perfect.mota == 1 and perfect.motp == 0
-    nothing = np.zeros(0, int), np.zeros(0, int), np.zeros((0, 3))
-    missed = clear_mot(frames, persons, positions, *nothing)
-    assert missed.mota == 0 and missed.misses == len(frames) and np.isnan(missed.motp)
-    invented = clear_mot(*nothing, frames, persons, positions)
-    assert invented.false_positives == len(frames) and np.isnan(invented.mota)
+    nothing = TrackTable(np.zeros(0, int), np.zeros(0, int), np.zeros((0, 3)))
+    missed = clear_mot(truth, nothing)
+    assert missed.mota == 0 and missed.misses == len(truth.frames) and np.isnan(missed.motp)
+    invented = clear_mot(nothing, truth)
+    assert invented.false_positives == len(truth.frames) and np.isnan(invented.mota)
 
 
 def test_height_is_disregarded_unless_asked_for():
-    one = np.array([0]), np.array([0])
-    low, high = np.array([[0, 0, 1.0]]), np.array([[0.3, 0, 1.7]])
-    assert clear_mot(*one, low, *one, high).misses == 0
-    assert clear_mot(*one, low, *one, high, plane=False).misses == 1
+    low = TrackTable(np.array([0]), np.array([0]), np.array([[0, 0, 1.0]]))
+    high = replace(low, positions=np.array([[0.3, 0, 1.7]]))
+    assert clear_mot(low, high).misses == 0
+    assert clear_mot(low, high, plane=False).misses == 1
 
 
 def test_an_identity_twice_in_a_frame_is_refused():
-    twice = np.array([4, 4]), np.array([1, 1]), np.zeros((2, 3))
-    once = np.array([4]), np.array([1]), np.zeros((1, 3))
+    twice = TrackTable(np.array([4, 4]), np.array([1, 1]), np.zeros((2, 3)))
+    once = twice.where(np.array([0]))
     with pytest.raises(InputError, match="truth: identity 1 stands twice in frame 4"):
-        clear_mot(*twice, *once)
+        clear_mot(twice, once)
     with pytest.raises(InputError, match="estimate: identity 1"):
-        clear_mot(*once, *twice)
+        clear_mot(once, twice)

@@ -12,8 +12,7 @@ def test_three_people_who_cross(shared_data):
     path = shared_data / "rendered" / "r3"
     table = track_recording(open_recording(path, start=40, frames=45), 0.08)
     truth = read_centroids(path / "truth" / "centroids.csv")
-    rows = (truth.frames >= 40) & (truth.frames < 85)
-    scores = clear_mot(truth.frames[rows], truth.persons[rows], truth.positions[rows], table.frames, table.persons, table.positions)
+    scores = clear_mot(truth.where((truth.frames >= 40) & (truth.frames < 85)), table)
     assert scores.mota > 0.99
     assert scores.motp < 0.06
     assert scores.mismatches == 0

@@ -139,7 +139,7 @@ def evaluate_pose(estimate: PoseTable, truth: PoseTable, thresholds_m: Sequence[
 
 def evaluate_tracks(estimate: TrackTable, truth: TrackTable) -> MotScores:
     """CLEAR MOT of tracks in the xy plane (`hmc.metrics.mot.clear_mot`)."""
-    return clear_mot(truth.frames, truth.persons, truth.positions, estimate.frames, estimate.persons, estimate.positions)
+    return clear_mot(truth, estimate)
 
 
 def pelvis_tracks(poses: PoseTable) -> TrackTable:
