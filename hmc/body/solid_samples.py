@@ -6,12 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hmc.body.contours import Strips
 from hmc.body.kinematics import segment_transforms
 from hmc.body.model import neutral_state
 from hmc.body.solids import GROUPS, SolidBody, to_world
 from hmc.body.superellipsoids import inside_outside, points_at
 
-__all__ = ["BANDS", "SECTORS", "SurfaceGrid", "draw_samples", "surface_grid"]
+__all__ = ["BANDS", "SECTORS", "SampledBody", "SurfaceGrid", "draw_samples", "surface_grid"]
 
 #: A patch, which has one colour, is one of so many bands of a solid by so many sectors around it.
 BANDS, SECTORS = 3, 4
@@ -43,6 +44,24 @@ class SurfaceGrid:
     patch: np.ndarray
     starts: np.ndarray
     n_patches: int
+
+
+@dataclass(frozen=True)
+class SampledBody:
+    """A solid body and what is laid on it once, for samples to be drawn from.
+
+    Parameters
+    ----------
+    body : SolidBody
+    grid : SurfaceGrid
+        Points of its surface.
+    strips : Strips
+        Around its limbs, where contours are looked for.
+    """
+
+    body: SolidBody
+    grid: SurfaceGrid
+    strips: Strips
 
 
 def surface_grid(body: SolidBody, per_group: int = 400) -> SurfaceGrid:

@@ -115,9 +115,9 @@ def test_rows_of_the_edge_cue_are_the_slopes_of_its_residuals(tracker, seed):
     images = images_of(tracker, state_of(rng, 0.35))
     views, posed = stack_views(CAMERAS), pose_body(body, state)
     crops = [Crop(image, 0, 0) for image in images]
-    maps = edge_maps(views, crops, shown_contours(body, strips, posed, views), ColorEdgeSettings())
+    maps = edge_maps(views, crops, shown_contours(tracker, posed, views), ColorEdgeSettings())
     chosen, view = rng.integers(len(strips.solid), size=60), rng.integers(len(CAMERAS), size=60)
-    matches = match_edges(body, strips, posed, maps, chosen, view, 0.08, 1.0)
+    matches = match_edges(tracker, posed, maps, chosen, view, 0.08, 1.0)
     rows = jacobian(posed, matches)
     found = np.flatnonzero(matches.weight > 0)
     assert len(found) > 5
@@ -167,10 +167,10 @@ def test_matched_edges_of_the_true_pose_are_near_and_lead_back(tracker):
         off = state.copy()
         off[dof_index("r_shoulder_x", "l_hip_x")] += np.radians([degrees, degrees])
         posed = pose_body(body, off)
-        maps = edge_maps(views, maps_of, shown_contours(body, strips, posed, views), ColorEdgeSettings())
+        maps = edge_maps(views, maps_of, shown_contours(tracker, posed, views), ColorEdgeSettings())
         circles = np.concatenate(strips.circles)
         chosen, view = np.tile(circles, 4), np.repeat(np.arange(4), len(circles))
-        matches = match_edges(body, strips, posed, maps, chosen, view, 0.08, 1.0)
+        matches = match_edges(tracker, posed, maps, chosen, view, 0.08, 1.0)
         found = matches.weight > 0
         error = 0.5 * (matches.residuals**2).sum(axis=1)
         values.append(float(error[found].mean()))
@@ -397,7 +397,7 @@ def test_samples_of_some_groups_pull_as_they_do_among_all(tracker):
     scene = make_scene(tracker, seen, state[FREE])
     drawn = scene.draw(rng, trunk=False)
     wanted = np.array([False, False, True, False, False, True])
-    fewer = draw_of_groups(drawn, tracker.grid, tracker.strips, wanted)
+    fewer = draw_of_groups(drawn, tracker, wanted)
     assert len(fewer.surface) == 40
     assert len(fewer.strips) == len(drawn.strips) // 2
     gradients = [evaluation(*scene.match(state[FREE], one), 1.0).gradient for one in (drawn, fewer)]

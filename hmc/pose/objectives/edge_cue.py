@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hmc.body.contours import Strips, contour_points, hidden
-from hmc.body.solids import GROUPS, SolidBody, to_world
+from hmc.body.contours import contour_points, hidden
+from hmc.body.solid_samples import SampledBody
+from hmc.body.solids import GROUPS, to_world
 from hmc.camera.color_edges import ColorEdgeSettings, color_edges
 from hmc.camera.stacked import Views, project_in
 from hmc.pose.objectives.cue_rows import Matches, Posed, point_wrenches
@@ -47,13 +48,12 @@ class EdgeMaps:
     shown: np.ndarray
 
 
-def shown_contours(body: SolidBody, strips: Strips, posed: Posed, views: Views) -> np.ndarray:
+def shown_contours(sampled: SampledBody, posed: Posed, views: Views) -> np.ndarray:
     """Which contour points each camera sees.
 
     Parameters
     ----------
-    body : SolidBody
-    strips : Strips
+    sampled : SampledBody
     posed : Posed
     views : Views
 
@@ -62,6 +62,7 @@ def shown_contours(body: SolidBody, strips: Strips, posed: Posed, views: Views) 
     ndarray of bool, shape (n_views, n_strips, 2)
         False where there is no such point, or where a solid hides it.
     """
+    body, strips = sampled.body, sampled.strips
     n = len(strips.solid)
     chosen, of = np.tile(np.arange(n), len(views)), np.repeat(np.arange(len(views)), n)
     turns, centres = to_world(body, posed.rotations, posed.positions)
@@ -114,14 +115,13 @@ def edge_maps(views: Views, crops: list[Crop], shown: np.ndarray, settings: Colo
 
 
 def match_edges(
-    body: SolidBody, strips: Strips, posed: Posed, maps: EdgeMaps, chosen: np.ndarray, view: np.ndarray, reach_m: float, weight: float
+    sampled: SampledBody, posed: Posed, maps: EdgeMaps, chosen: np.ndarray, view: np.ndarray, reach_m: float, weight: float
 ) -> Matches:
     """Match contour points with edges: both points of a circle of latitude as a pair (Eq. 12, 13), others singly (Eq. 14, 15).
 
     Parameters
     ----------
-    body : SolidBody
-    strips : Strips
+    sampled : SampledBody
     posed : Posed
     maps : EdgeMaps
     chosen : ndarray of int, shape (n,)
@@ -138,6 +138,7 @@ def match_edges(
     Matches
         Two features a strip: the pair and nothing, or either point. Hidden points, and those without an edge, are missing.
     """
+    body, strips = sampled.body, sampled.strips
     n = len(chosen)
     turns, centres = to_world(body, posed.rotations, posed.positions)
     solid, segment, group = strips.solid[chosen], body.segment[strips.solid[chosen]], strips.group[chosen]

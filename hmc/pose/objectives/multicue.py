@@ -6,9 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from hmc.body.contours import Strips
-from hmc.body.solid_samples import SurfaceGrid, draw_samples
-from hmc.body.solids import SolidBody
+from hmc.body.solid_samples import SampledBody, draw_samples
 from hmc.camera.color_edges import ColorEdgeSettings
 from hmc.pose.objectives.color_cue import ColorSettings
 from hmc.pose.objectives.cue_rows import Matches, Posed, joined
@@ -90,8 +88,7 @@ class Draw:
 
 def draw_cues(
     rng: np.random.Generator,
-    grid: SurfaceGrid,
-    strips: Strips,
+    sampled: SampledBody,
     cloud: VoxelCloud,
     n_views: int,
     settings: CueSettings,
@@ -103,8 +100,7 @@ def draw_cues(
     Parameters
     ----------
     rng : numpy.random.Generator
-    grid : SurfaceGrid
-    strips : Strips
+    sampled : SampledBody
     cloud : VoxelCloud
     n_views : int
         Views that are used.
@@ -115,8 +111,9 @@ def draw_cues(
         False: none on the trunk.
     """
     counts = [times * count for count in settings.surface_points]
-    surface = draw_samples(rng, grid, (counts[0] * trunk, *counts[1:]))
+    surface = draw_samples(rng, sampled.grid, (counts[0] * trunk, *counts[1:]))
     voxels = rng.integers(len(cloud.points), size=times * settings.voxel_points)
+    strips = sampled.strips
     chosen = [
         pool[rng.random((n_views, len(pool))).argsort(axis=1)[:, : times * count]]
         for pools, count in ((strips.circles, settings.circles), (strips.meridians, settings.meridians))
@@ -126,41 +123,29 @@ def draw_cues(
     return Draw(surface, voxels, lines.ravel(), np.repeat(np.arange(n_views), lines.shape[1]))
 
 
-def draw_of_groups(draw: Draw, grid: SurfaceGrid, strips: Strips, wanted: np.ndarray) -> Draw:
+def draw_of_groups(draw: Draw, sampled: SampledBody, wanted: np.ndarray) -> Draw:
     """Without the samples of groups that stay where they are; the others count as much as before.
 
     Parameters
     ----------
     draw : Draw
-    grid : SurfaceGrid
-    strips : Strips
+    sampled : SampledBody
     wanted : ndarray of bool, shape (6,)
         Of `hmc.body.solids.GROUPS`.
     """
-    surface, lines = wanted[grid.group[draw.surface]], wanted[strips.group[draw.strips]]
+    surface, lines = wanted[sampled.grid.group[draw.surface]], wanted[sampled.strips.group[draw.strips]]
     return Draw(
         draw.surface[surface], draw.voxels, draw.strips[lines], draw.view[lines],
         draw.surface_share * surface.mean() if len(surface) else 1.0, draw.edge_share * lines.mean() if len(lines) else 1.0,
     )  # fmt: skip
 
 
-def match_cues(
-    body: SolidBody,
-    grid: SurfaceGrid,
-    strips: Strips,
-    posed: Posed,
-    cloud: VoxelCloud,
-    maps: EdgeMaps | None,
-    draw: Draw,
-    settings: CueSettings,
-) -> Matches:
+def match_cues(sampled: SampledBody, posed: Posed, cloud: VoxelCloud, maps: EdgeMaps | None, draw: Draw, settings: CueSettings) -> Matches:
     """Match the drawn samples.
 
     Parameters
     ----------
-    body : SolidBody
-    grid : SurfaceGrid
-    strips : Strips
+    sampled : SampledBody
     posed : Posed
     cloud : VoxelCloud
     maps : EdgeMaps or None
@@ -168,6 +153,7 @@ def match_cues(
     draw : Draw
     settings : CueSettings
     """
+    body, grid = sampled.body, sampled.grid
     found = [match_surface(body, grid, draw.surface, posed, cloud, draw.surface_share * settings.surface_weight)]
     if len(draw.voxels):
         # A third of the grid is dense enough to say which part is nearest.
@@ -175,5 +161,5 @@ def match_cues(
         found.append(match_voxels(body, grid, candidates, posed, cloud, draw.voxels, settings.voxel_weight))
     if maps is not None and len(draw.strips):
         weight = draw.edge_share * settings.edge_weight
-        found.append(match_edges(body, strips, posed, maps, draw.strips, draw.view, settings.reach_m, weight))
+        found.append(match_edges(sampled, posed, maps, draw.strips, draw.view, settings.reach_m, weight))
     return joined(found)

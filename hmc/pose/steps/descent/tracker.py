@@ -8,11 +8,11 @@ from functools import partial
 
 import numpy as np
 
-from hmc.body.contours import Strips, make_strips
+from hmc.body.contours import make_strips
 from hmc.body.joints import N_DOF
 from hmc.body.model import BodyModel
-from hmc.body.solid_samples import SurfaceGrid, surface_grid
-from hmc.body.solids import CHAINS, FREE, GROUPS, SolidBody, solid_body
+from hmc.body.solid_samples import SampledBody, surface_grid
+from hmc.body.solids import CHAINS, FREE, GROUPS, solid_body
 from hmc.pose.objectives.color_cue import ColorModel, color_fits, learn_colors, update_colors
 from hmc.pose.objectives.cue_rows import Matches, Posed, evaluate, gauss_newton_product, jacobian, pose_body
 from hmc.pose.objectives.edge_cue import EdgeMaps, best_views, edge_maps, shown_contours
@@ -71,12 +71,9 @@ class SmdPreset:
 
 
 @dataclass(frozen=True)
-class SmdTracker:
+class SmdTracker(SampledBody):
     """A person's body and how it is followed."""
 
-    body: SolidBody
-    grid: SurfaceGrid
-    strips: Strips
     preset: SmdPreset
 
 
@@ -209,13 +206,13 @@ class Scene:
         """Samples for the whole body, or for the chains."""
         tracker = self.tracker
         n_views = 0 if self.maps is None or (trunk and not tracker.preset.cues.full_edges) else len(self.maps.views)
-        return draw_cues(rng, tracker.grid, tracker.strips, self.cloud, n_views, tracker.preset.cues, tracker.preset.times, trunk)
+        return draw_cues(rng, tracker, self.cloud, n_views, tracker.preset.cues, tracker.preset.times, trunk)
 
     def match(self, parameters: np.ndarray, drawn: Draw) -> tuple[Matches, np.ndarray]:
         """Matches of drawn samples at some parameters (24,), and their Jacobian."""
         tracker = self.tracker
         posed = _posed(tracker, parameters, self.base)
-        matches = match_cues(tracker.body, tracker.grid, tracker.strips, posed, self.cloud, self.maps, drawn, tracker.preset.cues)
+        matches = match_cues(tracker, posed, self.cloud, self.maps, drawn, tracker.preset.cues)
         return matches, jacobian(posed, matches)
 
 
@@ -242,7 +239,7 @@ def make_scene(
     usable = np.array([crop is not None for crop in observed.crops], bool)
     if cues.edge_weight == 0 or observed.views is None or not usable.any():
         return Scene(tracker, cloud, None, np.zeros(0, int), base)
-    shown = shown_contours(tracker.body, tracker.strips, _posed(tracker, parameters, base), observed.views)
+    shown = shown_contours(tracker, _posed(tracker, parameters, base), observed.views)
     chosen = best_views(shown, usable, cues.views)
     crops = [crop for k in chosen if (crop := observed.crops[k]) is not None]
     return Scene(tracker, cloud, edge_maps(observed.views.select(chosen), crops, shown[chosen], cues.edges), chosen, base)
@@ -279,7 +276,7 @@ def optimise(
     def matched(at: np.ndarray, going: np.ndarray, drawn: Draw) -> tuple[Matches, np.ndarray]:
         """What has come to rest needs no samples."""
         still = moved[going].any(axis=0)
-        return scene.match(at, drawn if still.all() else draw_of_groups(drawn, scene.tracker.grid, scene.tracker.strips, still))
+        return scene.match(at, drawn if still.all() else draw_of_groups(drawn, scene.tracker, still))
 
     if preset.optimiser == "lm":
         alone = np.eye(len(groups), dtype=bool)
