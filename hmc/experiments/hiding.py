@@ -28,9 +28,9 @@ from hmc.pose.method import Capture
 from hmc.pose.methods.scalable import method_preset
 from hmc.pose.objectives.four_scores import ScoreTable
 from hmc.pose.steps.annealed import annealed_subject
-from hmc.pose.steps.hidden.shown import limb_signs, place_flesh
+from hmc.pose.steps.hidden.shown import flesh_in_hulls, limb_signs, place_flesh
 from hmc.pose.steps.presets import pose_preset
-from hmc.pose.steps.restrict import part_mask, score_maps
+from hmc.pose.steps.restrict import part_mask
 from hmc.pose.views.person_view import views_of
 from hmc.tracking.resumable import person_grid
 from hmc.voxels.hulls import HullStep, stream_hulls
@@ -100,8 +100,8 @@ def _limb_views(inputs: Inputs, label: str) -> LimbViews:
         if target is None:
             continue
         state, _ = fit_landmarks(body, truth.positions[row[0]], state)
-        maps, transforms = score_maps(target, recording.room), segment_transforms(body, state)
-        flesh = place_flesh(table, state, maps, target, [part for limb in limbs for part in limb.parts])
+        looked, transforms = flesh_in_hulls(table, target, recording.room), segment_transforms(body, state)
+        flesh = place_flesh(looked, state, [part for limb in limbs for part in limb.parts])
         for k, limb in enumerate(limbs):
             occupancy[row[0], k] = limb_signs(flesh, limb.parts, whole).occupancy
             own = part_mask(limb.parts)[table.flesh.part]

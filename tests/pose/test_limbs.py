@@ -27,7 +27,7 @@ from hmc.pose.objectives.symmetric import Symmetric, body_distance
 from hmc.pose.steps.annealed import DRIFT, annealed_subject
 from hmc.pose.steps.hidden.limbs import LimbMemory, LimbSettings, limb_spread_deg, look_again
 from hmc.pose.steps.hidden.scouts import scout
-from hmc.pose.steps.hidden.shown import in_doubt, limb_signs, place_flesh
+from hmc.pose.steps.hidden.shown import flesh_in_hulls, in_doubt, limb_signs, place_flesh
 from hmc.pose.steps.hidden.step import with_hidden_limbs
 from hmc.pose.steps.presets import PRESETS, drift
 from hmc.pose.steps.restrict import ScoreData, SymmetricData, coarser_table, nearest_part, part_body, part_mask, restrict_table, score_maps
@@ -61,7 +61,7 @@ def without(*parts: str) -> np.ndarray:
 
 
 def signs(table, state, target, parts, others):
-    return limb_signs(place_flesh(table, state, score_maps(target, None), target, parts), parts, others)
+    return limb_signs(place_flesh(flesh_in_hulls(table, target), state, parts), parts, others)
 
 
 def few(preset):
@@ -240,7 +240,7 @@ def test_occupancy_and_scouts_tell_a_limb_that_is_there_from_one_that_is_not(sub
     parts = settings.tree.limbs[limb].parts
 
     def looked(target, seed, settings=settings):
-        return scout(np.random.default_rng(seed), table, score_maps(target, None), target, state, limb, active, settings)
+        return scout(np.random.default_rng(seed), flesh_in_hulls(table, target), state, limb, active, settings)
 
     assert signs(table, state, there, parts, others).occupancy > 0.9
     assert signs(table, state, missing, parts, others).occupancy < 0.1
@@ -264,7 +264,7 @@ def test_a_folded_forearm_is_in_doubt_in_a_fat_hull_that_has_none_and_not_in_its
     kneeling[dof_index("r_knee_y", "l_knee_y")] = np.radians(140.0)
 
     def doubted(state, target, settings=settings):
-        flesh = place_flesh(table, state, score_maps(target, None), target, LIMBS)
+        flesh = place_flesh(flesh_in_hulls(table, target), state, LIMBS)
         return {name for k, name in enumerate(LIMBS) if in_doubt(flesh, k, active, settings)}
 
     for state in (standing(), folded, kneeling):
@@ -292,7 +292,7 @@ def test_a_forearm_in_the_trunk_is_in_doubt_unless_what_sticks_out_is_in_the_str
         state[dof_index("l_shoulder_x", "l_shoulder_y", "l_shoulder_z", "l_elbow_z")] = np.radians(angles_deg)
         target = hull_of(state, keep)
         assert signs(table, state, target, ("l_forearm",), ALL).inside > 0.5
-        flesh = place_flesh(table, state, score_maps(target, None), target, LIMBS)
+        flesh = place_flesh(flesh_in_hulls(table, target), state, LIMBS)
         return in_doubt(flesh, LIMBS.index("l_forearm"), active, settings)
 
     half, whole = (85, -60, -41, -120), (60, -70, -40, -130)
@@ -309,7 +309,7 @@ def test_a_thigh_is_in_doubt_in_the_trunk_only_and_not_where_it_is_joined_to_it(
         state = standing()
         state[dof_index("r_hip_y", "torso_y")] = np.radians([-bent_deg, bent_deg / 2])
         target = hull_of(state)
-        flesh = place_flesh(subject.flesh, state, score_maps(target, None), target, LIMBS)
+        flesh = place_flesh(flesh_in_hulls(subject.flesh, target), state, LIMBS)
         found.append((limb_signs(flesh, ("r_thigh",), ALL).inside, in_doubt(flesh, LIMBS.index("r_thigh"), active, settings)))
     (standing_in, no), (sitting_in, neither), (folded_in, yes) = found
     assert 0.1 < standing_in < sitting_in < 0.8 < folded_in
@@ -321,11 +321,11 @@ def test_scouts_find_a_shank_although_its_thigh_has_gone_astray(subjects):
     state = standing()
     state[dof_index("r_knee_y", "r_hip_y")] = np.radians([60.0, -30.0])
     target, limb = hull_of(state), LIMBS.index("r_shank")
-    maps = score_maps(target, None)
+    looked = flesh_in_hulls(subject.flesh, target)
     astray = state.copy()
     astray[dof_index("r_hip_y")] += np.radians(50.0)
     active = SETTINGS.tree.possible(np.arange(len(LIMBS)) != limb)
-    found = [scout(np.random.default_rng(seed), subject.flesh, maps, target, astray, limb, active, SETTINGS) for seed in range(5)]
+    found = [scout(np.random.default_rng(seed), looked, astray, limb, active, SETTINGS) for seed in range(5)]
     away = [np.linalg.norm(landmarks(subject.body, one.state) - landmarks(subject.body, state), axis=1).max() for one in found]
     assert np.median(away) < 0.12
 

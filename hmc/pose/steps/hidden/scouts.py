@@ -12,11 +12,10 @@ import numpy as np
 
 from hmc.body.joints import dof_index
 from hmc.body.prior import POSTURE
-from hmc.pose.objectives.four_scores import ScoreMaps, ScoreTable, ScoreVariances, log_likelihood_factorised, scores
+from hmc.pose.objectives.four_scores import ScoreVariances, log_likelihood_factorised, scores
 from hmc.pose.steps.hidden.limbs import LimbSettings, limb_spread_deg
-from hmc.pose.steps.hidden.shown import in_doubt, limb_signs, place_flesh
+from hmc.pose.steps.hidden.shown import FleshInHulls, in_doubt, limb_signs, place_flesh
 from hmc.pose.steps.restrict import part_mask, restrict_table
-from hmc.pose.views.hull_target import HullTarget
 from hmc.search.filters import AnnealedSettings, annealed_step, particle_init
 from hmc.search.truncated import truncated_normal
 from hmc.search.weights import normalise
@@ -67,9 +66,7 @@ def limb_dofs(settings: LimbSettings, limb: int) -> np.ndarray:
 
 def scout(
     rng: np.random.Generator,
-    table: ScoreTable,
-    maps: ScoreMaps,
-    target: HullTarget,
+    looked: FleshInHulls,
     state: np.ndarray,
     limb: int,
     active: np.ndarray,
@@ -80,11 +77,7 @@ def scout(
     Parameters
     ----------
     rng : numpy.random.Generator
-    table : ScoreTable
-        Of the whole body.
-    maps : ScoreMaps
-        Of the target.
-    target : HullTarget
+    looked : FleshInHulls
     state : ndarray, shape (27,)
         Estimate of the tracked limbs.
     limb : int
@@ -92,7 +85,7 @@ def scout(
     active : ndarray of bool, shape (n_limbs,)
     settings : LimbSettings
     """
-    tree = settings.tree
+    tree, table = settings.tree, looked.table
     own_parts, dofs = tree.limbs[limb].parts, limb_dofs(settings, limb)
     moved = [*own_parts, *(tree.limbs[tree.parent[limb]].parts if tree.parent[limb] >= 0 else ())]
     scored, others = part_mask(moved), part_mask(tree.model(active).parts)
@@ -102,7 +95,7 @@ def scout(
     variances = ScoreVariances().by_part()[scored]
 
     def log_likelihood(angles: np.ndarray) -> np.ndarray:
-        return log_likelihood_factorised(scores(lean, _with(state, dofs, angles), maps)[:, scored], variances)
+        return log_likelihood_factorised(scores(lean, _with(state, dofs, angles), looked.maps)[:, scored], variances)
 
     own = tree.limbs[limb].dofs
     starts = np.repeat(state[None, dofs], settings.scouts, axis=0)
@@ -127,7 +120,7 @@ def scout(
     weights = normalise(cloud.log_weights)
     found = _with(state, dofs, (weights @ cloud.particles)[None])[0]
     spread = float(np.median(limb_spread_deg(cloud.particles, weights)[broad]))
-    flesh = place_flesh(table, found, maps, target, moved)
+    flesh = place_flesh(looked, found, moved)
     signs = limb_signs(flesh, own_parts, others)
     enough = signs.occupancy > settings.found_occupancy or signs.strict > settings.found_strict
     shown = spread < settings.found_spread_deg and enough and not in_doubt(flesh, limb, active, settings)

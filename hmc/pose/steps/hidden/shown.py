@@ -12,10 +12,10 @@ from hmc.body.kinematics import segment_transforms
 from hmc.body.nearest_cone import part_distances
 from hmc.pose.objectives.four_scores import ScoreMaps, ScoreTable
 from hmc.pose.steps.hidden.limbs import LimbSettings
-from hmc.pose.steps.restrict import part_mask
+from hmc.pose.steps.restrict import part_mask, score_maps
 from hmc.pose.views.hull_target import HullTarget, distance_at
 
-__all__ = ["LimbSigns", "PlacedFlesh", "covered", "in_doubt", "limb_signs", "place_flesh"]
+__all__ = ["FleshInHulls", "LimbSigns", "PlacedFlesh", "covered", "flesh_in_hulls", "in_doubt", "limb_signs", "place_flesh"]
 
 #: Flesh nearer than this to another part says nothing of its own part, metres.
 FREE_M = 0.05
@@ -27,6 +27,30 @@ INSIDE_M = 0.02
 FOLDED = 0.3
 #: Share of an upper arm or thigh that is in the trunk anyway, more than of a forearm or shank in others: where they are joined.
 JOINED = 0.3
+
+
+@dataclass(frozen=True)
+class FleshInHulls:
+    """A body's flesh and the hulls of one frame in which it is looked up.
+
+    Parameters
+    ----------
+    table : ScoreTable
+        Of the whole body.
+    target : HullTarget
+        The hulls, strict and tolerant.
+    maps : ScoreMaps
+        Of the target.
+    """
+
+    table: ScoreTable
+    target: HullTarget
+    maps: ScoreMaps
+
+
+def flesh_in_hulls(table: ScoreTable, target: HullTarget, room: np.ndarray | None = None) -> FleshInHulls:
+    """Make a frame's hulls ready for the look-ups; `room`, shape (2, 3), as of `hmc.pose.steps.restrict.score_maps`."""
+    return FleshInHulls(table, target, score_maps(target, room))
 
 
 @dataclass(frozen=True)
@@ -76,19 +100,16 @@ class LimbSigns:
     inside: float
 
 
-def place_flesh(table: ScoreTable, state: np.ndarray, maps: ScoreMaps, target: HullTarget, parts: Collection[str]) -> PlacedFlesh:
+def place_flesh(looked: FleshInHulls, state: np.ndarray, parts: Collection[str]) -> PlacedFlesh:
     """The flesh of some parts in a pose, and what the hulls say at each of its points.
 
     Parameters
     ----------
-    table : ScoreTable
-        Of the whole body.
+    looked : FleshInHulls
     state : ndarray, shape (27,)
-    maps : ScoreMaps
-        Of the target.
-    target : HullTarget
     parts : collection of str
     """
+    table, maps = looked.table, looked.maps
     flesh, rows = table.flesh, part_mask(parts)[table.flesh.part]
     points = place_points(*segment_transforms(table.body, state), flesh.points[rows], flesh.segment[rows])
     index = np.floor((points - maps.origin) / maps.voxel_size_m).astype(int)
@@ -99,7 +120,7 @@ def place_flesh(table: ScoreTable, state: np.ndarray, maps: ScoreMaps, target: H
         flesh.is_surface[rows],
         part_distances(table.body, state, points),
         occupied > 0,
-        distance_at(target, points) == 0,
+        distance_at(looked.target, points) == 0,
         closeness / 255,
     )
 

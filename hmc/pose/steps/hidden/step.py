@@ -10,9 +10,9 @@ from hmc.body.joints import N_DOF
 from hmc.pose.method import PoseStep, StepInfo, Tracked, particles_of, unseen, with_particles
 from hmc.pose.steps.hidden.limbs import LimbMemory, LimbSettings, limb_spread_deg, look_again
 from hmc.pose.steps.hidden.scouts import limb_dofs, scout
-from hmc.pose.steps.hidden.shown import covered, in_doubt, place_flesh
+from hmc.pose.steps.hidden.shown import covered, flesh_in_hulls, in_doubt, place_flesh
 from hmc.pose.steps.proposal import shows_enough
-from hmc.pose.steps.restrict import nearest_part, part_mask, restrict_target, restricted, score_maps
+from hmc.pose.steps.restrict import nearest_part, part_mask, restrict_target, restricted
 from hmc.pose.views.hull_target import HullTarget
 from hmc.pose.views.person_view import PersonView
 from hmc.search.weights import normalise
@@ -87,11 +87,11 @@ def _look(
     tree, table, particles = limbs.tree, tracked.subject.flesh, particles_of(tracked)
     if table is None:
         raise ValueError("the subject has no table of its flesh, by which limbs are looked for")
-    maps = score_maps(target, tracked.subject.capture.room)
+    looked = flesh_in_hulls(table, target, tracked.subject.capture.room)
     weights = normalise(particles.log_weights)
     evidence = np.zeros(len(tree.limbs), bool)
     found, freed, evaluations = {}, {}, 0
-    flesh = place_flesh(table, estimate, maps, target, [part for limb in tree.limbs for part in limb.parts])
+    flesh = place_flesh(looked, estimate, [part for limb in tree.limbs for part in limb.parts])
     for k, limb in enumerate(tree.limbs):
         if memory.active[k]:
             evaluations += 1
@@ -99,7 +99,7 @@ def _look(
             if spread > limbs.lost_spread_deg:
                 evidence[k] = in_doubt(flesh, k, memory.active, limbs)
         elif tree.parent[k] < 0 or memory.active[tree.parent[k]]:
-            report = scout(rng, table, maps, target, estimate, k, memory.active, limbs)
+            report = scout(rng, looked, estimate, k, memory.active, limbs)
             evaluations += report.evaluations
             found[k], evidence[k] = report.state, report.shown
             # Without its lower part an upper one that went into the trunk would stay there: nothing asks for it elsewhere.
