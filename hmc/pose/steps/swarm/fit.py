@@ -20,6 +20,9 @@ __all__ = [
     "rest_state", "torso_moves",
 ]  # fmt: skip
 
+#: Lowest and highest value of every parameter, shape (23,) each.
+Box = tuple[np.ndarray, np.ndarray]
+
 _TORSO = tuple(range(7))
 
 
@@ -126,7 +129,7 @@ def rest_state(model: SkeletonModel, centre: np.ndarray, up: np.ndarray, spin: f
     return state
 
 
-def bounds_around(model: SkeletonModel, state: np.ndarray, metres: float, radians: float) -> tuple[np.ndarray, np.ndarray]:
+def bounds_around(model: SkeletonModel, state: np.ndarray, metres: float, radians: float) -> Box:
     """A box about a state, its angles within the limits of the joints (motion constraints, section 3.2.2.3)."""
     reach = np.concatenate([np.full(6, metres), np.full(1 + len(ANGLES), radians)])
     low, high = state - reach, state + reach
@@ -202,8 +205,8 @@ def fit_hierarchical(
         for index in known - {6}:
             low[index], high[index] = near[0][index], near[1][index]
         low[6], high[6] = start[6] - spin_range, start[6] + spin_range
-        swarm = _sized(settings.swarm, particles, iterations)
-        state, more = _optimise(rng, model, seen, state, np.array(free), low, high, swarm, prior)
+        swarm = replace(settings.swarm, particles=particles, iterations=iterations)
+        state, more = _optimise(rng, _Goal(model, seen, prior), state[None], np.array(free), (low, high), swarm)
         evaluations += more
     tuned = fine_tune(rng, model, observed, state, settings, prior)
     return replace(tuned, evaluations=evaluations + tuned.evaluations)
@@ -214,35 +217,32 @@ def fit_around(
     model: SkeletonModel,
     observed: SampledCurves,
     starts: np.ndarray,
-    low: np.ndarray,
-    high: np.ndarray,
-    settings: FitSettings,
-    particles: int,
-    iterations: int,
+    box: Box,
+    swarm: PsoSettings,
     prior: Prior | None = None,
 ) -> Fitted:
     """All parameters within a box, from several starts: temporal PSO (section 3.2.2.5).
 
     Parameters
     ----------
-    rng, model, observed, settings
+    rng, model, observed
         As for `fit_hierarchical`.
     starts : ndarray, shape (k, 23)
         The first is what parameters outside the search keep.
-    low, high : ndarray, shape (23,)
-    particles, iterations : int
+    box : tuple of ndarray, shape (23,)
+        Lowest and highest values, as of `bounds_around`.
+    swarm : PsoSettings
     prior : Prior, optional
     """
-    swarm = _sized(settings.swarm, particles, iterations)
-    starts = np.concatenate([starts, _one_part_moved(rng, starts[0], low, high, particles - len(starts))])
-    state, evaluations = _optimise(rng, model, observed, starts[0], np.arange(N_PARAMETERS), low, high, swarm, prior, starts)
+    starts = np.concatenate([starts, _one_part_moved(rng, starts[0], box, swarm.particles - len(starts))])
+    state, evaluations = _optimise(rng, _Goal(model, observed, prior), starts, np.arange(N_PARAMETERS), box, swarm)
     return _fitted(model, observed, state, evaluations)
 
 
-def _one_part_moved(rng: np.random.Generator, state: np.ndarray, low: np.ndarray, high: np.ndarray, n: int) -> np.ndarray:
+def _one_part_moved(rng: np.random.Generator, state: np.ndarray, box: Box, n: int) -> np.ndarray:
     """States (n, 23) that differ from a known one in one part each: of places anywhere in a box of 23 dimensions, hardly any is a pose."""
     states = np.repeat(state[None], max(n, 0), axis=0)
-    moved = rng.uniform(low, high, states.shape)
+    moved = rng.uniform(*box, states.shape)
     far = rng.random((len(states), 1))
     for k, free in enumerate(PARTS):
         rows = np.arange(k, len(states), len(PARTS))[:, None]
@@ -261,7 +261,7 @@ def fit_flat(
     """All 23 parameters at once, for comparison; arguments as for `fit_hierarchical`."""
     low, high = bounds_around(model, start, 0.25, 4 * np.pi)
     low[6], high[6] = start[6] - spin_range, start[6] + spin_range
-    state, evaluations = _optimise(rng, model, observed, start, np.arange(N_PARAMETERS), low, high, swarm, Prior(start))
+    state, evaluations = _optimise(rng, _Goal(model, observed, Prior(start)), start[None], np.arange(N_PARAMETERS), (low, high), swarm)
     return _fitted(model, observed, state, evaluations)
 
 
@@ -274,26 +274,44 @@ def fine_tune(
     prior: Prior | None = None,
 ) -> Fitted:
     """Section 3.2.2.4: torso, head, arms and legs one after the other, near where they are."""
-    evaluations = 0
-    swarm = _sized(settings.swarm, settings.tune_particles, settings.tune_iterations)
+    evaluations, goal = 0, _Goal(model, observed, prior)
+    swarm = replace(settings.swarm, particles=settings.tune_particles, iterations=settings.tune_iterations)
     for number in range(settings.tune_rounds):
         share = 0.5**number
         for free in PARTS:
-            low, high = bounds_around(model, state, share * settings.tune_m, share * settings.tune_rad)
+            box = bounds_around(model, state, share * settings.tune_m, share * settings.tune_rad)
             moves = torso_moves(model, state) if free == _TORSO else None
-            state, more = _optimise(rng, model, observed, state, np.array(free), low, high, swarm, prior, moves=moves)
+            state, more = _optimise(rng, goal, state[None], np.array(free), box, swarm, moves)
             evaluations += more
     return _fitted(model, observed, state, evaluations)
 
 
-def _sized(swarm: PsoSettings, particles: int, iterations: int) -> PsoSettings:
-    return PsoSettings(
-        particles, iterations, swarm.inertia, swarm.own, swarm.shared, swarm.topology, swarm.swarms, swarm.fastest, swarm.stop_spread
-    )
+@dataclass(frozen=True)
+class _Goal:
+    """What a swarm seeks: states (n, 23) of a model that cost least for some curves (`fit_cost`, metres)."""
+
+    model: SkeletonModel
+    observed: SampledCurves
+    prior: Prior | None
+
+    def cost(self, states: np.ndarray) -> np.ndarray:
+        return fit_cost(self.model, states, self.observed, self.prior)
 
 
-def _optimise(rng, model, observed, state, free, low, high, swarm, prior, starts=None, moves=None):
-    """The state with some parameters optimised, and the number of evaluations; `moves` (k, 23): what each one moves, by default itself."""
+def _optimise(
+    rng: np.random.Generator,
+    goal: _Goal,
+    starts: np.ndarray,
+    free: np.ndarray,
+    box: Box,
+    swarm: PsoSettings,
+    moves: np.ndarray | None = None,
+) -> tuple[np.ndarray, int]:
+    """The first of the starts (n, 23) with some parameters optimised, and the number of evaluations.
+
+    `moves` (k, 23) says what each free parameter moves, by default itself.
+    """
+    model, state, (low, high) = goal.model, starts[0], box
     moves = np.eye(N_PARAMETERS)[free] if moves is None else moves
 
     def moved(values: np.ndarray) -> np.ndarray:
@@ -302,9 +320,9 @@ def _optimise(rng, model, observed, state, free, low, high, swarm, prior, starts
         return states
 
     def cost(values: np.ndarray) -> np.ndarray:
-        return fit_cost(model, moved(values), observed, prior)
+        return goal.cost(moved(values))
 
-    found = pso_run(rng, cost, low[free], high[free], swarm, (state[None] if starts is None else starts)[:, free])
+    found = pso_run(rng, cost, low[free], high[free], swarm, starts[:, free])
     out = moved(found.leader[None])[0]
     # Only the direction of the neck counts: keep it on the torso.
     axis = out[3:6] - out[:3]
