@@ -77,7 +77,7 @@ def find_da_vinci(points: np.ndarray, voxel_size_m: float, floor_z: float, heigh
     forward = np.array([-across[1], across[0]])
     if forward @ toes < 0:
         forward = -forward
-    left = np.array([-forward[1], forward[0]])
+    left = _left_of(forward)
     along = high[:, :2] @ left
     reach = 2 * voxel_size_m
     hands = [high[along >= along.max() - reach].mean(axis=0), high[along <= along.min() + reach].mean(axis=0)]
@@ -85,7 +85,11 @@ def find_da_vinci(points: np.ndarray, voxel_size_m: float, floor_z: float, heigh
     if span < _LEAST_SPAN * stature:
         return None
     body = _with_arms(default_body(height_m or stature), span)
-    return DaVinci(body, _pose(body, feet, hands, top, forward, left, floor_z, high))
+    return DaVinci(body, _pose(body, feet, hands, top, forward, floor_z))
+
+
+def _left_of(forward: np.ndarray) -> np.ndarray:
+    return np.array([-forward[1], forward[0]])
 
 
 def _two_feet(points: np.ndarray, across: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
@@ -106,9 +110,9 @@ def _with_arms(body: BodyModel, span: float) -> BodyModel:
     return make_body(d | {name: d[name] * float(factor) for name in ("upper_arm", "forearm", "hand")}, body.limits)
 
 
-def _pose(body: BodyModel, feet, hands, top: float, forward: np.ndarray, left: np.ndarray, floor_z: float, high: np.ndarray) -> np.ndarray:
+def _pose(body: BodyModel, feet, hands, top: float, forward: np.ndarray, floor_z: float) -> np.ndarray:
     """Inverse kinematics to the ends that were found."""
-    d = body.dimensions
+    d, left = body.dimensions, _left_of(forward)
     state = neutral_state("sideways", body.limits)
     if feet[0] @ left < feet[1] @ left:
         feet = feet[::-1]

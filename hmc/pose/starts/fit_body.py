@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hmc.body.dimensions import FITTED, GIRTHS, LENGTHS, FitBodySettings, reshaped
-from hmc.body.joints import N_DOF
+from hmc.body.joints import N_DOF, JointLimits
 from hmc.body.model import BodyModel
 from hmc.pose.objectives.residuals import residual_rows
 from hmc.pose.objectives.symmetric import Symmetric, body_points
@@ -32,6 +32,25 @@ class FitBodyInfo:
     cost_before: float
     cost_after: float
     accepted: bool
+
+
+@dataclass(frozen=True)
+class _Prior:
+    """What holds poses and dimensions where the data says little.
+
+    Parameters
+    ----------
+    anchors : ndarray, shape (n_frames, 27)
+        Poses near which those of the frames stay.
+    hold : ndarray, shape (27,)
+        Cost of a squared unit away from them.
+    precision : ndarray, shape (n_fitted,)
+        Cost a frame of a squared change of each dimension's logarithm.
+    """
+
+    anchors: np.ndarray
+    hold: np.ndarray
+    precision: np.ndarray
 
 
 def fit_body(
@@ -56,12 +75,12 @@ def fit_body(
     info : FitBodyInfo
     """
     body = objectives[0].body
-    low, high = body.limits.low, body.limits.high
     hold = 4e-6 / np.r_[np.full(3, 0.1), np.full(N_DOF - 3, 0.5)] ** 2
     precision = settings.prior_weight / np.array(
         [settings.scale_deviation**2] + [settings.length_deviation**2] * len(LENGTHS) + [settings.girth_deviation**2] * len(GIRTHS)
     )
-    anchors = states = np.clip(states, low, high)
+    states = np.clip(states, body.limits.low, body.limits.high)
+    prior = _Prior(states, hold, precision)
     shape = np.zeros(len(FITTED))
 
     def with_shape(shape: np.ndarray) -> list[Symmetric]:
@@ -82,7 +101,7 @@ def fit_body(
     def costs(shape, states):
         data = [one.linearise(state).residuals for one, state in zip(with_shape(shape), states, strict=True)]
         fit = sum(float(r @ r) for r in data)
-        total = fit + float((hold * (states - anchors) ** 2).sum()) + len(states) * float(precision @ shape**2)
+        total = fit + float((prior.hold * (states - prior.anchors) ** 2).sum()) + len(states) * float(prior.precision @ shape**2)
         return total, fit / len(states)
 
     total, before = costs(shape, states)
@@ -90,7 +109,7 @@ def fit_body(
     for _ in range(settings.iterations):
         frames = rows(shape, states)
         for _ in range(4):
-            trial_shape, trial_states = _gauss_newton(frames, shape, states, anchors, hold, precision, damping, low, high)
+            trial_shape, trial_states = _gauss_newton(frames, shape, states, prior, damping, body.limits)
             trial_total, trial_fit = costs(trial_shape, trial_states)
             if trial_total < total:
                 break
@@ -105,16 +124,16 @@ def fit_body(
     return reshaped(body, shape), states, FitBodyInfo(before, after, True)
 
 
-def _gauss_newton(frames, shape, states, anchors, hold, precision, damping, low, high):
+def _gauss_newton(frames, shape: np.ndarray, states: np.ndarray, prior: _Prior, damping: float, limits: JointLimits):
     """One damped step of shape and poses together, the poses eliminated."""
     n_shape = len(shape)
-    matrix = np.diag(len(states) * precision)
-    gradient = len(states) * precision * shape
+    matrix = np.diag(len(states) * prior.precision)
+    gradient = len(states) * prior.precision * shape
     solved = []
-    for (residual, by_pose, by_shape), state, anchor in zip(frames, states, anchors, strict=True):
-        pose_gradient = by_pose.T @ residual + hold * (state - anchor)
-        free = movable(state, pose_gradient, low, high)
-        normal = damped(by_pose[:, free].T @ by_pose[:, free] + np.diag(hold[free]), damping)
+    for (residual, by_pose, by_shape), state, anchor in zip(frames, states, prior.anchors, strict=True):
+        pose_gradient = by_pose.T @ residual + prior.hold * (state - anchor)
+        free = movable(state, pose_gradient, limits.low, limits.high)
+        normal = damped(by_pose[:, free].T @ by_pose[:, free] + np.diag(prior.hold[free]), damping)
         cross = by_pose[:, free].T @ by_shape
         inverse = np.linalg.solve(normal, np.column_stack([cross, pose_gradient[free]]))
         matrix += by_shape.T @ by_shape - cross.T @ inverse[:, :n_shape]
@@ -124,4 +143,4 @@ def _gauss_newton(frames, shape, states, anchors, hold, precision, damping, low,
     new_states = states.copy()
     for row, (free, inverse) in zip(new_states, solved, strict=True):
         row[free] += np.clip(-inverse[:, n_shape] - inverse[:, :n_shape] @ step, -0.3, 0.3)
-    return shape + step, np.clip(new_states, low, high)
+    return shape + step, np.clip(new_states, limits.low, limits.high)
