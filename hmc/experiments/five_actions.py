@@ -8,7 +8,8 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
-from hmc.synthetic.recipe import ActorRecipe, Recipe, RigRecipe, load_recipe
+from hmc.synthetic.recipe import ActorRecipe, Recipe, load_recipe
+from hmc.synthetic.rigs import RigRecipe
 
 __all__ = ["ACTIONS", "ACTORS", "LONG_SUFFIX", "action_name", "action_recipes", "action_title"]
 

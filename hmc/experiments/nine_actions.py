@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from hmc.synthetic.recipe import ActorRecipe, ImageRecipe, LightRecipe, Recipe, RigRecipe, RoomRecipe
+from hmc.synthetic.recipe import ActorRecipe, ImageRecipe, LightRecipe, Recipe, RoomRecipe
+from hmc.synthetic.rigs import RigRecipe
 
 __all__ = ["NINE_ACTIONS", "nine_recipes"]
 

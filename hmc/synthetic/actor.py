@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from hmc.errors import InputError
 from hmc.synthetic.clothes import Clothes, dress
 from hmc.synthetic.physique import body_sweeps, girth_of
-from hmc.synthetic.skeleton import BONE_NAMES, Skeleton, joint_positions, make_skeleton
+from hmc.synthetic.skeleton import BONE_NAMES, PosedSkeleton, Skeleton, joint_positions, make_skeleton
 from hmc.synthetic.surface import Sweep, distances, mesh_of
 
 __all__ = ["PARTS", "Actor", "bind_orientations", "make_actor", "pose_mesh"]
@@ -106,7 +106,8 @@ def make_actor(
     skeleton = make_skeleton(height_m, sex, rng)
     frames = bind_orientations()
     joints = joint_positions(skeleton, np.array([0, 0, skeleton.hip_height]), frames)
-    named = body_sweeps(skeleton, sex, girth_of(build), clothes.loose_m, clothes.long_hair, joints, frames, rng)
+    posed = PosedSkeleton(skeleton, joints, frames)
+    named = body_sweeps(posed, sex, girth_of(build), clothes.loose_m, clothes.long_hair, rng)
     names, sweeps = [name for name, _ in named], [sweep for _, sweep in named]
     mesh = mesh_of(sweeps, cell_m)
     _, each = distances(sweeps, mesh.vertices)
@@ -115,7 +116,7 @@ def make_actor(
     weights = _spread(start, mesh.triangles, steps=round(6 * (0.014 / cell_m) ** 2))
     bones = weights.argmax(axis=1)
     part_of_bone = np.array([next(p for p, members in enumerate(PARTS.values()) if name in members) for name in BONE_NAMES])
-    albedo = dress(names, nearest, mesh.vertices, joints, frames, skeleton, clothes, rng)
+    albedo = dress(np.array(names)[nearest], mesh.vertices, posed, clothes, rng)
     return Actor(
         skeleton,
         mesh.vertices,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hmc.errors import InputError
-from hmc.synthetic.skeleton import BONE_NAMES, Skeleton
+from hmc.synthetic.skeleton import BONE_NAMES, PosedSkeleton
 
 __all__ = ["PATTERNS", "Clothes", "dress"]
 
@@ -44,29 +44,17 @@ class Clothes:
     loose_m: float = 0.007
 
 
-def dress(
-    names: list[str],
-    nearest: np.ndarray,
-    vertices: np.ndarray,
-    joints: np.ndarray,
-    frames: np.ndarray,
-    skeleton: Skeleton,
-    clothes: Clothes,
-    rng: np.random.Generator,
-) -> np.ndarray:
+def dress(region: np.ndarray, vertices: np.ndarray, posed: PosedSkeleton, clothes: Clothes, rng: np.random.Generator) -> np.ndarray:
     """The colour of every point of a skin: face, hair and clothes, with the folds of cloth.
 
     Parameters
     ----------
-    names : list of str
-        Of the body's sweeps, as `hmc.synthetic.physique.body_sweeps` gives them.
-    nearest : ndarray of int, shape (n,)
-        The sweep that each vertex lies on.
+    region : ndarray of str, shape (n,)
+        Name of the sweep that each vertex lies on, as `hmc.synthetic.physique.body_sweeps` gives it.
     vertices : ndarray, shape (n, 3)
         In the pose in which the skin is modelled, metres.
-    joints, frames : ndarray, shapes (n_bones, 3) and (n_bones, 3, 3)
-        That pose.
-    skeleton : Skeleton
+    posed : PosedSkeleton
+        In that pose.
     clothes : Clothes
     rng : Generator
         Places the folds.
@@ -76,12 +64,12 @@ def dress(
     ndarray, shape (n, 3)
         Linear reflectance, BGR.
     """
-    region = np.array(names)[nearest]
+    skeleton, joints = posed.skeleton, posed.joints
 
     def along(bone: str) -> np.ndarray:
         k = BONE_NAMES.index(f"l_{bone}")
         mirrored = vertices * [1, -1, 1] * (vertices[:, 1:2] < 0) + vertices * (vertices[:, 1:2] >= 0)
-        return (mirrored - joints[k]) @ frames[k]
+        return (mirrored - joints[k]) @ posed.frames[k]
 
     trunk_height = joints[BONE_NAMES.index("neck"), 2] - joints[0, 2]
     height = (vertices[:, 2] - joints[0, 2]) / trunk_height

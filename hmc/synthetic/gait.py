@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,6 +15,33 @@ __all__ = ["jog", "walk", "walk_along"]
 
 #: Place (..., 2), metres, and heading (...), radians, after a distance (...) along the way; it goes on before its start and after its end.
 Way = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
+
+
+@dataclass(frozen=True)
+class _Gait:
+    """How somebody walks or runs.
+
+    Parameters
+    ----------
+    speed_m_s : float
+        To which swing and bend of the arms fit.
+    stride_m : float
+        Length of two steps.
+    stance : float
+        Share of a cycle for which a foot bears weight.
+    bounce_m : float
+        How far the pelvis of a runner goes up and down about its middle; 0 walks.
+    """
+
+    speed_m_s: float
+    stride_m: float
+    stance: float = 0.62
+    bounce_m: float = 0.0
+
+    @property
+    def running(self) -> bool:
+        """Whether there is a phase of flight."""
+        return self.bounce_m > 0
 
 
 def walk(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator, speed_m_s: float = 1.25, turn_radius_m: float = 0.0) -> Motion:
@@ -38,14 +66,14 @@ def walk(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator, speed_
     """
     stride = skeleton.height_m * (0.50 + 0.215 * speed_m_s) * rng.normal(1, 0.02)
     way = functools.partial(_path, radius=turn_radius_m)
-    return _gait(skeleton, times, rng, speed_m_s * times, speed_m_s, way, stride, stance=0.62, bounce=0.0)
+    return _motion(skeleton, times, rng, speed_m_s * times, way, _Gait(speed_m_s, stride))
 
 
 def jog(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator, speed_m_s: float = 2.2, turn_radius_m: float = 0.0) -> Motion:
     """Jog, with a phase of flight; arguments as for `walk`."""
     stride = skeleton.height_m * (0.50 + 0.30 * speed_m_s) * rng.normal(1, 0.02)
     way = functools.partial(_path, radius=turn_radius_m)
-    return _gait(skeleton, times, rng, speed_m_s * times, speed_m_s, way, stride, stance=0.38, bounce=0.03)
+    return _motion(skeleton, times, rng, speed_m_s * times, way, _Gait(speed_m_s, stride, stance=0.38, bounce_m=0.03))
 
 
 def walk_along(
@@ -74,7 +102,7 @@ def walk_along(
         In the coordinates of the way.
     """
     stride = stride_m or skeleton.height_m * (0.50 + 0.215 * speed_m_s) * rng.normal(1, 0.02)
-    return _gait(skeleton, times, rng, distance, speed_m_s, way, stride, stance=0.62, bounce=0.0)
+    return _motion(skeleton, times, rng, distance, way, _Gait(speed_m_s, stride))
 
 
 def _path(distance: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray]:
@@ -85,23 +113,12 @@ def _path(distance: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray]:
     return radius * np.stack([np.sin(heading), 1 - np.cos(heading)], axis=-1), heading
 
 
-def _gait(
-    skeleton: Skeleton,
-    times: np.ndarray,
-    rng: np.random.Generator,
-    distance: np.ndarray,
-    speed: float,
-    way: Way,
-    stride: float,
-    stance: float,
-    bounce: float,
-) -> Motion:
-    running = bounce > 0
+def _motion(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator, distance: np.ndarray, way: Way, gait: _Gait) -> Motion:
+    running, stride = gait.running, gait.stride_m
     phase = rng.uniform(0, 1)
     cycles = distance / stride + phase  # of the left foot; the right is half a cycle later
     origin = phase * stride
-    width = skeleton.height_m * (0.025 if running else 0.045)
-    feet = _feet(skeleton, cycles, stride, stance, width, way, origin, running)
+    feet = _feet(skeleton, cycles, way, origin, gait)
     sway = np.sin(2 * np.pi * cycles)
     twist = np.cos(2 * np.pi * cycles)
     middle, heading = way(cycles * stride - origin)
@@ -115,7 +132,7 @@ def _gait(
     if running:
         # Lowest in the middle of each stance, highest in flight.
         base = skeleton.hip_height - 0.035 * skeleton.height_m / 1.75
-        height = base - bounce * np.cos(4 * np.pi * (cycles - stance / 2))
+        height = base - gait.bounce_m * np.cos(4 * np.pi * (cycles - gait.stance / 2))
     else:
         height = pelvis_height(skeleton, middle, pelvis_yaw, feet, slack=0.995, smooth=0.025 * fps) - 0.002
         # Knees give way a little in the middle of stance, so that the pelvis rises less than straight legs would lift it.
@@ -127,10 +144,10 @@ def _gait(
         neck=np.stack([zero, zero + 0.05, -0.5 * yaw_size * twist], axis=-1),
         head=np.stack([zero, zero - 0.05 - lean * 0.7, -0.5 * yaw_size * twist], axis=-1),
     )
-    size = np.radians(rng.uniform(19, 26) * (1.5 if running else 0.6 + 0.35 * speed))
+    size = np.radians(rng.uniform(19, 26) * (1.5 if running else 0.6 + 0.35 * gait.speed_m_s))
     swing_left, swing_right = -size * np.cos(2 * np.pi * (cycles - 0.05)), size * np.cos(2 * np.pi * (cycles - 0.05))
     swing = np.stack([swing_left, swing_right], axis=-1) + (-0.08 if running else 0.03)
-    bend = np.radians(85 if running else 14 + 6 * speed)
+    bend = np.radians(85 if running else 14 + 6 * gait.speed_m_s)
     flex = bend + 0.35 * np.clip(swing, -0.5, 1.0)
     out = np.full_like(swing, np.radians(rng.uniform(8, 12)))
     root = np.column_stack([middle, height])
@@ -142,10 +159,13 @@ _WALK_PITCH = ((0.0, 18), (0.08, 3), (0.13, 0), (0.36, 0), (0.50, -18), (0.62, -
 _RUN_PITCH = ((0.0, 6), (0.05, 0), (0.16, 0), (0.28, -20), (0.38, -60), (0.52, -80), (0.75, -20), (0.92, 6), (1.0, 6))
 
 
-def _feet(
-    skeleton: Skeleton, cycles: np.ndarray, stride: float, stance: float, width: float, way: Way, origin: float, running: bool
-) -> Feet:
-    """Feet that stay where they are put while they bear weight, and swing on to the next footprint."""
+def _feet(skeleton: Skeleton, cycles: np.ndarray, way: Way, origin: float, gait: _Gait) -> Feet:
+    """Feet that stay where they are put while they bear weight, and swing on to the next footprint.
+
+    The way begins `origin` metres after the first cycle did.
+    """
+    running, stance = gait.running, gait.stance
+    width = skeleton.height_m * (0.025 if running else 0.045)
     curve = np.array(_RUN_PITCH if running else _WALK_PITCH, float)
     n = len(cycles)
     ankles, yaw, pitch, toe = np.zeros((n, 2, 3)), np.zeros((n, 2)), np.zeros((n, 2)), np.zeros((n, 2))
@@ -157,7 +177,7 @@ def _feet(
 
         def print_of(k: np.ndarray, s: int = s, offset: float = offset) -> tuple[np.ndarray, np.ndarray]:
             # The body passes over the foot a little before the middle of stance.
-            centre, heading = way((k + offset + 0.40 * stance) * stride - origin)
+            centre, heading = way((k + offset + 0.40 * stance) * gait.stride_m - origin)
             side = (1 - 2 * s) * width
             return centre + side * np.stack([-np.sin(heading), np.cos(heading)], axis=-1), heading + (1 - 2 * s) * np.radians(5)
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from hmc.errors import InputError
-from hmc.synthetic.skeleton import BONE_NAMES, Skeleton, unit
+from hmc.synthetic.skeleton import BONE_NAMES, PosedSkeleton, unit
 from hmc.synthetic.surface import Sweep
 
 __all__ = ["BUILDS", "body_sweeps", "girth_of"]
@@ -95,28 +95,19 @@ def girth_of(build: str | float) -> float:
 
 
 def body_sweeps(
-    skeleton: Skeleton,
-    sex: str,
-    girth: float,
-    loose_m: float,
-    long_hair: bool,
-    joints: np.ndarray,
-    orientations: np.ndarray,
-    rng: np.random.Generator,
+    posed: PosedSkeleton, sex: str, girth: float, loose_m: float, long_hair: bool, rng: np.random.Generator
 ) -> list[tuple[str, Sweep]]:
     """The body's sweeps in a given pose, each with the name of its table.
 
     Parameters
     ----------
-    skeleton : Skeleton
+    posed : PosedSkeleton
     sex : {"man", "woman"}
     girth : float
         From `girth_of`.
     loose_m : float
         How far clothes stand off the body, metres.
     long_hair : bool
-    joints, orientations : ndarray, shapes (n_bones, 3) and (n_bones, 3, 3)
-        The pose.
     rng : Generator
         Individual variation of girths.
 
@@ -124,6 +115,7 @@ def body_sweeps(
     -------
     list of (str, Sweep)
     """
+    skeleton, joints = posed.skeleton, posed.joints
     scale = skeleton.height_m / _REFERENCE_M
     woman = sex == "woman"
     factor = {name: scale * float(1 + 0.03 * np.clip(rng.standard_normal(), -2, 2)) for name in ("trunk", "arm", "leg", "end")}
@@ -132,7 +124,7 @@ def body_sweeps(
 
     def add(name: str, bone: str, axes: list[list[float]], table: np.ndarray, power: float, blend: float, origin=(0.0, 0.0, 0.0)) -> None:
         k = BONE_NAMES.index(bone)
-        frame = orientations[k]
+        frame = posed.frames[k]
         sweeps.append((name, Sweep(k, joints[k] + frame @ np.array(origin), unit(np.array(axes)) @ frame.T, table, power, blend)))
 
     forward, left, up = [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]

@@ -5,14 +5,14 @@ from __future__ import annotations
 import difflib
 import sysconfig
 import tomllib
-from dataclasses import MISSING, dataclass, fields, replace
+from dataclasses import MISSING, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, get_args, get_origin, get_type_hints
 
 from hmc.errors import InputError
 from hmc.synthetic.clothes import PATTERNS
 from hmc.synthetic.physique import girth_of
-from hmc.synthetic.rigs import RIGS
+from hmc.synthetic.rigs import RIGS, RigRecipe
 from hmc.synthetic.room import FURNITURE
 from hmc.synthetic.textures import TEXTURES
 
@@ -22,7 +22,6 @@ __all__ = [
     "ImageRecipe",
     "LightRecipe",
     "Recipe",
-    "RigRecipe",
     "RoomRecipe",
     "StepRecipe",
     "load_recipe",
@@ -43,18 +42,6 @@ MOTIONS = (
 STEPS = ("walk", "turn", "stand", "gesture", "box", "throw_catch", "pick_up", "hug", "sit")
 #: So many people can be told apart in silhouettes, by 85 or 51 x (person + 1).
 MOST_ACTORS = 5
-
-
-@dataclass(frozen=True)
-class RigRecipe:
-    """Cameras; see `hmc.synthetic.rigs.make_rig`. A `field_of_view_deg` (horizontal, degrees) of 0 takes the rig's own."""
-
-    kind: str = "ring7"
-    size_px: tuple[int, int] = (640, 480)
-    camera_height_m: float = 2.3
-    target_height_m: float = 0.95
-    field_of_view_deg: float = 0.0
-    distorted: bool = False
 
 
 @dataclass(frozen=True)
@@ -235,7 +222,7 @@ class Recipe:
     background_frames: int = 30
     silhouette_every: int = 30
     cell_m: float = 0.016
-    rig: RigRecipe = RigRecipe()
+    rig: RigRecipe = field(default_factory=RigRecipe)
     room: RoomRecipe = RoomRecipe()
     light: LightRecipe = LightRecipe()
     image: ImageRecipe = ImageRecipe()
@@ -319,9 +306,9 @@ def _fill(kind: type, table: Any, where: str) -> Any:
             raise InputError(
                 f"{where}: unknown key '{key}'" + (f"; did you mean '{near[0]}'?" if near else f"; keys are {', '.join(hints)}")
             )
-    for field in fields(kind):
-        if field.default is MISSING and field.name not in table:
-            raise InputError(f"{where}: '{field.name}' is missing")
+    for one in fields(kind):
+        if one.default is MISSING and one.default_factory is MISSING and one.name not in table:
+            raise InputError(f"{where}: '{one.name}' is missing")
     values = {}
     for key, value in table.items():
         if key == "script" and isinstance(value, list):

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from hmc.camera.model import Camera, Rig, look_at
 from hmc.errors import InputError
 
-__all__ = ["RIGS", "make_rig"]
+__all__ = ["RIGS", "RigRecipe", "make_rig"]
 
 #: Rigs by name: cameras in a ring, in corners, overhead.
 RIGS: dict[str, tuple[int, int, int]] = {
@@ -21,33 +21,41 @@ RIGS: dict[str, tuple[int, int, int]] = {
 }
 
 
-def make_rig(
-    name: str,
-    room: np.ndarray,
-    rng: np.random.Generator,
-    size: tuple[int, int] = (640, 480),
-    camera_height_m: float = 2.3,
-    target_height_m: float = 0.95,
-    field_of_view_deg: float | None = None,
-    distorted: bool = False,
-) -> Rig:
+@dataclass(frozen=True)
+class RigRecipe:
+    """What a rig is like.
+
+    Parameters
+    ----------
+    kind : str
+        One of `RIGS`.
+    size_px : (width, height)
+    camera_height_m, target_height_m : float
+        Heights of the wall cameras and of the point they look at.
+    field_of_view_deg : float
+        Horizontal; 0 takes the rig's own: 68 in a ring, 80 in corners, 95 overhead.
+    distorted : bool
+        Give each lens a radial distortion, k1 about -0.2.
+    """
+
+    kind: str = "ring7"
+    size_px: tuple[int, int] = (640, 480)
+    camera_height_m: float = 2.3
+    target_height_m: float = 0.95
+    field_of_view_deg: float = 0.0
+    distorted: bool = False
+
+
+def make_rig(recipe: RigRecipe, room: np.ndarray, rng: np.random.Generator) -> Rig:
     """A rig in a room, with the small irregularities of a real one.
 
     Parameters
     ----------
-    name : str
-        One of `RIGS`.
+    recipe : RigRecipe
     room : ndarray, shape (2, 3)
         Corners of the room, metres.
     rng : Generator
         Places, aim and intrinsics vary a little from camera to camera.
-    size : (width, height)
-    camera_height_m, target_height_m : float
-        Heights of the wall cameras and of the point they look at.
-    field_of_view_deg : float, optional
-        Horizontal. By default 68 in a ring, 80 in corners, 95 overhead.
-    distorted : bool
-        Give each lens a radial distortion, k1 about -0.2.
 
     Returns
     -------
@@ -56,11 +64,11 @@ def make_rig(
     Raises
     ------
     InputError
-        For an unknown name.
+        For an unknown kind.
     """
-    if name not in RIGS:
-        raise InputError(f"rig {name!r} is unknown; use one of {', '.join(RIGS)}")
-    ring, corners, overhead = RIGS[name]
+    if recipe.kind not in RIGS:
+        raise InputError(f"rig {recipe.kind!r} is unknown; use one of {', '.join(RIGS)}")
+    ring, corners, overhead = RIGS[recipe.kind]
     low, high = room
     middle, half = (low + high)[:2] / 2, (high - low)[:2] / 2
     places: list[tuple[np.ndarray, float]] = []
@@ -69,19 +77,19 @@ def make_rig(
         direction = np.array([np.cos(angle), np.sin(angle)])
         # As far out as the walls allow on a superellipse between the room's ellipse and its box.
         reach = 0.95 / (np.abs(direction / half) ** 4).sum() ** 0.25
-        places.append((np.append(middle + direction * reach, camera_height_m), 68.0))
+        places.append((np.append(middle + direction * reach, recipe.camera_height_m), 68.0))
     for sx, sy in ((-1, -1), (1, -1), (1, 1), (-1, 1))[:corners]:
-        places.append((np.append(middle + 0.93 * half * [sx, sy], camera_height_m + 0.25), 80.0))
+        places.append((np.append(middle + 0.93 * half * [sx, sy], recipe.camera_height_m + 0.25), 80.0))
     for _ in range(overhead):
         places.append((np.array([middle[0] + 0.05, middle[1] + 0.03, high[2] - 0.08]), 95.0))
     cameras = []
     for k, (position, fov) in enumerate(places):
         down = k >= ring + corners
         position = position + rng.normal(0, [0.05, 0.05, 0.0 if down else 0.08])
-        target = np.append(middle, 0.0 if down else target_height_m) + rng.normal(0, 0.08, 3)
-        k1 = rng.normal(-0.20, 0.03) if distorted else 0.0
-        k2 = 0.05 + rng.normal(0, 0.01) if distorted else 0.0
-        camera = look_at(f"cam_{k:02d}", size, position, target, field_of_view_deg or fov, (k1, k2, 0.0, 0.0))
+        target = np.append(middle, 0.0 if down else recipe.target_height_m) + rng.normal(0, 0.08, 3)
+        k1 = rng.normal(-0.20, 0.03) if recipe.distorted else 0.0
+        k2 = 0.05 + rng.normal(0, 0.01) if recipe.distorted else 0.0
+        camera = look_at(f"cam_{k:02d}", recipe.size_px, position, target, recipe.field_of_view_deg or fov, (k1, k2, 0.0, 0.0))
         cameras.append(_jitter(camera, rng))
     return Rig(tuple(cameras))
 

@@ -123,10 +123,7 @@ def build_scene(recipe: Recipe, seed: int | None = None) -> Scene:
     )
     x, y, z = recipe.room.size_m
     corners = np.array([[-x / 2, -y / 2, 0.0], [x / 2, y / 2, z]])
-    rig = make_rig(
-        recipe.rig.kind, corners, rng_rig, recipe.rig.size_px, recipe.rig.camera_height_m, recipe.rig.target_height_m,
-        recipe.rig.field_of_view_deg or None, recipe.rig.distorted,
-    )  # fmt: skip
+    rig = make_rig(recipe.rig, corners, rng_rig)
     walls = recipe.room.walls * (4 // len(recipe.room.walls))
     colours = recipe.room.wall_colours * (4 // len(recipe.room.wall_colours))
     fixed = [item for item in recipe.furniture if not item.moves]

@@ -12,7 +12,10 @@ import numpy as np
 
 from hmc.landmarks import LANDMARKS
 
-__all__ = ["BONE_NAMES", "PARENTS", "Skeleton", "joint_positions", "landmark_positions", "limb_orientations", "make_skeleton", "reach"]
+__all__ = [
+    "BONE_NAMES", "PARENTS", "PosedSkeleton", "Skeleton", "joint_positions", "landmark_positions", "limb_orientations", "make_skeleton",
+    "reach",
+]  # fmt: skip
 
 _TREE: tuple[tuple[str, str], ...] = (
     ("pelvis", ""), ("abdomen", "pelvis"), ("chest", "abdomen"), ("neck", "chest"), ("head", "neck"),
@@ -65,6 +68,24 @@ class Skeleton:
     def ankle_height(self) -> float:
         """Height of the ankle centre above the sole, metres."""
         return self.height_m * ANKLE_HEIGHT
+
+
+@dataclass(frozen=True)
+class PosedSkeleton:
+    """A skeleton in one pose.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    joints : ndarray, shape (n_bones, 3)
+        Origins of the bones, metres.
+    frames : ndarray, shape (n_bones, 3, 3)
+        Their orientations, world from bone.
+    """
+
+    skeleton: Skeleton
+    joints: np.ndarray
+    frames: np.ndarray
 
 
 #: Ankle centre above the sole, as a fraction of stature.

@@ -16,7 +16,7 @@ from hmc.landmarks import LANDMARKS
 from hmc.synthetic.image import light_crowd, make_backdrop, picture, static_shadows
 from hmc.synthetic.recipe import RECIPE_FOLDER, load_recipe, recipe_from, shipped_recipes
 from hmc.synthetic.render import render_recording
-from hmc.synthetic.rigs import RIGS, make_rig
+from hmc.synthetic.rigs import RIGS, RigRecipe, make_rig
 from hmc.synthetic.room import Room, cast_rays, furnish
 from hmc.synthetic.scene import build_scene, crowd_at
 
@@ -159,7 +159,7 @@ def test_rays_meet_walls_and_boxes_where_geometry_says():
 @pytest.mark.parametrize("name", RIGS)
 def test_rigs_stand_in_the_room_and_see_its_middle(name):
     room = np.array([[-3.0, -2.5, 0], [3, 2.5, 3]])
-    rig = make_rig(name, room, np.random.default_rng(0), distorted=True)
+    rig = make_rig(RigRecipe(name, distorted=True), room, np.random.default_rng(0))
     assert len(rig) == sum(RIGS[name])
     for camera in rig:
         assert np.all((camera.centre > room[0]) & (camera.centre < room[1]))
