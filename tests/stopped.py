@@ -1,4 +1,8 @@
-"""Runs that are stopped on their way."""
+"""Runs that are stopped on their way, politely or not."""
+
+import multiprocessing
+import os
+import signal
 
 
 class Stopped(Exception):
@@ -18,11 +22,23 @@ def stopping(after: int):
 
 
 def noting(seen: list[int]):
-    """A `progress` that adds the number of every frame to a list."""
+    """A `progress` that adds the number of every frame to a list; frames that need no hull are numbers themselves."""
 
     def progress(steps, total):
         for step in steps:
-            seen.append(step.index)
+            seen.append(getattr(step, "index", step))
             yield step
 
     return progress
+
+
+def killed(work, *given) -> None:
+    """Do ``work(dies, *given)`` in a process of its own, which is gone at once where it calls ``dies()``; it must call it."""
+    process = multiprocessing.get_context("spawn").Process(target=work, args=(_dies, *given))
+    process.start()
+    process.join()
+    assert process.exitcode == -signal.SIGKILL
+
+
+def _dies() -> None:
+    os.kill(os.getpid(), signal.SIGKILL)
