@@ -17,10 +17,10 @@ from hmc.body.marker_places import place_tips
 from hmc.body.model import neutral_state
 from hmc.body.proportions import default_body
 from hmc.camera.model import Rig, look_at, project
+from hmc.pose.method import Capture, begin_tracking, make_subject
 from hmc.pose.objectives.epipolar import marker_cost, project_markers
 from hmc.pose.objectives.nearest_detections import nearest_detections
-from hmc.pose.steps.annealed import pose_init
-from hmc.pose.steps.marker_filter import make_marker_filter, marker_preset, marker_step
+from hmc.pose.steps.marker_filter import marker_frame, marker_preset
 from hmc.pose.steps.presets import drift
 from hmc.pose.views.markers import marker_views, observe_markers
 from hmc.search import truncated_normal
@@ -78,11 +78,13 @@ def main() -> int:
     # Each filter follows the still person; the detections change from frame to frame.
     for name, target in (("canton2009", 100.0), ("default", None)):
         preset = marker_preset(name)
-        filt, pose = make_marker_filter(body, preset, 30), pose_init(state)
+        begun = begin_tracking(make_subject(body, Capture(30.0)), state)
 
-        def follow(filt=filt, pose=pose, preset=preset):
+        def follow(pose=begun, preset=preset):
             for k, detections in enumerate(frames):
-                pose, _ = marker_step(np.random.default_rng(k), filt, pose, observe_markers(views, detections, preset.likelihood.gate_px))
+                pose, _ = marker_frame(
+                    np.random.default_rng(k), pose, observe_markers(views, detections, preset.likelihood.gate_px), preset
+                )
 
         rate = len(frames) / interleaved({"follow": follow}, rounds=5)["follow"]
         if target is None:

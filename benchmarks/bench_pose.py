@@ -26,11 +26,14 @@ from hmc.body.kinematics import segment_transforms
 from hmc.body.model import BodyModel, neutral_state
 from hmc.body.proportions import default_body
 from hmc.camera.model import project
-from hmc.pose.legs import leg_choice
-from hmc.pose.steps.annealed import PoseFilter, make_filter, pose_init, pose_step
-from hmc.pose.steps.presets import PRESETS
+from hmc.pose.legs import leg_alternatives
+from hmc.pose.method import Capture, Subject, begin_tracking
+from hmc.pose.methods.annealed import annealed_pose_step
+from hmc.pose.steps.annealed import annealed_subject
+from hmc.pose.steps.presets import PRESETS, PosePreset
 from hmc.pose.views.hull_target import FAR_M, HullTarget, make_target
 from hmc.pose.views.near_distance import near_distance
+from hmc.pose.views.person_view import PersonView
 from hmc.pose.views.rays import with_rays
 from hmc.search.filters import AnnealedSettings
 from hmc.voxels.grid import VoxelGrid
@@ -76,15 +79,16 @@ def target_of(body: BodyModel, pose: np.ndarray, voxel_m: float) -> HullTarget:
     return with_rays(target, rig, masks)
 
 
-def seconds_a_frame(filt: PoseFilter, first: np.ndarray, targets: list[HullTarget]) -> tuple[float, float, float]:
+def seconds_a_frame(subject: Subject, preset: PosePreset, first: np.ndarray, targets: list[HullTarget]) -> tuple[float, float, float]:
     """Processor seconds of a frame's pose, of its legs, and evaluations of the annealed layers, search and refinement: means."""
-    state, pose_s, legs_s, evaluations = pose_init(first), 0.0, 0.0, 0
+    step, tracked = annealed_pose_step(preset), begin_tracking(subject, first)
+    pose_s, legs_s, evaluations = 0.0, 0.0, 0
     for k, target in enumerate(targets):
-        rng = np.random.default_rng(k)
+        rng, view = np.random.default_rng(k), PersonView(k, target)
         start = time.thread_time()
-        state, info = pose_step(rng, filt, state, target)
+        tracked, info = step(rng, tracked, view)
         middle = time.thread_time()
-        leg_choice(rng, filt, state.state, target)
+        leg_alternatives(rng, subject, tracked.state, view, preset.polish)
         pose_s, legs_s, evaluations = pose_s + middle - start, legs_s + time.thread_time() - middle, evaluations + info.evaluations
     return pose_s / len(targets), legs_s / len(targets), evaluations / len(targets)
 
@@ -104,8 +108,8 @@ def main() -> int:
         size = f"{voxel_m * 100:.0f} cm"
         targets = [target_of(body, pose, voxel_m) for pose in poses[1:]]
         for name, one in (("default", preset), ("default with 6 layers of 600", replace(preset, annealed=MANY))):
-            filt = make_filter(body, one, FPS, voxel_m, np.asarray(ROOM))
-            pose_s, legs_s, evaluations = median_of(partial(seconds_a_frame, filt, poses[0], targets))
+            subject = annealed_subject(body, Capture(FPS, voxel_m, np.asarray(ROOM)), one)
+            pose_s, legs_s, evaluations = median_of(partial(seconds_a_frame, subject, one, poses[0], targets))
             total = pose_s + legs_s
             note = (
                 f"pose {1e3 * pose_s:.1f} ms, legs {1e3 * legs_s:.1f} ms; {evaluations:.0f} evaluations, {evaluations / total:.0f} a second"

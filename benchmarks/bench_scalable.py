@@ -22,12 +22,14 @@ from hmc.body.flesh import flesh_points, place_points
 from hmc.body.joints import N_DOF
 from hmc.body.kinematics import landmarks, segment_transforms
 from hmc.body.proportions import default_body
+from hmc.pose.method import Capture, begin_tracking
+from hmc.pose.methods.annealed import annealed_pose_step
 from hmc.pose.methods.scalable import method_preset
-from hmc.pose.steps.restrict import part_mask
-from hmc.pose.steps.annealed import make_filter, pose_init
+from hmc.pose.steps.annealed import annealed_subject
 from hmc.pose.steps.presets import PRESETS, PosePreset
-from hmc.pose.steps.scalable import step_of
+from hmc.pose.steps.restrict import part_mask
 from hmc.pose.views.hull_target import make_target
+from hmc.pose.views.person_view import PersonView
 from hmc.search.filters import AnnealedSettings
 from hmc.voxels.grid import VoxelGrid
 
@@ -38,14 +40,14 @@ ROUNDS = 5
 
 def run(preset: PosePreset, body, voxel_m: float, poses, targets, seed: int = 0) -> tuple[float, float]:
     """Seconds a frame of the filter, and mean error of the landmarks, metres, from the true first pose."""
-    filt = make_filter(body, preset, FPS, voxel_m, np.asarray(ROOM))
-    step, state, seconds, errors = step_of(preset), pose_init(poses[0]), 0.0, []
+    subject = annealed_subject(body, Capture(FPS, voxel_m, np.asarray(ROOM)), preset)
+    step, tracked, seconds, errors = annealed_pose_step(preset), begin_tracking(subject, poses[0]), 0.0, []
     for k, target in enumerate(targets):
         rng = np.random.default_rng([seed, k])
         start = time.thread_time()
-        state, _ = step(rng, filt, state, target)
+        tracked, _ = step(rng, tracked, PersonView(k, target))
         seconds += time.thread_time() - start
-        errors.append(np.linalg.norm(landmarks(body, state.state) - landmarks(body, poses[k + 1]), axis=1).mean())
+        errors.append(np.linalg.norm(landmarks(body, tracked.state) - landmarks(body, poses[k + 1]), axis=1).mean())
     return seconds / len(targets), float(np.mean(errors))
 
 
