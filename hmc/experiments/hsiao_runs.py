@@ -79,7 +79,7 @@ def pose_cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) 
     """The whole method on a recording, from videos alone but for the stature, which the thesis knows beforehand."""
     seen = tracked(inputs, parameters["recording"], 0)
     options = FollowOptions(VOXEL_M, int(rng.integers(2**31)), stature_m(seen.recording))
-    people = run_method(seen, pose_method("pso"), options)
+    people = run_method(seen, pose_method("pso", parameters["preset"]), options)
     results = pose_results(seen.recording, people)
     return {
         "estimate_m": results["estimate_m"],
