@@ -1,35 +1,29 @@
 """The pose command on the small rendered clip: results, resuming, repeated runs and wrong input."""
 
-from dataclasses import replace
-from pathlib import Path
+import csv
 
 import numpy as np
 import pytest
 from drawn import draw_recording
+from methods import TINY, lean_method
 from numpy.testing import assert_array_equal
 
 from hmc.cli import main
+from hmc.cli import pose as command
 from hmc.io.results import read_joints, read_pose, read_run, read_tracks
-from hmc.pose import person, sequence
-from hmc.pose.legs import LegSettings
-from hmc.pose.person import FollowSettings
-from hmc.pose.starts.window import StartSettings
-from hmc.pose.steps import presets
-from hmc.search.filters import AnnealedSettings
+from hmc.pose import follow, registry
 from hmc.voxels import hulls as frontend
-
-TINY = Path(__file__).resolve().parents[2] / "data" / "synthetic" / "tiny"
 
 
 @pytest.fixture(scope="module", autouse=True)
 def little_work():
-    """The presets as they are, with fewer particles and starts."""
+    """The methods as they are, with less work, people watched for three frames."""
+
+    def lean(name, preset, models, init, skin):
+        return lean_method(name, preset, tuple(models), init, skin)
+
     with pytest.MonkeyPatch.context() as patch:
-        for name, layers in (("default", {"survival_rate": 0.1, "spread": 0.5}), ("canton2009", {})):
-            lean = replace(presets.PRESETS[name], annealed=AnnealedSettings(layers=2, particles=40, **layers))
-            patch.setitem(presets.PRESETS, name, lean)
-        lean_start = FollowSettings(window_s=0.2, start=StartSettings(anchors=1, candidates=1), legs=LegSettings(lag_s=0.1))
-        patch.setattr(person, "FollowSettings", lambda: lean_start)
+        patch.setattr(command, "pose_method", lean)
         yield
 
 
@@ -70,10 +64,28 @@ def test_a_run_leaves_its_four_files_and_nothing_else(finished):
 
 def test_a_finished_run_is_not_repeated(finished, capsys, monkeypatch):
     before = {path.name: path.stat().st_mtime_ns for path in finished.iterdir()}
-    monkeypatch.setattr(sequence, "stream_hulls", None)
+    monkeypatch.setattr(follow, "stream_hulls", None)
     assert pose(finished, "--frames", "5", "--voxel", "0.05") == 0
     assert "finished before" in capsys.readouterr().out
     assert {path.name: path.stat().st_mtime_ns for path in finished.iterdir()} == before
+
+
+@pytest.mark.parametrize("full", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_what_a_method_tells_of_each_frame_stands_beside_the_poses(tmp_path, monkeypatch, full):
+    """With little work the swarm's own fits are far off; as the preset has it they are near."""
+    if full:
+        monkeypatch.setattr(command, "pose_method", registry.pose_method)
+    assert pose(tmp_path, "--method", "pso", "--frames", "5", "--voxel", "0.04", "--height", "recording") == 0
+    assert {path.name for path in tmp_path.iterdir()} == {"fits.csv", "joints.csv", "pose.npz", "run.toml", "tracks.csv"}
+    with open(tmp_path / "fits.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert list(rows[0]) == ["frame", "person", "status", "error_m", "started", "turned", "doubts"]
+    joints = read_joints(tmp_path / "joints.csv")
+    fitted = [int(row["frame"]) for row in rows if row["status"] == "fitted"]
+    assert [int(row["frame"]) for row in rows] == list(range(5)) and fitted == sorted(set(joints.frames.tolist()))
+    assert all(0 < float(row["error_m"]) < (0.3 if full else 1.0) for row in rows if row["status"] == "fitted")
+    told = read_run(tmp_path / "run.toml")
+    assert told["method"] == "pso" and told["parameters"]["preset"]["swarm"]["swarm"]["voxels"] is True
 
 
 def test_a_changed_parameter_starts_anew(tmp_path, capsys):
@@ -92,7 +104,7 @@ def test_a_changed_parameter_starts_anew(tmp_path, capsys):
 @pytest.mark.parametrize("stop", [1, 4])
 def test_a_stopped_run_goes_on_and_ends_as_if_it_had_not_been(tmp_path, monkeypatch, stop):
     assert quick(tmp_path / "whole", frames="6") == 0
-    stream = sequence.stream_hulls
+    stream = follow.stream_hulls
 
     def dying(*args, **options):
         for hull in stream(*args, **options):
@@ -101,7 +113,7 @@ def test_a_stopped_run_goes_on_and_ends_as_if_it_had_not_been(tmp_path, monkeypa
             yield hull
 
     with monkeypatch.context() as patch:
-        patch.setattr(sequence, "stream_hulls", dying)
+        patch.setattr(follow, "stream_hulls", dying)
         assert quick(tmp_path / "cut", frames="6") == 130
     assert not (tmp_path / "cut" / "joints.csv").exists()
     assert quick(tmp_path / "cut", frames="6") == 0
@@ -117,7 +129,7 @@ def test_the_recording_is_segmented_once(tmp_path, monkeypatch):
     stream = frontend.stream_masks
     monkeypatch.setattr(frontend, "stream_masks", lambda *args, **options: calls.append(args) or stream(*args, **options))
     assert quick(tmp_path / "kept") == 0 and len(calls) == 1
-    monkeypatch.setattr(sequence, "kept_masks", lambda *args: None)
+    monkeypatch.setattr(follow, "kept_masks", lambda *args: None)
     assert quick(tmp_path / "again") == 0 and len(calls) == 3
     assert (tmp_path / "kept" / "joints.csv").read_bytes() == (tmp_path / "again" / "joints.csv").read_bytes()
 
@@ -156,7 +168,10 @@ def test_part_of_a_recording_with_some_of_its_cameras(tmp_path):
         (["--height", "175"], "stature in metres"),
         (["--height", "tall"], "stature in metres"),
         (["--height", "nan"], "stature in metres"),
-        (["--preset", "defualt"], "no preset named 'defualt'; there are canton2009, default"),
+        (["--method", "pso", "--preset", "canton2009"], "no preset named 'canton2009' of method pso; there are default, hsiao2008"),
+        (["--method", "smd", "--model", "1"], "has no use for a scalable model"),
+        (["--method", "guess"], "no pose method named 'guess'; there are apf"),
+        (["--preset", "defualt"], "no preset named 'defualt' of method apf; there are default, canton2009"),
         (["--frames", "2", "--voxel", "0.0005"], "would fit"),
         (["--frames", "2", "--track-voxel", "0.0005"], "would fit"),
         (["--track-voxel", "0.5"], "do not show people"),
@@ -170,7 +185,7 @@ def test_wrong_input_is_one_line(tmp_path, capsys, more, message):
     assert message in error and error.count("\n") == 1
 
 
-WRONG = (("--voxel", "0"), ("--voxel", "much"), ("--method", "guess"), ("--frames", "-1"), ("--seed", "x"), ("--seed", "-1"))
+WRONG = (("--voxel", "0"), ("--voxel", "much"), ("--frames", "-1"), ("--seed", "x"), ("--seed", "-1"))
 
 
 @pytest.mark.parametrize("more", WRONG)

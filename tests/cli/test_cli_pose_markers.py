@@ -55,7 +55,7 @@ def test_from_a_table_of_detections(table, tmp_path, capsys):
     assert len(read_pose(tmp_path / "out" / "pose.npz").states) == 5
     run = read_run(tmp_path / "out" / "run.toml")
     assert run["method"] == "marker-apf" and run["parameters"]["markers"] == "joints"
-    assert "5 of 5 frames, 105 detections a frame" in capsys.readouterr().out
+    assert "person 0: 5 frames, from 0 to 4, stature about" in capsys.readouterr().out
     assert pose(TINY, tmp_path / "out", *arguments) == 0
     assert "finished before" in capsys.readouterr().out
     assert pose(TINY, tmp_path / "out", *arguments, "--seed", 3) == 0
@@ -112,7 +112,7 @@ def test_what_it_says_of_wrong_input(worn, table, tmp_path, capsys):
     assert "give --detections FILE" in fails(TINY, tmp_path / "out")
     assert "no such file" in fails(TINY, tmp_path / "out", "--detections", tmp_path / "none.csv")
     assert "give one of them" in fails(TINY, tmp_path / "out", "--detections", table, "--labels", table)
-    assert "no preset of markers" in fails(TINY, tmp_path / "out", "--detections", table, "--preset", "best")
+    assert "no preset named 'best' of method marker-apf" in fails(TINY, tmp_path / "out", "--detections", table, "--preset", "best")
     assert "no marker in these frames" in fails(TINY, tmp_path / "out", "--detections", table, "--start", 10)
     (tmp_path / "labels.csv").write_text("frame,camera,u,v\n90,c0,1,1\n")
     assert "frame 90 is not in the recording" in fails(folder, tmp_path / "out", "--labels", tmp_path / "labels.csv")

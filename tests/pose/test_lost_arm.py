@@ -8,7 +8,7 @@ import pytest
 from acted import act, ring
 from hypothesis import given
 from hypothesis import strategies as st
-from posed import body_of, true_state
+from posed import subject_of, true_state, view_of
 
 from hmc.body.kinematics import landmarks
 from hmc.camera.model import project
@@ -17,7 +17,8 @@ from hmc.experiments.engine.experiment import Cell
 from hmc.experiments.engine.style import house_style
 from hmc.experiments.lost_arm import BACK_M, STAYS, taken_back, without_arm
 from hmc.landmarks import landmark_index
-from hmc.pose.steps.annealed import make_filter, pose_init, pose_step
+from hmc.pose.method import begin_tracking
+from hmc.pose.methods.annealed import annealed_pose_step
 from hmc.pose.steps.presets import PRESETS
 from hmc.pose.views.hull_target import make_target
 from hmc.pose.views.rays import with_rays
@@ -41,11 +42,11 @@ def test_the_arm_is_cut_out_and_the_rest_stays():
 def arm_errors(targets, acted, arm, search, seed):
     """The worse error of elbow and wrist, frame by frame, of a filter that starts from the truth."""
     preset = replace(PRESETS["default"], annealed=AnnealedSettings(layers=2, particles=50, survival_rate=0.1, spread=0.5), search=search)
-    filt = make_filter(body_of(acted.height_m)[0], preset, acted.fps, acted.grid.voxel_size_m, acted.grid.bounds)
-    pose, errors = pose_init(true_state(filt.body, acted)), []
+    subject, step = subject_of(acted, preset), annealed_pose_step(preset)
+    tracked, errors = begin_tracking(subject, true_state(subject.body, acted)), []
     for frame, target in enumerate(targets):
-        pose, _ = pose_step(np.random.default_rng([seed, frame]), filt, pose, target)
-        off = landmarks(filt.body, pose.state)[arm[1:]] - acted.landmarks[frame][arm[1:]]
+        tracked, _ = step(np.random.default_rng([seed, frame]), tracked, view_of(target))
+        off = landmarks(subject.body, tracked.state)[arm[1:]] - acted.landmarks[frame][arm[1:]]
         errors.append(float(np.linalg.norm(off, axis=1).max()))
     return np.array(errors)
 
