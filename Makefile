@@ -1,6 +1,7 @@
 # Every target does its own set-up: a virtual environment in .venv, made anew when pyproject.toml changes.
 #   make demo    render a clip, find and fit the person in it, print the metrics and where the pictures are
-#   make test    the test suite            make lint    style and types
+#   make test    the quick tests           make test-all  all tests, the slow ones too (real kills, whole chains, notebooks)
+#   make lint    style and types
 #   make bench   measured speed            make docs    pages of the functions and of the notebooks, in out/pages
 #   make clean   remove what the others made
 
@@ -8,6 +9,8 @@ PYTHON ?= python3
 VENV ?= .venv
 OUT ?= out
 PY := $(VENV)/bin/python
+# Files over two processes, each file in one of them: what a file renders or carves is made once.
+PARALLEL := -n 2 --dist loadfile
 READY := $(VENV)/.ready
 
 # The arrays here are small: threads inside BLAS cost more than they bring, and hmc uses its cores in other ways.
@@ -15,7 +18,7 @@ export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help setup demo test lint bench docs clean
+.PHONY: help setup demo test test-all lint bench docs clean
 help:
 	@sed -n 's/^#   //p' Makefile
 
@@ -41,7 +44,10 @@ demo: $(READY)
 	@echo "tables:                            $(OUT)/demo-result/"
 
 test: $(READY)
-	$(PY) -m pytest
+	$(PY) -m pytest $(PARALLEL) -m "not slow"
+
+test-all: $(READY)
+	$(PY) -m pytest $(PARALLEL)
 
 lint: $(READY)
 	$(VENV)/bin/ruff check --output-format concise

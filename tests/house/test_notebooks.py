@@ -54,6 +54,7 @@ def runs(tmp_path_factory):
         yield {path: pool.submit(run, path) for path in NOTEBOOKS}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_runs_and_shows_pictures(path, runs):
     done, result = runs[path].result()
