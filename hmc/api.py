@@ -133,7 +133,13 @@ def track(
     return _tracked(_opened(recording), tracker, seed, voxel_size_m)
 
 
-def views(recording: Recording, tracks: TrackTable, needs: Sequence[str] = ("hulls",)) -> Iterator[dict[int, PersonView]]:
+def views(
+    recording: Recording,
+    tracks: TrackTable,
+    needs: Sequence[str] = ("hulls",),
+    voxel_size_m: float = POSE_VOXEL_M,
+    masks: Iterable[MaskStep] | None = None,
+) -> Iterator[dict[int, PersonView]]:
     """What each frame shows of each person: what pose methods work on.
 
     Parameters
@@ -143,6 +149,8 @@ def views(recording: Recording, tracks: TrackTable, needs: Sequence[str] = ("hul
         As from `track`.
     needs : sequence of str
         What is to be there: "hulls", "skin", "voxels" (`hmc.pose.views.person_view`).
+    voxel_size_m, masks
+        As for `hulls`.
 
     Examples
     --------
@@ -155,8 +163,8 @@ def views(recording: Recording, tracks: TrackTable, needs: Sequence[str] = ("hul
     from hmc.pose.views.person_view import check_needs, views_of
     from hmc.tracking.resumable import person_grid
 
-    grid, wanted = person_grid(recording, POSE_VOXEL_M), check_needs(needs)
-    return (views_of(recording, grid, tracks, hull, wanted) for hull in stream_hulls(recording, grid))
+    grid, wanted = person_grid(recording, voxel_size_m), check_needs(needs)
+    return (views_of(recording, grid, tracks, hull, wanted) for hull in stream_hulls(recording, grid, masks=masks))
 
 
 def pose(
