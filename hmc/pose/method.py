@@ -314,6 +314,6 @@ def with_particles(particles: ParticleState, name: str = "") -> dict[str, np.nda
 
 
 def other_rng(rng: np.random.Generator, purpose: int) -> np.random.Generator:
-    """Random numbers of the same frame for another purpose, whatever was drawn of the first: a part that draws none disturbs no other."""
+    """Random numbers of the same frame for another purpose, 1 or more (0 would give the frame's own), whatever was drawn of the first."""
     entropy = rng.bit_generator.seed_seq.entropy  # type: ignore[attr-defined]
     return np.random.default_rng([*np.atleast_1d(np.array(entropy, object)).tolist(), purpose])

@@ -21,7 +21,7 @@ from hmc.pose.views.person_view import PersonView
 
 __all__ = ["Decided", "PersonState", "PersonTrack", "PoseTask", "person_step", "taken_up"]
 
-NO_START = "no hull to start from"
+NO_START = "nothing to start from"
 
 
 @dataclass(frozen=True)

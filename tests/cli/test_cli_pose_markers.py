@@ -1,6 +1,7 @@
 """`hmc pose --method marker-apf`: from a table of detections, from coloured markers in images, and what it says of wrong input."""
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -27,7 +28,7 @@ GREEN = (30, 230, 40)
 
 @pytest.fixture(autouse=True)
 def little_work(monkeypatch):
-    lean = marker_filter.MarkerPreset("default", "for tests", annealed=AnnealedSettings(2, 120, 0.1, 0.5), drift_scale=0.4, refine=True)
+    lean = replace(marker_filter.MARKER_PRESETS["default"], annealed=AnnealedSettings(2, 120, 0.1, 0.5))
     monkeypatch.setitem(marker_filter.MARKER_PRESETS, "default", lean)
 
 
@@ -99,7 +100,7 @@ def test_from_coloured_markers_in_images(worn, tmp_path):
     assert np.linalg.norm(joints.positions - truth, axis=-1).mean() < 0.05
     again = shutil.copy(tmp_path / "out" / "detections.csv", tmp_path / "d.csv")
     assert pose(folder, tmp_path / "again", "--detections", again) == 0
-    np.testing.assert_allclose(read_joints(tmp_path / "again" / "joints.csv").positions, joints.positions, atol=0.02)
+    np.testing.assert_allclose(read_joints(tmp_path / "again" / "joints.csv").positions, joints.positions, atol=0.05)
 
 
 def test_what_it_says_of_wrong_input(worn, table, tmp_path, capsys):

@@ -40,7 +40,7 @@ class MarkerPreset:
     likelihood : MarkerLikelihood
     annealed : AnnealedSettings
     drift_scale : float
-        Factor on `hmc.pose.steps.preset.drift`.
+        Factor on `hmc.pose.steps.presets.drift`.
     refine : bool
         Move the estimate to where the detections say that its markers are, and begin the next frame there.
     search : bool
