@@ -34,6 +34,7 @@ def test_masked_median_against_a_loop():
 
 
 @pytest.mark.parametrize(("name", "least"), [("r1", 0.6), ("r2", 0.7)])
+@pytest.mark.slow
 def test_people_leave_less_in_the_scene_than_in_a_plain_median(shared_data, name, least):
     """Walking, and boxing in place, where legs hardly move: what is wrong in the scene without being told so."""
     recording = open_recording(shared_data / "rendered" / name, cameras=["cam_00", "cam_02", "cam_03", "cam_05"])

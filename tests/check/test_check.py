@@ -211,6 +211,7 @@ def test_lengths_rates_gaps_and_dark_images(recording_folder, ring):
 
 
 @pytest.mark.parametrize("name", ["r1", "r2", "r3", "r4"])
+@pytest.mark.slow
 def test_good_recordings_of_another_program_are_quiet(shared_data, name):
     assert sentences(check_recording(shared_data / "rendered" / name), "warning") == []
 

@@ -20,6 +20,7 @@ def run(*words):
 
 
 @pytest.mark.parametrize(("file", "method"), [("random_search.py", "random-search"), ("top_of_head.py", "apf-top")])
+@pytest.mark.slow
 def test_examples_of_the_documentation_run(file, method, tmp_path):
     words = ("pose", TINY, "--plugin", f"docs/{file}", "--method", method, "--frames", 3, "--voxel", 0.05, "--out", tmp_path, "--quiet")
     done = run(*words)

@@ -71,6 +71,7 @@ def test_a_finished_run_is_not_repeated(finished, capsys, monkeypatch):
 
 
 @pytest.mark.parametrize("full", [False, pytest.param(True, marks=pytest.mark.slow)])
+@pytest.mark.slow
 def test_what_a_method_tells_of_each_frame_stands_beside_the_poses(tmp_path, monkeypatch, full):
     """With little work the swarm's own fits are far off; as the preset has it they are near."""
     if full:
@@ -102,6 +103,7 @@ def test_a_changed_parameter_starts_anew(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("stop", [1, 4])
+@pytest.mark.slow
 def test_a_stopped_run_goes_on_and_ends_as_if_it_had_not_been(tmp_path, monkeypatch, stop):
     assert quick(tmp_path / "whole", frames="6") == 0
     stream = follow.stream_hulls
@@ -124,6 +126,7 @@ def test_a_stopped_run_goes_on_and_ends_as_if_it_had_not_been(tmp_path, monkeypa
     assert sorted(path.name for path in (tmp_path / "cut").iterdir()) == ["joints.csv", "pose.npz", "run.toml", "tracks.csv"]
 
 
+@pytest.mark.slow
 def test_the_recording_is_segmented_once(tmp_path, monkeypatch):
     calls = []
     stream = frontend.stream_masks
@@ -140,6 +143,7 @@ def test_a_given_height_is_the_body_s(tmp_path, capsys):
     assert float(read_pose(tmp_path / "pose.npz").bodies[0]["height"]) == pytest.approx(1.62)
 
 
+@pytest.mark.slow
 def test_the_height_of_the_recording_is_used_unless_auto(tmp_path):
     assert quick(tmp_path / "told", frames="3") == 0
     assert float(read_pose(tmp_path / "told" / "pose.npz").bodies[0]["height"]) == pytest.approx(1.76)  # recording.toml

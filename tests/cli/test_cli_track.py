@@ -40,6 +40,7 @@ def test_tracks_are_where_people_were_drawn(folder, tmp_path, capsys):
 
 
 @pytest.mark.parametrize("stop", [3, 14, 23])
+@pytest.mark.slow
 def test_a_stopped_run_goes_on_and_ends_as_if_it_had_not_been(folder, tmp_path, monkeypatch, stop):
     monkeypatch.setattr(resumable, "CHECKPOINT_FRAMES", 5)
     assert track(folder, tmp_path / "whole") == 0

@@ -94,6 +94,7 @@ def finish(process):
 
 
 @pytest.mark.parametrize("workers", ["1", "2"])
+@pytest.mark.slow
 def test_a_killed_run_goes_on_and_ends_the_same(toy, tmp_path, workers):
     whole, killed = tmp_path / "whole", tmp_path / "killed"
     assert "12 cells computed, 0 found" in finish(start(toy, whole, "--workers", "1"))
@@ -116,6 +117,7 @@ def test_a_killed_run_goes_on_and_ends_the_same(toy, tmp_path, workers):
     assert (killed / "made.log").read_text() == "made\n"
 
 
+@pytest.mark.slow
 def test_workers_end_with_a_parent_that_is_killed(toy, tmp_path):
     out = tmp_path / "out"
     process = start(toy, out, "--workers", "2", pause_s=60)
@@ -128,6 +130,7 @@ def test_workers_end_with_a_parent_that_is_killed(toy, tmp_path):
     finish(start(toy, out, "--workers", "2"))
 
 
+@pytest.mark.slow
 def test_a_kill_while_an_input_is_made_leaves_no_half_of_it(toy, tmp_path):
     out = tmp_path / "out"
     process = start(toy, out, "--workers", "2", pause_s=5)
@@ -256,6 +259,7 @@ def test_wrong_input_is_told_in_a_line(arguments, words, tmp_path, capsys):
     assert words in told and told.count("\n") == 1
 
 
+@pytest.mark.slow
 def test_recordings_that_change_nothing_are_told(recording_folder, tmp_path, capsys):
     options = ["--quick", "--quiet", "--workers", "1", "--out", str(tmp_path / "out")]
     assert main(["run", "fig-B.1", "--recordings", str(recording_folder), *options]) == 0
@@ -450,6 +454,7 @@ def test_a_recipe_s_label_is_of_what_it_tells():
     assert len({str(_told(one)) for one in (Newer("a", 3.0), *others)}) == 5
 
 
+@pytest.mark.slow
 def test_a_reader_that_goes_away_stops_nothing():
     process = subprocess.Popen(
         [sys.executable, "-m", "hmc.experiments", "list"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=Path(__file__).parent.parent

@@ -83,6 +83,7 @@ def test_rows_by_action_have_known_scores_and_the_papers_beside(rng):
 
 
 @pytest.mark.parametrize("name", ["table-6.4", "table-6.3", "fig-6.13", "fig-6.16", "fig-6.17", "fig-6.18", "fig-6.19", "what-each-adds"])
+@pytest.mark.slow
 def test_reports_tell_better_from_worse(name, rng):
     """Where the papers' better choice has the smaller errors, every claim about an order holds; the other way round, none does."""
     for right in (True, False):
@@ -185,6 +186,7 @@ def small(tmp_path_factory):
     return source, Inputs(tmp_path_factory.mktemp("inputs"), {source.label: source.folder})
 
 
+@pytest.mark.slow
 def test_a_marker_cell_follows_the_truth(small):
     source, inputs = small
     parameters = find_experiment("table-6.3").grid(Plan(recordings=(source,)))[0]
@@ -197,6 +199,7 @@ def test_a_marker_cell_follows_the_truth(small):
     assert blind["problem"] and np.isnan(blind["estimate_m"]).all()
 
 
+@pytest.mark.slow
 def test_a_filter_cell_starts_from_the_truth(small, monkeypatch):
     source, inputs = small
     parameters = find_experiment("fig-6.17").grid(Plan(quick=True, recordings=(source,)))[-1]

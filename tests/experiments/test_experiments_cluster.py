@@ -122,6 +122,7 @@ def wait_for(condition, seconds=60):
     assert condition()
 
 
+@pytest.mark.slow
 def test_a_worker_that_is_killed_loses_nothing(toy, tmp_path, cluster):
     whole, out = tmp_path / "whole", tmp_path / "out"
     run_experiment(str(toy), whole, Plan(quick=True))

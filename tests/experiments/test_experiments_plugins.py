@@ -82,6 +82,7 @@ def files(tmp_path, monkeypatch):
     plugins._loaded.clear()
 
 
+@pytest.mark.slow
 def test_a_strangers_method_runs_from_python_and_from_experiments(files, tmp_path):
     method, experiment = files
     out, env = tmp_path / "out", {**os.environ, "OPENBLAS_NUM_THREADS": "1"}

@@ -262,6 +262,7 @@ def test_frames_in_which_a_person_is_not_shown_are_nan_and_noted(case):
 
 
 @each(TRACKED)
+@pytest.mark.slow
 def test_one_camera_is_enough_to_run(case):
     """What it shows is little, and the run ends in rows that say so or in poses of finite numbers."""
     people = followed(case, 4, recording=tiny_clip(4, ("cam_00",)))
@@ -290,6 +291,7 @@ def pair(tmp_path_factory, ring):
 
 
 @each(TRACKED)
+@pytest.mark.slow
 def test_two_people_keep_their_numbers(pair, case):
     """Drawn people are egg-shaped, but each is fitted where it stands."""
     recording, tracks = pair
@@ -338,6 +340,7 @@ def test_a_lost_limb_is_found(subjects, case):
 
 
 @each(HOUSE)
+@pytest.mark.slow
 def test_legs_that_a_step_exchanged_are_told(case):
     """In one frame a method ends with exchanged legs: without what tells them they stay so."""
     method = lean_method(*case)

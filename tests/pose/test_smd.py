@@ -513,6 +513,7 @@ def test_chains_and_trunk_share_nothing():
     assert all((chain >= 6).all() for chain in CHAINS)
 
 
+@pytest.mark.slow
 def test_who_does_not_stand_like_da_vinci_is_found_by_the_spectral_route(monkeypatch):
     """The tiny recording begins with arms down: the first pose comes from the voxels' skeleton, and is followed from there."""
     recording = open_recording(TINY, frames=3)

@@ -158,6 +158,7 @@ def test_stature_where_there_is_little_to_see():
 
 
 @pytest.mark.parametrize("height", [1.22, 1.38])
+@pytest.mark.slow
 def test_a_child_who_stands_is_no_adult_who_bends(height):
     acted = act("gesture", frames=4, height_m=height)
     begun = start_of(acted, 1)
@@ -165,6 +166,7 @@ def test_a_child_who_stands_is_no_adult_who_bends(height):
     assert errors_of(acted, begun).mean() < 0.10
 
 
+@pytest.mark.slow
 def test_an_adult_who_sits_is_no_child():
     acted = act("seated", frames=4)
     assert len(possible_heights(acted.targets)) == 2
