@@ -40,7 +40,7 @@ CASES = [
 ]
 #: Those with the house's refinement, search, recovery and legs on hulls.
 HOUSE = [(name, preset) for name, preset in CASES if preset == "default" and name != "marker-apf"]
-TRACKED = [(name, preset) for name, preset in CASES if METHODS[name].needs_tracks]
+TRACKED = [(name, preset) for name, preset in CASES if pose_method(name).needs_tracks]
 
 
 #: Those that run in `make test`: of each kind one, with all that it remembers.
@@ -155,7 +155,7 @@ def true_detections(frames: int, without: tuple[int, ...] = ()) -> DetectionTabl
 def followed(case: tuple[str, str], frames: int, run: RunOptions | None = None, **how) -> PosedPeople:
     """The clip's person by a method: `tracks`, `seed`, `recording`, `detections` and `method` may be others."""
     method = how.get("method") or lean_method(*case)
-    tracks = how.get("tracks", true_tracks(frames)) if METHODS[case[0]].needs_tracks else None
+    tracks = how.get("tracks", true_tracks(frames)) if pose_method(case[0]).needs_tracks else None
     detections = None
     if "detections" in method.needs:
         detections = how.get("detections", true_detections(frames))

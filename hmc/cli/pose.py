@@ -108,7 +108,7 @@ def run(args: argparse.Namespace) -> int:
     recording = open_selected(args)
     if args.out.is_file():
         raise InputError(f"--out {args.out}: is a file; give a folder")
-    height, tracked, frontend = _height(args.height, recording), METHODS[args.method].needs_tracks, FrontendSettings()
+    height, tracked, frontend = _height(args.height, recording), method.needs_tracks, FrontendSettings()
     parameters: dict[str, Any] = {
         "start": recording.start,
         "frames": recording.n_frames,

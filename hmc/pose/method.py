@@ -295,6 +295,11 @@ class PoseMethod:
     gate_px: float = 30.0
     settings: Any = None
 
+    @property
+    def needs_tracks(self) -> bool:
+        """Whether people are tracked first: not where detections are given."""
+        return "detections" not in self.needs
+
 
 def unseen(tracked: Tracked, status: str = "no hull of this person in this frame") -> tuple[Tracked, StepInfo]:
     """A frame that shows nothing of the person: the pose stays."""

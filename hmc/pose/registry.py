@@ -25,6 +25,8 @@ __all__ = ["BUILT_IN", "INITS", "METHODS", "MethodChoice", "MethodEntry", "pose_
 #: Where a start takes its candidates from.
 Init = Literal["hypotheses", "spectral"]
 INITS = get_args(Init)
+#: Presets whose work has a start of its own.
+OWN_START = frozenset({"kehl2006", "hsiao2008"})
 
 
 @dataclass(frozen=True)
@@ -60,15 +62,15 @@ class MethodEntry:
     presets : tuple of str
     make : callable
         ``make(choice)`` gives the `hmc.pose.method.PoseMethod`.
-    needs_tracks : bool
-        Whether people are tracked first.
+    takes : frozenset of str
+        Which of "models" and "init" it has a use for.
     """
 
     name: str
     help: str
     presets: tuple[str, ...]
     make: Callable[[MethodChoice], PoseMethod]
-    needs_tracks: bool = True
+    takes: frozenset[str] = frozenset()
 
 
 def pose_method(name: str, preset: str = "default", models: Sequence[str] = (), init: str | None = None, skin: bool = True) -> PoseMethod:
@@ -92,10 +94,12 @@ def pose_method(name: str, preset: str = "default", models: Sequence[str] = (), 
     entry = METHODS[name]
     if preset not in entry.presets:
         raise InputError(f"no preset named {preset!r} of method {name}; there are {', '.join(entry.presets)}")
-    if models and "shbm" not in name and "ddm" not in name:
+    if models and "models" not in entry.takes:
         raise InputError(f"--model {models[0]}: method {name} has no use for a scalable model; shbm-apf, ddm-apf and shbm-ddm-apf have")
     if init is not None and init not in INITS:
         raise InputError(f"--init {init}: use one of {', '.join(INITS)}")
+    if init is not None and ("init" not in entry.takes or preset in OWN_START):
+        raise InputError(f"--init {init}: method {name}{'' if preset == 'default' else f' of preset {preset}'} has a start of its own")
     return entry.make(MethodChoice(preset, models, cast("Init | None", init), skin))
 
 
@@ -159,13 +163,21 @@ def _markers(choice: MethodChoice) -> PoseMethod:
 METHODS: dict[str, MethodEntry] = {
     entry.name: entry
     for entry in (
-        MethodEntry("apf", "annealed particle filter (default)", ("default", "canton2009"), _annealed("apf")),
-        MethodEntry("shbm-apf", "by models of rising detail", ("default", "canton2009"), _annealed("shbm-apf")),
-        MethodEntry("ddm-apf", "without the limbs that the data does not show", ("default", "canton2009"), _annealed("ddm-apf")),
-        MethodEntry("shbm-ddm-apf", "both", ("default", "canton2009"), _annealed("shbm-ddm-apf")),
-        MethodEntry("smd", "superellipsoids by stochastic meta descent", ("default", "kehl2006"), _smd),
-        MethodEntry("pso", "spectral skeleton and particle swarm", ("default", "hsiao2008"), _pso),
-        MethodEntry("marker-apf", "annealed particle filter on markers", ("default", "canton2009"), _markers, needs_tracks=False),
+        MethodEntry("apf", "annealed particle filter (default)", ("default", "canton2009"), _annealed("apf"), frozenset({"init"})),
+        MethodEntry(
+            "shbm-apf", "by models of rising detail", ("default", "canton2009"), _annealed("shbm-apf"), frozenset({"init", "models"})
+        ),
+        MethodEntry(
+            "ddm-apf",
+            "without the limbs that the data does not show",
+            ("default", "canton2009"),
+            _annealed("ddm-apf"),
+            frozenset({"init", "models"}),
+        ),
+        MethodEntry("shbm-ddm-apf", "both", ("default", "canton2009"), _annealed("shbm-ddm-apf"), frozenset({"init", "models"})),
+        MethodEntry("smd", "superellipsoids by stochastic meta descent", ("default", "kehl2006"), _smd, frozenset({"init"})),
+        MethodEntry("pso", "spectral skeleton and particle swarm", ("default", "hsiao2008"), _pso, frozenset({"init"})),
+        MethodEntry("marker-apf", "annealed particle filter on markers", ("default", "canton2009"), _markers),
     )
 }
 #: Of these, the ones that come with the package.

@@ -186,3 +186,17 @@ def test_what_a_method_has_no_use_for_is_refused():
     ):
         with pytest.raises(InputError, match=told):
             pose_method(*given)
+
+
+@pytest.mark.parametrize(
+    ("name", "preset", "model", "init"),
+    [
+        ("smd", "kehl2006", (), "spectral"),
+        ("pso", "hsiao2008", (), "hypotheses"),
+        ("marker-apf", "default", (), "spectral"),
+        ("smd", "default", ("1",), None),
+    ],
+)
+def test_a_start_or_model_that_a_method_does_not_take_is_refused(name, preset, model, init):
+    with pytest.raises(InputError, match="has no use for a scalable model" if model else f"--init {init}: method {name}"):
+        pose_method(name, preset, model, init)
