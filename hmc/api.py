@@ -218,8 +218,7 @@ def pose(
     recording, method = _opened(recording), pose_method(method) if isinstance(method, str) else method
     if "detections" in method.needs:
         raise InputError(f"method {method.name} works on detections; use `hmc.pose.follow.follow`, or `hmc pose` from the command line")
-    if height_m is None and len(recording.subject_height_m) == 1 and recording.persons in (None, 1):
-        height_m = recording.subject_height_m[0]
+    height_m = recording.known_height_m if height_m is None else height_m
 
     def counted(steps: Iterable[HullStep], total: int) -> Iterator[HullStep]:
         for n, step in enumerate(steps, start=1):
@@ -296,15 +295,10 @@ def view(found: PosedPeople | TrackTable, recording: Recording, out: str | Path,
     ...     pathlib.Path(folder, "tracks.png").is_file()
     True
     """
-    from hmc.body.proportions import make_body
-    from hmc.view.mosaic import Result
+    from hmc.view.mosaic import Result, with_bodies
     from hmc.view.write import write_view
 
-    if isinstance(found, TrackTable):
-        result = Result(tracks=found)
-    else:
-        dimensions = {person: {name: float(value) for name, value in body.items()} for person, body in found.states.bodies.items()}
-        result = Result(found.poses, None, found.states, {person: make_body(one) for person, one in dimensions.items()})
+    result = Result(tracks=found) if isinstance(found, TrackTable) else with_bodies(Result(found.poses), found.states)
     write_view(out, recording, result, frames)
 
 

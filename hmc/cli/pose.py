@@ -228,8 +228,7 @@ def _height(text: str, recording) -> float | None:
     if text == "auto":
         return None
     if text == "recording":
-        heights = recording.subject_height_m
-        return float(heights[0]) if len(heights) == 1 and recording.persons in (None, 1) else None
+        return recording.known_height_m
     try:
         height = float(text)
     except ValueError:

@@ -89,6 +89,11 @@ class Recording:
     _background: tuple[Footage | None, ...] = field(default=(), repr=False)
 
     @property
+    def known_height_m(self) -> float | None:
+        """The stature of whoever is in it, metres; None where it is not known, or somebody else may be there too."""
+        return self.subject_height_m[0] if len(self.subject_height_m) == 1 and self.persons in (None, 1) else None
+
+    @property
     def has_images(self) -> bool:
         """Whether any camera has images (else there are only silhouettes)."""
         return any(footage is not None for footage in self._footage)

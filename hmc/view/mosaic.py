@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
@@ -24,7 +24,7 @@ from hmc.view.scene import BACKGROUND, draw_floor, draw_rig, draw_voxels, from_a
 from hmc.voxels.grid import VoxelGrid
 from hmc.voxels.hulls import HullStep, stream_hulls
 
-__all__ = ["Layout", "Person", "Result", "make_layout", "people_in", "read_result", "render", "stream_mosaics"]
+__all__ = ["Layout", "Person", "Result", "make_layout", "people_in", "read_result", "render", "stream_mosaics", "with_bodies"]
 
 #: Largest picture, (width, height) in pixels, and the most that a camera's image is enlarged.
 MAX_SIZE = (1920, 1080)
@@ -94,10 +94,14 @@ def read_result(directory: str | Path) -> Result:
     if poses is None and tracks is None:
         raise InputError(f"{directory}: neither joints.csv nor tracks.csv; give the folder that `hmc pose` or `hmc track` wrote")
     states = read_pose(directory / "pose.npz") if (directory / "pose.npz").exists() else None
-    if states is None or states.dof_names != tuple(DOF_NAMES):
-        return Result(poses, tracks)
+    result = Result(poses, tracks)
+    return result if states is None or states.dof_names != tuple(DOF_NAMES) else with_bodies(result, states)
+
+
+def with_bodies(result: Result, states: PoseStates) -> Result:
+    """A result with its states and the bodies that they are of, so that flesh can be drawn."""
     bodies = {person: make_body({name: float(value) for name, value in body.items()}) for person, body in states.bodies.items()}
-    return Result(poses, tracks, states, bodies)
+    return replace(result, states=states, bodies=bodies)
 
 
 def people_in(result: Result, frame: int) -> list[Person]:

@@ -24,11 +24,10 @@ from hmc.pose.views.skin import Skin
 from hmc.search.meta_descent import Evaluation, SmdSettings, smd_run
 
 __all__ = [
-    "OPTIMISERS", "Scene", "SmdPreset", "SmdTracker", "TrackInfo", "TrackState", "evaluation", "make_scene", "make_tracker", "optimise",
+    "Scene", "SmdPreset", "SmdTracker", "TrackInfo", "TrackState", "evaluation", "make_scene", "make_tracker", "optimise",
     "track_init", "track_step",
 ]  # fmt: skip
 
-OPTIMISERS = ("smd", "deterministic", "lm")
 #: Fewer surface voxels than these say nothing of a pose.
 LEAST_VOXELS = 60
 #: In which step sizes are learnt: a centimetre, and a degree.
