@@ -20,7 +20,7 @@ from hmc.camera.model import Rig, look_at, project
 from hmc.pose.method import Capture, begin_tracking, make_subject
 from hmc.pose.objectives.epipolar import marker_cost, project_markers
 from hmc.pose.objectives.nearest_detections import nearest_detections
-from hmc.pose.steps.marker_filter import marker_frame, marker_preset
+from hmc.pose.steps.marker_filter import MARKER_PRESETS, marker_frame
 from hmc.pose.steps.presets import drift
 from hmc.pose.views.markers import marker_views, observe_markers
 from hmc.search import truncated_normal
@@ -51,7 +51,7 @@ def main() -> int:
     state[2] = 0.95
     ideal, _ = seen_by_ideal_detector(body, rig, landmarks(body, state), state)
     boxes = np.array([[one.min(0), one.max(0)] for one in project(rig, landmarks(body, state))[0]])
-    views, preset = marker_views(rig), marker_preset("canton2009")
+    views, preset = marker_views(rig), MARKER_PRESETS["canton2009"]
     frames = [detect_synthetic(rng, ideal, SyntheticDetector(0.9, 6.5, 4.0), boxes) for _ in range(20)]
     counts = [len(uv) for one in frames for uv in one]
     print(f"{VIEWS} views, {min(counts)} to {max(counts)} detections, 15 landmarks, {PARTICLES} particles a layer")
@@ -77,7 +77,7 @@ def main() -> int:
         good &= report("9", f"likelihood / brute nearest with a pair table, {name} layer", times["ours"] / times["brute"], 0.35, note=note)
     # Each filter follows the still person; the detections change from frame to frame.
     for name, target in (("canton2009", 100.0), ("default", None)):
-        preset = marker_preset(name)
+        preset = MARKER_PRESETS[name]
         begun = begin_tracking(make_subject(body, Capture(30.0)), state)
 
         def follow(pose=begun, preset=preset):

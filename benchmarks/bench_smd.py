@@ -20,7 +20,7 @@ from hmc.body.joints import dof_index
 from hmc.body.model import neutral_state
 from hmc.body.proportions import default_body
 from hmc.camera.model import project
-from hmc.pose.methods.smd import smd_preset
+from hmc.pose.methods.smd import SMD_PRESETS
 from hmc.pose.objectives.cue_rows import pose_body
 from hmc.pose.objectives.surface_cue import place
 from hmc.pose.steps.descent.tracker import make_tracker, track_init, track_step
@@ -62,7 +62,7 @@ def main() -> int:
     rig = ring_rig()
     grid = VoxelGrid.from_room(CUBE, 2.2 / 64, len(rig))
     tables = make_tables(grid, rig)
-    tracker = make_tracker(default_body(1.78), smd_preset("default"))
+    tracker = make_tracker(default_body(1.78), SMD_PRESETS["default"])
     frames = [observed(tracker, rig, grid, tables, k / 15) for k in range(FRAMES)]
     begun, _ = track_step(np.random.default_rng(0), tracker, track_init(pose(0.0)), frames[0])
 
@@ -76,7 +76,7 @@ def main() -> int:
         {
             "smd": lambda: follow(preset),
             "lm": lambda: follow(replace(preset, optimiser="lm")),
-            "printed": lambda: follow(smd_preset("kehl2006")),
+            "printed": lambda: follow(SMD_PRESETS["kehl2006"]),
         },
         rounds=5,
     )

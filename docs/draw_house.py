@@ -29,7 +29,7 @@ FLOW = (
     ("voxels", "pose.views", "HullStep", 0.0),
     ("tracking", "pose.views", "person_voxels", 0.0),
     ("pose.views", "pose.person", "PersonView", 0.0),
-    ("pose.person", "pose.follow", "Decided", 0.0),
+    ("pose.person", "pose.follow", "DecidedFrames", 0.0),
     ("pose.follow", "cli", "follow", 0.0),
 )
 #: Where boxes stand: columns from left to right as a frame goes, rows from above.

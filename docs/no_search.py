@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import hmc
 from hmc.pose.steps.polish import polished
-from hmc.pose.steps.presets import pose_preset
+from hmc.pose.steps.presets import PRESETS
 from hmc.pose.steps.proposal import Proposal
 
-HOUSE = pose_preset("default")
+HOUSE = PRESETS["default"]
 
 
 def propose(rng, tracked, view):

@@ -12,10 +12,10 @@ import numpy as np
 
 import hmc
 from hmc.pose.steps.polish import fine_objective, polished
-from hmc.pose.steps.presets import pose_preset
+from hmc.pose.steps.presets import PRESETS
 from hmc.pose.steps.proposal import Proposal
 
-HOUSE = pose_preset("default")
+HOUSE = PRESETS["default"]
 DRAWS, SPREADS = 60, (0.1, 0.05, 0.025)
 
 

@@ -14,10 +14,10 @@ from hmc.landmarks import landmark_index
 from hmc.pose.objectives.objective import Sum
 from hmc.pose.steps.annealed import annealed
 from hmc.pose.steps.polish import fine_objective, polished
-from hmc.pose.steps.presets import pose_preset
+from hmc.pose.steps.presets import PRESETS
 
 WEIGHT, STEP = 0.05, 1e-5
-HOUSE = pose_preset("default")
+HOUSE = PRESETS["default"]
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ from hmc.io.masks import MaskStep, kept_masks
 from hmc.pose.method import Capture, begin_tracking
 from hmc.pose.methods.annealed import annealed_pose_step
 from hmc.pose.steps.annealed import DRIFT, annealed_subject
-from hmc.pose.steps.presets import PosePreset, pose_preset
+from hmc.pose.steps.presets import PRESETS, PosePreset
 from hmc.pose.views.person_view import PersonView, views_of
 from hmc.tracking.resumable import person_grid
 from hmc.voxels.hulls import HullStep, stream_hulls, stream_masks
@@ -48,7 +48,7 @@ LEAST_VARIATION = np.r_[np.full(3, 0.02), np.full(N_DOF - 3, np.radians(2))]
 
 def filter_preset(parameters: Parameters) -> PosePreset:
     """The thesis's preset with a cell's likelihood, layers, particles, density and way of annealing."""
-    base, annealing = pose_preset("canton2009"), pose_preset(ANNEALING[parameters["annealing"]])
+    base, annealing = PRESETS["canton2009"], PRESETS[ANNEALING[parameters["annealing"]]]
     return replace(
         base,
         likelihood=parameters["likelihood"],

@@ -29,7 +29,7 @@ from hmc.pose.methods.scalable import method_preset
 from hmc.pose.objectives.four_scores import ScoreTable
 from hmc.pose.steps.annealed import annealed_subject
 from hmc.pose.steps.hidden.shown import flesh_in_hulls, limb_signs, place_flesh
-from hmc.pose.steps.presets import pose_preset
+from hmc.pose.steps.presets import PRESETS
 from hmc.pose.steps.restrict import part_mask
 from hmc.pose.views.person_view import views_of
 from hmc.tracking.resumable import person_grid
@@ -83,7 +83,7 @@ def _limb_views(inputs: Inputs, label: str) -> LimbViews:
     recording, masks = seen.recording, seen.masks
     truth = first_truth(recording)
     body = default_body(stature_m(recording) or HEIGHT_M)
-    preset = method_preset(pose_preset("default"), "ddm-apf")
+    preset = method_preset(PRESETS["default"], "ddm-apf")
     table: ScoreTable | None = annealed_subject(body, Capture(recording.fps, VOXEL_M, recording.room), preset).flesh
     limbs, whole = UNITIVE_PIECES.limbs, part_mask(UNITIVE_PIECES.unions[-1].model.parts)
     occupancy, cameras = np.full((2, len(truth.frames), len(limbs)), np.nan)

@@ -23,7 +23,7 @@ from hmc.experiments.engine.inputs import Inputs, rendered
 from hmc.experiments.engine.style import COLOURS
 from hmc.experiments.truth import HEIGHT_M, first_truth, standing_state, stature_m
 from hmc.landmarks import LANDMARKS
-from hmc.pose.steps.descent.tracker import make_scene, make_tracker, optimise
+from hmc.pose.steps.descent.tracker import make_cue_frame, make_tracker, optimise
 
 __all__ = ["EXPERIMENT"]
 
@@ -59,7 +59,7 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
     # The paper has 10 points on the arm's surface and 10 on each contour.
     preset = replace(preset, cues=replace(preset.cues, surface_points=(60, 20, 10, 20, 20, 20), colors=None))
     dense = make_tracker(skeleton, replace(preset, times=5))
-    scene = make_scene(dense, seen, state[FREE])
+    scene = make_cue_frame(dense, seen, state[FREE])
     best, _, _ = optimise(rng, scene, state[FREE], [np.arange(len(FREE))])
     best, _, _ = optimise(rng, scene, best, CHAINS, 0.5)
     goal = _ends(skeleton, best)
@@ -75,7 +75,7 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
         sizes.append(size)
         for name in METHODS:
             tracker = make_tracker(skeleton, replace(preset, optimiser=kehl_runs.preset_of(name).optimiser))
-            scene = make_scene(tracker, seen, start)
+            scene = make_cue_frame(tracker, seen, start)
             found, _, _ = optimise(np.random.default_rng(seed), scene, start, [ARM], 0.5)
             distance[name].append(float(np.linalg.norm(_ends(skeleton, found) - goal, axis=1).max()))
     return {"distance_m": distance, "degrees": sizes}

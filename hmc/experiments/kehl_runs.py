@@ -23,7 +23,7 @@ from hmc.experiments.truth import first_truth, stature_m
 from hmc.io.recording import Recording
 from hmc.landmarks import BONES, LANDMARKS
 from hmc.metrics.landmarks import landmark_errors
-from hmc.pose.methods.smd import smd_preset
+from hmc.pose.methods.smd import SMD_PRESETS
 from hmc.pose.starts.da_vinci import find_da_vinci
 from hmc.pose.starts.settle import FirstPose, begin
 from hmc.pose.steps.descent.levenberg import LmSettings
@@ -69,7 +69,7 @@ def preset_of(variant: str) -> SmdPreset:
     """
     cues, more = VARIANTS[variant]
     more = dict(more)
-    preset = smd_preset(more.pop("name", "default"))
+    preset = SMD_PRESETS[more.pop("name", "default")]
     return replace(preset, cues=replace(preset.cues, **cues), **more)
 
 

@@ -25,7 +25,7 @@ from hmc.io.results import PoseTable
 from hmc.pose.follow import FollowOptions, follow
 from hmc.pose.method import Capture, begin_tracking, make_subject
 from hmc.pose.methods.marker_apf import marker_method
-from hmc.pose.steps.marker_filter import MarkerPreset, marker_frame, marker_preset
+from hmc.pose.steps.marker_filter import MARKER_PRESETS, MarkerPreset, marker_frame
 from hmc.pose.views.markers import marker_views, seen_in_frame
 from hmc.synthetic.marker_detector import SyntheticDetector
 
@@ -93,7 +93,7 @@ def _from_the_truth(
 
 
 def _preset(parameters: Parameters) -> MarkerPreset:
-    preset = marker_preset(parameters["preset"])
+    preset = MARKER_PRESETS[parameters["preset"]]
     return replace(
         preset,
         likelihood=replace(preset.likelihood, reprojection=parameters["reprojection"]),

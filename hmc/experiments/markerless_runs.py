@@ -20,7 +20,7 @@ from hmc.io.results import TrackTable, read_tracks, write_tracks
 from hmc.pose.follow import FollowOptions, PosedPeople, RunOptions, follow
 from hmc.pose.method import PoseMethod
 from hmc.pose.methods.annealed import annealed_method
-from hmc.pose.steps.presets import PosePreset, pose_preset
+from hmc.pose.steps.presets import PRESETS, PosePreset
 from hmc.pose.steps.refine import RefineSettings
 from hmc.tracking.resumable import track_recording
 from hmc.voxels.hulls import FrontendSettings, HullStep
@@ -131,7 +131,7 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
     inputs : Inputs
     rng : numpy.random.Generator
     """
-    way = SWITCHES[parameters["without"]](pose_preset(parameters["preset"]))
+    way = SWITCHES[parameters["without"]](PRESETS[parameters["preset"]])
     seen = tracked(inputs, parameters["recording"], parameters["cameras"])
     options = FollowOptions(VOXEL_M, int(rng.integers(2**31)))
     return pose_results(seen.recording, run_method(seen, way.method, options, change_hulls(way.change)))

@@ -25,7 +25,7 @@ from hmc.pose.follow import FollowOptions
 from hmc.pose.method import PoseMethod
 from hmc.pose.methods.annealed import annealed_method
 from hmc.pose.smoothing import smooth_landmarks
-from hmc.pose.steps.presets import pose_preset
+from hmc.pose.steps.presets import PRESETS
 from hmc.voxels.hulls import HullStep
 
 __all__ = ["EXPERIMENT", "hidden", "jitter_mm"]
@@ -46,7 +46,7 @@ DEFAULT, NO_RECOVERY = "default", "without recovery"
 
 
 def _preset(**changes) -> PoseMethod:
-    return annealed_method(replace(pose_preset("default"), **changes))
+    return annealed_method(replace(PRESETS["default"], **changes))
 
 
 #: What is in place of what `default` has.

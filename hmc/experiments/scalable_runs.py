@@ -25,7 +25,7 @@ from hmc.experiments.removal import remover
 from hmc.pose.follow import FollowOptions
 from hmc.pose.methods.scalable import method_preset
 from hmc.pose.registry import pose_method
-from hmc.pose.steps.presets import PosePreset, pose_preset
+from hmc.pose.steps.presets import PRESETS, PosePreset
 from hmc.search.structural import StructuralSettings
 
 __all__ = [
@@ -77,7 +77,7 @@ def run_preset(parameters: Parameters) -> PosePreset:
     evaluations, annealing = parameters["evaluations"], ANNEALING[parameters["annealing"]]
     base = {"likelihood": "factorised", "density": 1.0, "layers": APF_LAYERS, "particles": round(evaluations / APF_LAYERS)}
     preset = filter_preset(base | {"annealing": parameters["annealing"]})
-    structural = StructuralSettings() if annealing == "canton2009" else pose_preset(annealing).structural
+    structural = StructuralSettings() if annealing == "canton2009" else PRESETS[annealing].structural
     structural = replace(structural, gamma=evaluations / (N_DOF * structural.layers))
     method = parameters["method"]
     if method == WHOLE:

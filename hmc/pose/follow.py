@@ -23,7 +23,7 @@ from hmc.io.recording import Recording, iterate_frames
 from hmc.io.results import PoseStates, PoseTable, TrackTable, write_joints, write_pose
 from hmc.landmarks import LANDMARKS
 from hmc.pose.method import Capture, PoseMethod
-from hmc.pose.person import Decided, PersonState, PersonTrack, PoseTask, person_step, taken_up
+from hmc.pose.person import DecidedFrames, PersonState, PersonTrack, PoseTask, person_step, taken_up
 from hmc.pose.records import keep_decided, kept_decided
 from hmc.pose.views.markers import marker_views, seen_in_frame
 from hmc.pose.views.person_view import IMAGES_FOR, PersonView, check_needs, views_of
@@ -185,7 +185,7 @@ def follow(
     capture = Capture(recording.fps, options.voxel_size_m, recording.room, recording.rig)
     task, persons = PoseTask(method, capture, options.seed, options.height_m), persons_of(recording, tracks)
     states = dict.fromkeys(persons, PersonState())
-    done: list[Decided] = []
+    done: list[DecidedFrames] = []
     for decided in kept_decided(run.journal, run.key, task):
         done.append(replace(decided, tracked=None))
         states[decided.person] = taken_up(task, states[decided.person], decided)
@@ -280,7 +280,7 @@ def unfitted_notes(persons: Iterable[int], status: Iterable[str]) -> list[str]:
     return [f"person {who}: {n} frame{'s' if n > 1 else ''} without a pose: {reason}" for (who, reason), n in sorted(why.items())]
 
 
-def _posed_people(rows: Sequence[Decided]) -> PosedPeople:
+def _posed_people(rows: Sequence[DecidedFrames]) -> PosedPeople:
     """Tables of all rows of a run, in order of frame and person."""
     none = np.zeros((0, len(DOF_NAMES)))
     frames = np.array([frame for one in rows for frame in one.frames], int)

@@ -31,7 +31,7 @@ __all__ = [
     "PoseStep",
     "Recover",
     "Start",
-    "Started",
+    "StartPose",
     "StepInfo",
     "Stepped",
     "Subject",
@@ -216,7 +216,7 @@ Choose = Callable[[np.random.Generator, Stepped, PersonView], Alternatives]
 
 
 @dataclass(frozen=True)
-class Started:
+class StartPose:
     """A first pose.
 
     Parameters
@@ -245,7 +245,9 @@ class Started:
 class Start(Protocol):
     """Finds a person's body and first pose in a window of frames."""
 
-    def __call__(self, frame_rng: FrameRng, views: Sequence[PersonView], capture: Capture, height_m: float | None = None) -> Started | None:
+    def __call__(
+        self, frame_rng: FrameRng, views: Sequence[PersonView], capture: Capture, height_m: float | None = None
+    ) -> StartPose | None:
         """The first pose; None where no frame of the window has anything to start from."""
 
 

@@ -19,7 +19,7 @@ from hmc.pose.method import Alternatives, Capture, PoseMethod, StepInfo, Subject
 from hmc.pose.starts.window import walk
 from hmc.pose.views.person_view import PersonView
 
-__all__ = ["Decided", "PersonState", "PersonTrack", "PoseTask", "person_step", "taken_up"]
+__all__ = ["DecidedFrames", "PersonState", "PersonTrack", "PoseTask", "person_step", "taken_up"]
 
 NO_START = "nothing to start from"
 
@@ -81,7 +81,7 @@ class PersonTrack:
 
 
 @dataclass(frozen=True)
-class Followed:
+class FollowedFrame:
     """A frame that is followed and not decided yet."""
 
     frame: int
@@ -91,7 +91,7 @@ class Followed:
 
 
 @dataclass(frozen=True)
-class Decided:
+class DecidedFrames:
     """Consecutive frames of a person that will not change any more.
 
     Parameters
@@ -128,7 +128,7 @@ class PersonState:
         Of the last frame that was followed.
     watched : tuple of PersonView
         The window that is not over. The only views that are kept.
-    followed : tuple of Followed
+    followed : tuple of FollowedFrame
         Frames that are not decided.
     context : tuple of (int, ndarray of shape (27,))
         The last decided frames, with their poses.
@@ -139,12 +139,12 @@ class PersonState:
     subject: Subject | None = None
     tracked: Tracked | None = None
     watched: tuple[PersonView, ...] = ()
-    followed: tuple[Followed, ...] = ()
+    followed: tuple[FollowedFrame, ...] = ()
     context: tuple[tuple[int, np.ndarray], ...] = ()
     done_to: int = -1
 
 
-def person_step(task: PoseTask, person: PersonTrack, state: PersonState, view: PersonView) -> tuple[PersonState, list[Decided]]:
+def person_step(task: PoseTask, person: PersonTrack, state: PersonState, view: PersonView) -> tuple[PersonState, list[DecidedFrames]]:
     """What is known after one more frame of a person, and what is decided by it.
 
     Parameters
@@ -158,7 +158,7 @@ def person_step(task: PoseTask, person: PersonTrack, state: PersonState, view: P
     Returns
     -------
     state : PersonState
-    decided : list of Decided
+    decided : list of DecidedFrames
         In order.
     """
     is_last = view.frame == int(person.frames[-1])
@@ -170,7 +170,9 @@ def person_step(task: PoseTask, person: PersonTrack, state: PersonState, view: P
         if started is None:
             # Nothing to start from yet: these frames stay without a pose, and the next window is tried.
             frames = tuple(one.frame for one in state.watched)
-            nothing = Decided(person.number, frames, np.full((len(frames), len(DOF_NAMES)), np.nan), (StepInfo(NO_START),) * len(frames))
+            nothing = DecidedFrames(
+                person.number, frames, np.full((len(frames), len(DOF_NAMES)), np.nan), (StepInfo(NO_START),) * len(frames)
+            )
             return replace(state, watched=(), done_to=view.frame), [nothing]
         state = started
     else:
@@ -201,13 +203,13 @@ def _start(task: PoseTask, person: PersonTrack, state: PersonState) -> PersonSta
     return replace(state, subject=subject, tracked=path[-1][0], watched=(), followed=followed)
 
 
-def _followed(task: PoseTask, rng: np.random.Generator, tracked: Tracked, info: StepInfo, view: PersonView) -> Followed:
+def _followed(task: PoseTask, rng: np.random.Generator, tracked: Tracked, info: StepInfo, view: PersonView) -> FollowedFrame:
     choose = task.method.choose
     found = info.alternatives if choose is None else choose(rng, (tracked, info), view)
-    return Followed(view.frame, tracked, info, found or Alternatives(tracked.state[None], np.array([info.cost])))
+    return FollowedFrame(view.frame, tracked, info, found or Alternatives(tracked.state[None], np.array([info.cost])))
 
 
-def _decide(task: PoseTask, person: PersonTrack, state: PersonState, is_last: bool) -> tuple[PersonState, list[Decided]]:
+def _decide(task: PoseTask, person: PersonTrack, state: PersonState, is_last: bool) -> tuple[PersonState, list[DecidedFrames]]:
     """Decide what has waited for its legs long enough; everything in the person's last frame."""
     lag = task.lag
     # The window's frames were followed from its middle on; a run goes on from frames that were followed one after the other.
@@ -217,7 +219,7 @@ def _decide(task: PoseTask, person: PersonTrack, state: PersonState, is_last: bo
     picks = _picks(task, state)
     rows = state.followed if is_last else state.followed[: len(state.followed) - lag]
     chosen = [(row, int(pick)) for row, pick in zip(rows, picks, strict=False)]
-    decided = Decided(
+    decided = DecidedFrames(
         person.number,
         tuple(row.frame for row in rows),
         np.array([row.alternatives.states[pick] for row, pick in chosen]),
@@ -243,7 +245,7 @@ def _picks(task: PoseTask, state: PersonState) -> np.ndarray:
     return choose_legs(frames, costs, points, task.capture.fps, legs)[len(state.context) :]
 
 
-def _context(task: PoseTask, context: tuple[tuple[int, np.ndarray], ...], decided: Decided) -> tuple[tuple[int, np.ndarray], ...]:
+def _context(task: PoseTask, context: tuple[tuple[int, np.ndarray], ...], decided: DecidedFrames) -> tuple[tuple[int, np.ndarray], ...]:
     """The last decided frames, as many as the velocity of the legs is taken from."""
     legs = task.method.legs
     if legs is None:
@@ -251,7 +253,7 @@ def _context(task: PoseTask, context: tuple[tuple[int, np.ndarray], ...], decide
     return (*context, *zip(decided.frames, decided.states, strict=True))[-1 - legs.reach(task.capture.fps) :]
 
 
-def taken_up(task: PoseTask, state: PersonState, decided: Decided) -> PersonState:
+def taken_up(task: PoseTask, state: PersonState, decided: DecidedFrames) -> PersonState:
     """The state of a person after these rows, all that a stopped run leaves.
 
     Parameters
@@ -259,7 +261,7 @@ def taken_up(task: PoseTask, state: PersonState, decided: Decided) -> PersonStat
     task : PoseTask
     state : PersonState
         After the rows before them; empty for the first.
-    decided : Decided
+    decided : DecidedFrames
     """
     done_to = decided.frames[-1]
     if decided.body is None:

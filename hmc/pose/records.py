@@ -14,7 +14,7 @@ from hmc.body.proportions import make_body
 from hmc.io.files import atomic_write
 from hmc.io.journal import append_journal, open_journal
 from hmc.pose.method import StepInfo, Tracked, begin_tracking
-from hmc.pose.person import Decided, PoseTask
+from hmc.pose.person import DecidedFrames, PoseTask
 
 __all__ = ["from_record", "keep_decided", "kept_decided", "to_record"]
 
@@ -22,14 +22,14 @@ __all__ = ["from_record", "keep_decided", "kept_decided", "to_record"]
 _MEMORY = "memory_"
 
 
-def keep_decided(journal: str | Path | None, decided: Decided, before: int) -> None:
+def keep_decided(journal: str | Path | None, decided: DecidedFrames, before: int) -> None:
     """Add rows to a run's journal, with what the method goes on from beside it.
 
     Parameters
     ----------
     journal : path or None
         None: nothing is kept.
-    decided : Decided
+    decided : DecidedFrames
     before : int
         The last frame of the person that was decided before these rows; -1: there was none.
     """
@@ -40,7 +40,7 @@ def keep_decided(journal: str | Path | None, decided: Decided, before: int) -> N
     append_journal(journal, to_record(decided))
 
 
-def kept_decided(journal: str | Path | None, key: str, task: PoseTask) -> Iterator[Decided]:
+def kept_decided(journal: str | Path | None, key: str, task: PoseTask) -> Iterator[DecidedFrames]:
     """The rows that a stopped run left, in order; the last ones of each person with what the method goes on from.
 
     Parameters
@@ -62,7 +62,7 @@ def kept_decided(journal: str | Path | None, key: str, task: PoseTask) -> Iterat
         yield decided
 
 
-def to_record(decided: Decided) -> dict[str, Any]:
+def to_record(decided: DecidedFrames) -> dict[str, Any]:
     """Plain values; the memory is not among them."""
     infos = decided.infos
     record: dict[str, Any] = {
@@ -81,7 +81,7 @@ def to_record(decided: Decided) -> dict[str, Any]:
     return record
 
 
-def from_record(record: dict[str, Any], task: PoseTask) -> Decided:
+def from_record(record: dict[str, Any], task: PoseTask) -> DecidedFrames:
     """What `to_record` made into a record, without what the method goes on from."""
     n = len(record["frames"])
     missing: list[np.ndarray | None] = [None] * n
@@ -94,10 +94,10 @@ def from_record(record: dict[str, Any], task: PoseTask) -> Decided:
     )
     states = np.array([np.full(len(DOF_NAMES), np.nan) if state is None else state for state in record["states"]], float)
     body = make_body(record["body"], task.method.limits) if "body" in record else None
-    return Decided(record["person"], tuple(record["frames"]), states, infos, None, body)
+    return DecidedFrames(record["person"], tuple(record["frames"]), states, infos, None, body)
 
 
-def _keep_memory(journal: str | Path, decided: Decided, before: int) -> None:
+def _keep_memory(journal: str | Path, decided: DecidedFrames, before: int) -> None:
     """Keep a person's memory beside the journal, to be called before the frame's record is added.
 
     There are two files a person, and that of the frame `before`, which the last record is of, is left alone: it is needed should

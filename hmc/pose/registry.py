@@ -134,29 +134,29 @@ def _annealed(name: str) -> Callable[[MethodChoice], PoseMethod]:
 
 def _house(choice: MethodChoice, preset: str | None = None):
     """The preset whose start, refinement and recovery a method has, with the candidates that are asked for."""
-    from hmc.pose.steps.presets import pose_preset
+    from hmc.pose.steps.presets import PRESETS
 
-    house = pose_preset(preset or choice.preset)
+    house = PRESETS[preset or choice.preset]
     return house if choice.init is None else replace(house, start=choice.init)
 
 
 def _smd(choice: MethodChoice) -> PoseMethod:
-    from hmc.pose.methods.smd import smd_method, smd_preset
+    from hmc.pose.methods.smd import SMD_PRESETS, smd_method
 
-    return smd_method(smd_preset(choice.preset), None if choice.preset == "kehl2006" else _house(choice, "default"))
+    return smd_method(SMD_PRESETS[choice.preset], None if choice.preset == "kehl2006" else _house(choice, "default"))
 
 
 def _pso(choice: MethodChoice) -> PoseMethod:
-    from hmc.pose.methods.pso import pso_method, swarm_preset
+    from hmc.pose.methods.pso import SWARM_PRESETS, pso_method
 
-    return pso_method(swarm_preset(choice.preset), None if choice.preset == "hsiao2008" else _house(choice, "default"))
+    return pso_method(SWARM_PRESETS[choice.preset], None if choice.preset == "hsiao2008" else _house(choice, "default"))
 
 
 def _markers(choice: MethodChoice) -> PoseMethod:
     from hmc.pose.methods.marker_apf import marker_method
-    from hmc.pose.steps.marker_filter import marker_preset
+    from hmc.pose.steps.marker_filter import MARKER_PRESETS
 
-    return marker_method(marker_preset(choice.preset), choice.skin)
+    return marker_method(MARKER_PRESETS[choice.preset], choice.skin)
 
 
 #: By name, in the order in which they are listed.

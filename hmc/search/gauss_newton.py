@@ -19,7 +19,7 @@ from typing import Any, Generic, Protocol, TypeVar
 import numpy as np
 
 __all__ = [
-    "Damping", "GaussNewtonSettings", "GaussNewtonState", "LeastSquares", "Linearised", "damped", "gauss_newton_init", "gauss_newton_run",
+    "Damping", "GaussNewtonSettings", "GaussNewtonState", "LeastSquares", "Residuals", "damped", "gauss_newton_init", "gauss_newton_run",
     "gauss_newton_step", "movable",
 ]  # fmt: skip
 
@@ -27,7 +27,7 @@ __all__ = [
 _LEAST_DIAGONAL = 1e-9
 
 
-class Linearised(Protocol):
+class Residuals(Protocol):
     """Residuals at some parameters.
 
     Attributes
@@ -45,7 +45,7 @@ class Linearised(Protocol):
         """Which residuals change with the parameters (indices or a slice), k of them, and how, shape (k, n)."""
 
 
-L = TypeVar("L", bound=Linearised)
+L = TypeVar("L", bound=Residuals)
 
 
 @dataclass(frozen=True)
@@ -140,7 +140,7 @@ class GaussNewtonState(Generic[L]):
     Parameters
     ----------
     x, anchor : ndarray, shape (n,)
-    found : Linearised
+    found : Residuals
         At `x`.
     cost, first_cost : float
         Now and at the start, the hold included.
@@ -180,7 +180,7 @@ def gauss_newton_init(
     anchor : ndarray, shape (n,), optional
         The start by default.
     near : object, optional
-        `Linearised.near` of parameters evaluated before.
+        `Residuals.near` of parameters evaluated before.
     """
     x = np.clip(x, problem.low, problem.high)
     anchor = x if anchor is None else anchor

@@ -17,7 +17,7 @@ from hmc.tracking.blobs import Observation
 from hmc.tracking.rules import RULES
 from hmc.tracking.rules.birth import confirm
 from hmc.tracking.settings import FollowingSettings
-from hmc.tracking.state import StepInfo, TrackerState, TrackRow
+from hmc.tracking.state import TrackerInfo, TrackerState, TrackRow
 from hmc.tracking.update import Filter, Rule, begin_update
 
 __all__ = ["advance", "finish", "init", "original_number"]
@@ -51,7 +51,7 @@ def advance(
     settings: FollowingSettings,
     filter: Filter | None = None,
     rules: Iterable[Rule] = RULES,
-) -> tuple[TrackerState, StepInfo]:
+) -> tuple[TrackerState, TrackerInfo]:
     """The state after a frame, and what was found in it.
 
     Parameters
@@ -69,7 +69,7 @@ def advance(
     """
     if observation is None:
         waiting = tuple(replace(track, last_frame=track.last_frame + 1, velocity=track.velocity * WAITING) for track in state.tracks)
-        return replace(state, tracks=waiting), StepInfo(())
+        return replace(state, tracks=waiting), TrackerInfo(())
     update = reduce(lambda update, rule: rule(update, settings), rules, begin_update(state, frame, observation, filter))
     return update.after(), update.info()
 

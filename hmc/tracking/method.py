@@ -27,13 +27,13 @@ import numpy as np
 from hmc.errors import InputError
 from hmc.tracking.blobs import Observation
 from hmc.tracking.settings import FollowingSettings
-from hmc.tracking.state import StepInfo, TrackerState
+from hmc.tracking.state import TrackerInfo, TrackerState
 
 __all__ = ["Step", "Tracker", "TrackerMethod"]
 
 #: ``step(rng, state, frame, observation, settings)`` returns the state after the frame and what was found; of a frame that tells nothing
 #: the observation is None.
-Step = Callable[[np.random.Generator, TrackerState, int, Observation | None, Any], tuple[TrackerState, StepInfo]]
+Step = Callable[[np.random.Generator, TrackerState, int, Observation | None, Any], tuple[TrackerState, TrackerInfo]]
 
 
 @dataclass(frozen=True)
@@ -125,6 +125,6 @@ class Tracker:
 
     def step(
         self, rng: np.random.Generator, state: TrackerState, frame: int, observation: Observation | None
-    ) -> tuple[TrackerState, StepInfo]:
+    ) -> tuple[TrackerState, TrackerInfo]:
         """The state after a frame, and what was found in it."""
         return self.method.step(rng, state, frame, observation, self.settings)

@@ -16,7 +16,7 @@ from hmc.tracking.blobs import Observation
 from hmc.tracking.following import advance
 from hmc.tracking.method import TrackerMethod
 from hmc.tracking.settings import ALIKE, CANTON_2009, FollowingSettings
-from hmc.tracking.state import StepInfo, TrackerState
+from hmc.tracking.state import TrackerInfo, TrackerState
 
 __all__ = ["METHOD", "NaiveSettings", "step"]
 
@@ -30,7 +30,7 @@ class NaiveSettings:
 
 def step(
     rng: np.random.Generator, state: TrackerState, frame: int, observation: Observation | None, settings: NaiveSettings
-) -> tuple[TrackerState, StepInfo]:
+) -> tuple[TrackerState, TrackerInfo]:
     """The state after a frame, and what was found in it; no random numbers are drawn."""
     return advance(state, frame, observation, settings.following)
 

@@ -18,7 +18,7 @@ from hmc.tracking.following import advance
 from hmc.tracking.method import TrackerMethod
 from hmc.tracking.region import PERSON_RADIUS_M
 from hmc.tracking.settings import ALIKE, CANTON_2009, FollowingSettings
-from hmc.tracking.state import PersonMemory, StepInfo, TrackerState
+from hmc.tracking.state import PersonMemory, TrackerInfo, TrackerState
 from hmc.tracking.surroundings import blocking, look_around, looks_of
 from hmc.tracking.update import FilterEstimate
 
@@ -72,7 +72,7 @@ class ParticleSettings:
 
 def step(
     rng: np.random.Generator, state: TrackerState, frame: int, observation: Observation | None, settings: ParticleSettings
-) -> tuple[TrackerState, StepInfo]:
+) -> tuple[TrackerState, TrackerInfo]:
     """The state after a frame, and what was found in it.
 
     Parameters
@@ -86,7 +86,7 @@ def step(
     Returns
     -------
     state : TrackerState
-    info : StepInfo
+    info : TrackerInfo
     """
 
     def follow(state: TrackerState, predicted: np.ndarray, observation: Observation) -> FilterEstimate:

@@ -20,7 +20,7 @@ from hmc.tracking.following import advance
 from hmc.tracking.method import TrackerMethod
 from hmc.tracking.region import PERSON_RADIUS_M
 from hmc.tracking.settings import ALIKE, CANTON_2009, FollowingSettings
-from hmc.tracking.state import PersonMemory, StepInfo, TrackerState
+from hmc.tracking.state import PersonMemory, TrackerInfo, TrackerState
 from hmc.tracking.surroundings import Surroundings, blocking, look_around, looks_of
 from hmc.tracking.update import FilterEstimate
 
@@ -105,7 +105,7 @@ class SparseSettings:
 
 def step(
     rng: np.random.Generator, state: TrackerState, frame: int, observation: Observation | None, settings: SparseSettings
-) -> tuple[TrackerState, StepInfo]:
+) -> tuple[TrackerState, TrackerInfo]:
     """The state after a frame, and what was found in it.
 
     Parameters
@@ -119,7 +119,7 @@ def step(
     Returns
     -------
     state : TrackerState
-    info : StepInfo
+    info : TrackerInfo
     """
 
     def follow(state: TrackerState, predicted: np.ndarray, observation: Observation) -> FilterEstimate:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-__all__ = ["Candidate", "DepartedTrack", "PersonMemory", "StaticObjects", "StepInfo", "Track", "TrackRow", "TrackerState"]
+__all__ = ["Candidate", "DepartedTrack", "PersonMemory", "StaticObjects", "Track", "TrackRow", "TrackerInfo", "TrackerState"]
 
 
 @dataclass(frozen=True)
@@ -176,7 +176,7 @@ class TrackerState:
 
 
 @dataclass(frozen=True)
-class StepInfo:
+class TrackerInfo:
     """What a step found beside the new state.
 
     Attributes

@@ -9,7 +9,7 @@ import numpy as np
 
 from hmc.tracking.blobs import Blobs, Observation, blob_features
 from hmc.tracking.settings import FollowingSettings
-from hmc.tracking.state import Candidate, DepartedTrack, PersonMemory, StaticObjects, StepInfo, Track, TrackerState, TrackRow
+from hmc.tracking.state import Candidate, DepartedTrack, PersonMemory, StaticObjects, Track, TrackerInfo, TrackerState, TrackRow
 
 __all__ = ["Filter", "FilterEstimate", "FrameUpdate", "Measurement", "Rule", "begin_update"]
 
@@ -188,13 +188,13 @@ class FrameUpdate:
             static=self.static,
         )
 
-    def info(self) -> StepInfo:
+    def info(self) -> TrackerInfo:
         """What was found in the frame."""
         persons = np.array([*(track.person for track in self.state.tracks), -1])
         owners = np.full(len(self.whole.points), -1)
         owners[self.visible] = persons[self.owners]
         shared = tuple(int(person) for person in persons[:-1][self.shared])
-        return StepInfo((*self.rows, *self.born_rows), owners, shared, self.estimate.color_s, self.filter_s)
+        return TrackerInfo((*self.rows, *self.born_rows), owners, shared, self.estimate.color_s, self.filter_s)
 
 
 #: What is done with a frame, one after the other: ``rule(update, settings)`` returns the update with what it found.

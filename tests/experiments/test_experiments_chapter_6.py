@@ -19,7 +19,7 @@ from hmc.experiments.engine.style import house_style
 from hmc.experiments.five_actions import ACTIONS, ACTORS, action_name, action_recipes, action_title
 from hmc.experiments.truth import estimate_of, first_truth, standing_state
 from hmc.io.results import PoseTable
-from hmc.pose.steps.presets import pose_preset
+from hmc.pose.steps.presets import PRESETS
 
 N = 12
 
@@ -118,7 +118,7 @@ def test_the_papers_grid_has_7200_runs():
 
 
 def test_every_switch_changes_one_thing_only():
-    preset = pose_preset("default")
+    preset = PRESETS["default"]
 
     def told(way):
         """What a way is made of; functions that differ have other settings."""
@@ -140,9 +140,7 @@ def test_filter_presets_are_the_theses_but_for_what_a_cell_says():
         preset = filter_runs.filter_preset(parameters)
         assert preset.body == "canton" and preset.refine is None and preset.likelihood == parameters["likelihood"]
         assert (preset.annealed.layers, preset.annealed.particles) == (parameters["layers"], parameters["particles"])
-        assert preset.annealed.survival_rate == (
-            0.5 if parameters["annealing"] == "printed" else pose_preset("default").annealed.survival_rate
-        )
+        assert preset.annealed.survival_rate == (0.5 if parameters["annealing"] == "printed" else PRESETS["default"].annealed.survival_rate)
 
 
 def test_modes_of_a_map_are_counted():

@@ -10,7 +10,7 @@ from hmc.experiments import Plan, over_time
 from hmc.experiments.engine.experiment import Cell
 from hmc.experiments.engine.style import house_style
 from hmc.experiments.over_time import DEFAULT, GONE_S, NO_RECOVERY, WAYS, hidden, jitter_mm
-from hmc.pose.steps.presets import pose_preset
+from hmc.pose.steps.presets import PRESETS
 from hmc.voxels.hulls import HullStep
 
 FPS, N = 20.0, 90
@@ -90,6 +90,6 @@ def test_nobody_is_seen_in_the_gap(monkeypatch):
     ]
     assert all(result["gone"] == [45, 75] for result in results)
     assert [method.recover is None for method, _ in asked] == [False, True]
-    assert all(method.settings == pose_preset("default") for method, _ in asked)
+    assert all(method.settings == PRESETS["default"] for method, _ in asked)
     shown = list(asked[0][1](steps, len(steps)))
     assert not shown[50].strict.any() and shown[80] is steps[80]

@@ -33,9 +33,9 @@ from hmc.pose.method import PoseMethod, StepInfo, Tracked, unseen
 from hmc.pose.registry import register
 from hmc.pose.starts.window import StartSettings, WindowStart
 from hmc.pose.steps.polish import fine_objective
-from hmc.pose.steps.presets import pose_preset
+from hmc.pose.steps.presets import PRESETS
 
-HOUSE = pose_preset("default")
+HOUSE = PRESETS["default"]
 
 
 def step(rng, tracked, view):

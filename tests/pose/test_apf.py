@@ -14,7 +14,7 @@ from hmc.errors import InputError
 from hmc.pose.method import begin_tracking, particles_of, with_particles
 from hmc.pose.methods.annealed import annealed_pose_step
 from hmc.pose.steps.annealed import DRIFT, first_spread, starting_particles
-from hmc.pose.steps.presets import PRESETS, drift, pose_preset
+from hmc.pose.steps.presets import PRESETS, drift
 from hmc.search.filters import AnnealedSettings, particle_init
 
 # Little work a frame, and weights of the tests' own; everything else as in the presets.
@@ -173,7 +173,7 @@ def test_drift_grows_with_the_time_between_frames():
 
 def test_the_thesis_preset_is_as_printed():
     """Canton (2009), 3.2.2 and 6.7: survival rate .5 and the survival rates as spread, 6 layers of 600, factorised likelihood."""
-    preset = pose_preset("canton2009")
+    preset = PRESETS["canton2009"]
     assert (preset.annealed.layers, preset.annealed.particles) == (6, 600)
     assert preset.annealed.survival_rate == 0.5 and preset.annealed.spread == "survival"
     assert preset.body == "canton" and preset.likelihood == "factorised" and preset.start == "neutral"
@@ -186,8 +186,6 @@ def test_presets_know_their_names_and_sources():
         assert preset.name == name and preset.source
         # What leans on the refinement has one.
         assert preset.refine is not None or (preset.search is None and preset.fit_body is None and preset.start == "neutral")
-    with pytest.raises(InputError, match=r"defualt.*canton2009, default"):
-        pose_preset("defualt")
 
 
 def test_a_preset_that_cannot_work_is_refused():

@@ -26,7 +26,7 @@ from hmc.pose.methods.marker_apf import MarkerRecovery, MarkerStart, marker_meth
 from hmc.pose.objectives.epipolar import MarkerLikelihood, marker_cost, project_markers
 from hmc.pose.objectives.marker_points import find_points, triangulate
 from hmc.pose.objectives.nearest_detections import nearest_detections
-from hmc.pose.steps.marker_filter import TIPS, MarkerPreset, marker_frame, marker_preset, on_markers, with_tips
+from hmc.pose.steps.marker_filter import MARKER_PRESETS, TIPS, MarkerPreset, marker_frame, on_markers, with_tips
 from hmc.pose.steps.marker_limbs import explain_all, refine_to_points
 from hmc.pose.steps.marker_search import left_over, search_near, start_poses
 from hmc.pose.steps.presets import drift
@@ -197,7 +197,7 @@ def test_markers_of_two_people_are_refused():
     cameras = np.repeat(RIG.names, 30)
     table = DetectionTable(np.repeat(np.arange(4), len(uv)), np.tile(cameras, 4), np.tile(uv, (4, 1)))
     with pytest.raises(InputError, match="more than one person seems to wear markers"):
-        followed(table, 4, marker_preset("default"))
+        followed(table, 4, MARKER_PRESETS["default"])
 
 
 def test_learnt_markers_are_where_they_were_worn():
@@ -338,7 +338,7 @@ def test_limbs_are_told_apart_over_the_whole_motion():
         for uv in seen
     ]
     table = DetectionTable(*(np.array(column) for column in zip(*rows, strict=True)))
-    method = marker_method(marker_preset("default"), skin=False)
+    method = marker_method(MARKER_PRESETS["default"], skin=False)
 
     def confused(rng, tracked, view):
         tracked, info = method.step(rng, tracked, view)
@@ -346,13 +346,13 @@ def test_limbs_are_told_apart_over_the_whole_motion():
             return tracked, info
         return replace(tracked, state=info.alternatives.states[1]), info
 
-    found = followed(table, len(frames), marker_preset("default"), replace(method, step=confused))
+    found = followed(table, len(frames), MARKER_PRESETS["default"], replace(method, step=confused))
     off = np.linalg.norm(found.poses.positions - points, axis=2)
     assert off.mean() < 0.03 and off.max() < 0.15
 
 
 def test_without_markers_the_pose_stays():
-    step, start = on_markers(marker_preset("canton2009")), begin_tracking(SUBJECT, standing(), np.ones(27), {TIPS: BODY.tips})
+    step, start = on_markers(MARKER_PRESETS["canton2009"]), begin_tracking(SUBJECT, standing(), np.ones(27), {TIPS: BODY.tips})
     nothing = PersonView(0, markers=observe_markers(VIEWS, [np.zeros((0, 2))] * 5, GATE))
     for view, why in ((nothing, "fewer than two views"), (PersonView(0), "no detections in this frame")):
         tracked, info = step(np.random.default_rng(0), start, view)
@@ -361,8 +361,6 @@ def test_without_markers_the_pose_stays():
         assert why in info.status and np.isnan(info.cost)
     with pytest.raises(InputError, match="two cameras"):
         marker_views(Rig(RIG.cameras[:1]))
-    with pytest.raises(InputError, match="no preset of markers named 'best'"):
-        marker_preset("best")
 
 
 def walking_table(n=8, unseen=(5,)):

@@ -11,7 +11,7 @@ from hmc.body.joints import N_DOF
 from hmc.body.proportions import default_body
 from hmc.io.journal import append_journal, open_journal
 from hmc.pose.method import Capture, StepInfo, Tracked, begin_tracking, make_subject
-from hmc.pose.person import Decided, PoseTask
+from hmc.pose.person import DecidedFrames, PoseTask
 from hmc.pose.records import from_record, keep_decided, kept_decided, to_record
 from hmc.pose.registry import pose_method
 
@@ -19,7 +19,7 @@ TASK = PoseTask(pose_method("apf"), Capture())
 SUBJECT = make_subject(default_body(1.69), TASK.capture)
 
 
-def through(tmp_path, rows: Decided) -> Decided:
+def through(tmp_path, rows: DecidedFrames) -> DecidedFrames:
     """Rows that were written and read."""
     journal = tmp_path / "journal"
     open_journal(journal, "run")
@@ -34,7 +34,7 @@ def test_rows_come_back_to_the_last_digit(tmp_path):
     told = {"error_m": 1 / 7, "started": True, "doubts": "a leg is missing; legs touch"}
     infos = (StepInfo(cost=1e-4, missing=missing), StepInfo("no hull"), StepInfo(cost=1 / 3e4, details=told))
     tracked = begin_tracking(SUBJECT, states[-1] + 0.01, rng.standard_normal(N_DOF) / 3)
-    rows = Decided(4, (7, 8, 10), states, infos, tracked, SUBJECT.body)
+    rows = DecidedFrames(4, (7, 8, 10), states, infos, tracked, SUBJECT.body)
     back = through(tmp_path, rows)
     assert (back.person, back.frames) == (rows.person, rows.frames)
     assert [info.status for info in back.infos] == ["fitted", "no hull", "fitted"]
@@ -48,7 +48,7 @@ def test_rows_come_back_to_the_last_digit(tmp_path):
 
 
 def test_rows_without_a_start_come_back_as_nothing(tmp_path):
-    back = through(tmp_path, Decided(0, (1, 2), np.full((2, N_DOF), np.nan), (StepInfo("no hull"),) * 2))
+    back = through(tmp_path, DecidedFrames(0, (1, 2), np.full((2, N_DOF), np.nan), (StepInfo("no hull"),) * 2))
     assert back.frames == (1, 2) and back.states.shape == (2, N_DOF) and np.isnan(back.states).all()
     assert back.tracked is None and back.body is None
 
@@ -59,8 +59,8 @@ def tracked(value: float) -> Tracked:
     return begin_tracking(SUBJECT, np.full(N_DOF, value), np.full(N_DOF, value / 3), memory)
 
 
-def rows_of(frame: int, value: float, person: int = 2) -> Decided:
-    return Decided(person, (frame,), np.full((1, N_DOF), value), (StepInfo(cost=1.0),), tracked(value), SUBJECT.body)
+def rows_of(frame: int, value: float, person: int = 2) -> DecidedFrames:
+    return DecidedFrames(person, (frame,), np.full((1, N_DOF), value), (StepInfo(cost=1.0),), tracked(value), SUBJECT.body)
 
 
 def kept(journal: Path, person: int = 2) -> Tracked:

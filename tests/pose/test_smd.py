@@ -20,11 +20,10 @@ from hmc.body.solids import CHAINS, FREE
 from hmc.camera.color_edges import ColorEdgeSettings
 from hmc.camera.model import look_at, project
 from hmc.camera.stacked import project_in, stack_views
-from hmc.errors import InputError
 from hmc.io.recording import open_recording
 from hmc.io.results import TrackTable, read_joints
 from hmc.pose.follow import FollowOptions, follow
-from hmc.pose.methods.smd import smd_method, smd_preset
+from hmc.pose.methods.smd import SMD_PRESETS, smd_method
 from hmc.pose.objectives.color_cue import ColorSettings, color_fits, learn_colors, update_colors
 from hmc.pose.objectives.cue_rows import evaluate, gauss_newton_product, jacobian, leclerc, pose_body
 from hmc.pose.objectives.edge_cue import edge_maps, match_edges, shown_contours
@@ -33,7 +32,7 @@ from hmc.pose.objectives.surface_cue import match_surface, match_voxels, nearest
 from hmc.pose.starts.da_vinci import find_da_vinci
 from hmc.pose.starts.spectral import spectral_poses
 from hmc.pose.steps.descent.levenberg import robust_residuals
-from hmc.pose.steps.descent.tracker import evaluation, make_scene, make_tracker, track_init, track_step
+from hmc.pose.steps.descent.tracker import evaluation, make_cue_frame, make_tracker, track_init, track_step
 from hmc.pose.views.skin import Crop, Skin, crop_images
 from hmc.search.meta_descent import Evaluation, SmdSettings, converged, curvature_axes, smd_init, smd_run, smd_step
 
@@ -44,7 +43,7 @@ CAMERAS = [look_at(f"c{k}", (320, 240), at, (0, 0, 1.0), 50, (-0.15, 0.03, 0.001
 
 @pytest.fixture(scope="module")
 def tracker():
-    return make_tracker(default_body(1.78), smd_preset("default"))
+    return make_tracker(default_body(1.78), SMD_PRESETS["default"])
 
 
 def state_of(rng, spread=0.3):
@@ -394,7 +393,7 @@ def test_samples_of_some_groups_pull_as_they_do_among_all(tracker):
     """Without what stays, the gradient on the chains that still move is the same."""
     rng = np.random.default_rng(6)
     state, seen = state_of(rng, 0.2), seen_of(tracker, state_of(rng, 0.2))
-    scene = make_scene(tracker, seen, state[FREE])
+    scene = make_cue_frame(tracker, seen, state[FREE])
     drawn = scene.draw(rng, trunk=False)
     wanted = np.array([False, False, True, False, False, True])
     fewer = draw_of_groups(drawn, tracker, wanted)
@@ -475,7 +474,7 @@ def test_da_vinci_is_recognised_with_heading_and_arms(height, heading, arms):
 
     for name in ("upper_arm", "forearm", "hand"):
         dimensions[name] *= arms
-    one = make_tracker(make_body(dimensions), smd_preset("default"))
+    one = make_tracker(make_body(dimensions), SMD_PRESETS["default"])
     state = neutral_state("sideways")
     state[dof_index("r_hip_x", "l_hip_x")] = np.radians([-14, 14])
     state[3] = heading
@@ -504,11 +503,6 @@ def test_without_voxels_at_the_soles_nobody_is_da_vinci(tracker):
     assert find_da_vinci(points[points[:, 2] > 0.1], 0.02, 0.0) is None
 
 
-def test_unknown_preset():
-    with pytest.raises(InputError, match="kehl2006"):
-        smd_preset("canton2009")
-
-
 def test_chains_and_trunk_share_nothing():
     assert all((chain >= 6).all() for chain in CHAINS)
 
@@ -526,7 +520,7 @@ def test_who_does_not_stand_like_da_vinci_is_found_by_the_spectral_route(monkeyp
         return spectral_poses(*args, **kwargs)
 
     monkeypatch.setattr("hmc.pose.starts.window.spectral_poses", spy)
-    found = follow(recording, tracks, smd_method(smd_preset("default")), FollowOptions(0.04, height_m=1.76))
+    found = follow(recording, tracks, smd_method(SMD_PRESETS["default"]), FollowOptions(0.04, height_m=1.76))
     assert asked
     assert found.notes == ()
     error = np.linalg.norm(found.poses.positions - truth.positions[:3], axis=2)

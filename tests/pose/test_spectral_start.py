@@ -14,7 +14,7 @@ from hmc.pose.method import begin_tracking
 from hmc.pose.methods.annealed import annealed_pose_step
 from hmc.pose.spectral.reading import read_body
 from hmc.pose.starts.spectral import body_state, spectral_poses, strict_voxels
-from hmc.pose.steps.presets import pose_preset
+from hmc.pose.steps.presets import PRESETS
 
 
 def test_a_body_takes_up_the_landmarks_of_another():
@@ -53,7 +53,7 @@ def test_a_filter_started_in_the_middle_of_an_action_is_at_the_truth_within_ten_
     targets, truth = [acted.targets[k] for k in order], acted.landmarks[list(order)]
     body, _ = body_of(acted.height_m)
     states, _ = spectral_poses(np.random.default_rng(0), plain_subject(acted.height_m), targets[2], COST)
-    preset, errors = pose_preset("default"), []
+    preset, errors = PRESETS["default"], []
     step, tracked = annealed_pose_step(preset), begin_tracking(subject_of(acted, preset), states[0])
     for k in range(3, 13):
         tracked, _ = step(np.random.default_rng(k), tracked, view_of(targets[k]))

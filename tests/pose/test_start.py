@@ -10,7 +10,7 @@ from posed import COST, capture_of, mean_error, subject_of, true_state, view_of,
 
 from hmc.body.kinematics import landmarks
 from hmc.body.model import BodyModel
-from hmc.pose.method import Capture, Started, StepInfo, begin_tracking
+from hmc.pose.method import Capture, StartPose, StepInfo, begin_tracking
 from hmc.pose.methods.annealed import annealed_method
 from hmc.pose.starts.window import StartSettings, WindowStart, estimate_height, possible_heights, walk
 from hmc.pose.steps.limb_search import SearchSettings
@@ -27,7 +27,7 @@ QUICK, LEAST = StartSettings(anchors=2, candidates=4), StartSettings(anchors=1, 
 class Begun:
     """What came of a window: the start, the person's body, and the pose in every frame."""
 
-    started: Started
+    started: StartPose
     body: BodyModel
     states: np.ndarray
     infos: list[StepInfo]

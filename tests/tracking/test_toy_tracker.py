@@ -29,7 +29,7 @@ import numpy as np
 
 from hmc.tracking.method import TrackerMethod
 from hmc.tracking.settings import FollowingSettings
-from hmc.tracking.state import StepInfo, TrackRow
+from hmc.tracking.state import TrackerInfo, TrackRow
 from hmc.tracking.trackers import register
 
 
@@ -41,7 +41,7 @@ class ToySettings:
 
 def step(rng, state, frame, observation, settings):
     if observation is None:
-        return state, StepInfo(())
+        return state, TrackerInfo(())
     places, speeds = (state.arrays.get(name, np.zeros((0, 3))) for name in ("places", "speeds"))  # a row a person
     expected, rows = places + speeds, []
     places, speeds = expected.copy(), speeds.copy()
@@ -55,7 +55,7 @@ def step(rng, state, frame, observation, settings):
             speeds[person] += 0.5 * (centroid - expected[person])
         places[person] = centroid
         rows.append(TrackRow(frame, person, centroid, head))
-    return replace(state, arrays={"places": places, "speeds": speeds}), StepInfo(tuple(rows))
+    return replace(state, arrays={"places": places, "speeds": speeds}), TrackerInfo(tuple(rows))
 
 
 register(TrackerMethod("toy", "these tests", "nearest components", step, {"default": ToySettings(), "near": ToySettings(0.1)}))

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.image import imread
 
 from hmc.experiments.engine.page import HEADING, INTRODUCTION, verdict_counts, without_dataset
-from hmc.experiments.engine.summary import OURS, Result, Row, StoredTable
+from hmc.experiments.engine.summary import OURS, Row, StoredRun, StoredTable
 from hmc.io.files import sibling
 
 __all__ = ["write_booklet"]
@@ -134,7 +134,7 @@ def _detail(pages: _Pages, row: Row) -> None:
         _run(pages, result)
 
 
-def _run(pages: _Pages, result: Result) -> None:
+def _run(pages: _Pages, result: StoredRun) -> None:
     pages.text(result.what, 8, color="0.3", after=0.1)
     for claim in result.claims:
         word = "holds" if claim.holds else "DIFFERS"

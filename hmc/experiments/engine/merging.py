@@ -11,11 +11,11 @@ from hmc.errors import InputError
 from hmc.experiments.engine.library import EXPERIMENTS, find_experiment
 from hmc.experiments.engine.store import cell_key, read_cell, write_text
 
-__all__ = ["Merged", "merge_stores"]
+__all__ = ["MergeReport", "merge_stores"]
 
 
 @dataclass(frozen=True)
-class Merged:
+class MergeReport:
     """What became of the cells of other stores.
 
     Attributes
@@ -39,7 +39,7 @@ class Merged:
     damaged: tuple[Path, ...] = ()
 
 
-def merge_stores(out: Path, others: Sequence[Path]) -> Merged:
+def merge_stores(out: Path, others: Sequence[Path]) -> MergeReport:
     """Copy the cells of other stores that this one has not, each checked against its name.
 
     Cells of experiments that are not the package's are copied unchecked.
@@ -53,7 +53,7 @@ def merge_stores(out: Path, others: Sequence[Path]) -> Merged:
 
     Returns
     -------
-    Merged
+    MergeReport
 
     Raises
     ------
@@ -86,7 +86,7 @@ def merge_stores(out: Path, others: Sequence[Path]) -> Merged:
             same += 1
         else:
             different.append(path)
-    return Merged(copied, same, tuple(different), tuple(old), tuple(damaged))
+    return MergeReport(copied, same, tuple(different), tuple(old), tuple(damaged))
 
 
 def _pairs(out: Path, others: Iterable[Path]) -> Iterable[tuple[Path, Path]]:

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 from html import escape
 
 from hmc.experiments.engine.catalogue import Entry
-from hmc.experiments.engine.summary import DIFFERS, MISSING, NOT_RUN, REPRODUCED, SHOWN, Result, Row, StoredTable
+from hmc.experiments.engine.summary import DIFFERS, MISSING, NOT_RUN, REPRODUCED, SHOWN, Row, StoredRun, StoredTable
 
 __all__ = ["HEADING", "INTRODUCTION", "to_html", "verdict_counts", "without_dataset"]
 
@@ -112,7 +112,7 @@ def _section(row: Row) -> str:
     return "\n".join([*lines, "</section>"])
 
 
-def _run(name: str, result: Result) -> Iterable[str]:
+def _run(name: str, result: StoredRun) -> Iterable[str]:
     yield f'<p class="small">{escape(result.what)}</p>'
     if result.claims:
         yield '<ul class="claims">'

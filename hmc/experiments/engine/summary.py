@@ -15,7 +15,7 @@ from hmc.experiments.engine.library import EXPERIMENTS, find_experiment
 from hmc.experiments.engine.writing import report_folder
 from hmc.io.results import read_run
 
-__all__ = ["DIFFERS", "MISSING", "NOT_RUN", "OURS", "REPRODUCED", "SHOWN", "Result", "Row", "StoredTable", "summarise"]
+__all__ = ["DIFFERS", "MISSING", "NOT_RUN", "OURS", "REPRODUCED", "SHOWN", "Row", "StoredRun", "StoredTable", "summarise"]
 
 REPRODUCED, DIFFERS, SHOWN = "reproduced", "differs", "shown"
 NOT_RUN, MISSING = "not computed yet", "no experiment yet"
@@ -34,7 +34,7 @@ class StoredTable:
 
 
 @dataclass(frozen=True)
-class Result:
+class StoredRun:
     """What one run left.
 
     Attributes
@@ -67,13 +67,13 @@ class Row:
     entry : Entry
     verdict : str
         One of the constants of this module, of the run that counts: in full before quick.
-    results : tuple of Result
+    results : tuple of StoredRun
         The run that counts, then one on the user's recordings; either may be missing.
     """
 
     entry: Entry
     verdict: str
-    results: tuple[Result, ...] = ()
+    results: tuple[StoredRun, ...] = ()
 
     @property
     def differing(self) -> tuple[Claim, ...]:
@@ -130,7 +130,7 @@ def _row(out: Path, entry: Entry) -> Row:
     return Row(entry, verdict, tuple(results))
 
 
-def _result(folder: Path) -> Result:
+def _result(folder: Path) -> StoredRun:
     run = read_run(folder / "run.toml")
     parameters: dict[str, Any] = run.get("parameters", {})
     try:
@@ -144,7 +144,7 @@ def _result(folder: Path) -> Result:
     captions = run.get("captions", {})
     tables = (_table(path, captions.get(path.stem, "")) for path in _in_order(folder, "csv", list(captions)))
     pictures = _in_order(folder, "png", run.get("figures", []))
-    return Result(folder, what, claims, tuple(tables), tuple(pictures), run.get("versions", {}))
+    return StoredRun(folder, what, claims, tuple(tables), tuple(pictures), run.get("versions", {}))
 
 
 def _in_order(folder: Path, kind: str, names: list[str]) -> Iterator[Path]:

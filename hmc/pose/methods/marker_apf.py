@@ -13,7 +13,7 @@ from hmc.body.model import BodyModel
 from hmc.body.proportions import canton_body, default_body
 from hmc.errors import InputError
 from hmc.pose.legs import LegSettings
-from hmc.pose.method import Capture, FrameRng, PoseMethod, Started, Stepped, Tracked, begin_tracking, make_subject, other_rng
+from hmc.pose.method import Capture, FrameRng, PoseMethod, StartPose, Stepped, Tracked, begin_tracking, make_subject, other_rng
 from hmc.pose.objectives.marker_points import find_points
 from hmc.pose.steps.marker_filter import TIPS, MarkerPreset, marker_frame, on_markers, with_tips
 from hmc.pose.steps.marker_search import LEAST_POINTS, left_over, start_poses
@@ -60,7 +60,9 @@ class MarkerStart:
     preset: MarkerPreset
     skin: bool = True
 
-    def __call__(self, frame_rng: FrameRng, views: Sequence[PersonView], capture: Capture, height_m: float | None = None) -> Started | None:
+    def __call__(
+        self, frame_rng: FrameRng, views: Sequence[PersonView], capture: Capture, height_m: float | None = None
+    ) -> StartPose | None:
         """The body, the pose and the places of the markers; None where no frame has enough points that views agree on.
 
         Raises
@@ -75,7 +77,7 @@ class MarkerStart:
         anchor, tracked = begun
         if self.skin and self.preset.refine:
             tracked = self._learnt(frame_rng, seen, anchor, tracked)
-        return Started(tracked.subject, anchor, tracked.state, tracked.memory)
+        return StartPose(tracked.subject, anchor, tracked.state, tracked.memory)
 
     def _begin(self, frame_rng, seen: Sequence[SeenMarkers | None], capture: Capture, height_m: float | None) -> tuple[int, Tracked] | None:
         """The frame in which the first pose fits best, and the pose."""

@@ -11,9 +11,8 @@ import numpy as np
 from hmc.body.inverse import fit_landmarks
 from hmc.body.model import neutral_state
 from hmc.body.spin_skeleton import model_of_body, skeleton_landmarks, thesis_body
-from hmc.errors import InputError
 from hmc.pose.legs import LegSettings, TellLegs
-from hmc.pose.method import Capture, FrameRng, PoseMethod, Started
+from hmc.pose.method import Capture, FrameRng, PoseMethod, StartPose
 from hmc.pose.recovery import Recovery
 from hmc.pose.spectral.reading import BodyReading
 from hmc.pose.starts.window import WindowStart, estimate_height
@@ -24,7 +23,7 @@ from hmc.pose.steps.swarm.step import SwarmPreset, read_view, swarm_memory, swar
 from hmc.pose.steps.swarm.temporal import SwarmSettings, swarm_step
 from hmc.pose.views.person_view import PersonView
 
-__all__ = ["SWARM_PRESETS", "ReadingStart", "pso_method", "swarm_preset"]
+__all__ = ["SWARM_PRESETS", "ReadingStart", "pso_method"]
 
 #: Frames of the first window in which a start is tried.
 ANCHORS = 3
@@ -35,19 +34,6 @@ SWARM_PRESETS: dict[str, SwarmPreset] = {
     "default": SwarmPreset(),
     "hsiao2008": SwarmPreset(swarm=SwarmSettings(always_check=True, voxels=False), thesis=True),
 }
-
-
-def swarm_preset(name: str) -> SwarmPreset:
-    """A preset by its name.
-
-    Raises
-    ------
-    InputError
-        When there is no such preset.
-    """
-    if name not in SWARM_PRESETS:
-        raise InputError(f"there is no preset '{name}' of --method pso; use {' or '.join(SWARM_PRESETS)}")
-    return SWARM_PRESETS[name]
 
 
 @dataclass(frozen=True)
@@ -61,7 +47,9 @@ class ReadingStart:
 
     preset: SwarmPreset
 
-    def __call__(self, frame_rng: FrameRng, views: Sequence[PersonView], capture: Capture, height_m: float | None = None) -> Started | None:
+    def __call__(
+        self, frame_rng: FrameRng, views: Sequence[PersonView], capture: Capture, height_m: float | None = None
+    ) -> StartPose | None:
         """The thesis's body and the pose in the frame that shows most; None where no frame can be read."""
         height_m = height_m or estimate_height([view.target for view in views], capture.floor_z)
         body = thesis_body(height_m)
@@ -88,7 +76,7 @@ class ReadingStart:
         across = points[9] - points[12] + points[3] - points[6]
         start[:3], start[3] = points[0], np.arctan2(-across[0], across[1])
         state, _ = fit_landmarks(body, points, start)
-        return Started(swarm_subject(body, capture, self.preset), anchor, state, swarm_memory(best))
+        return StartPose(swarm_subject(body, capture, self.preset), anchor, state, swarm_memory(best))
 
 
 def pso_method(preset: SwarmPreset, house: PosePreset | None = None) -> PoseMethod:

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
-from hmc.errors import InputError
 from hmc.pose.legs import LegSettings, TellLegs
-from hmc.pose.method import Capture, FrameRng, PoseMethod, Start, Started, make_subject, other_rng
+from hmc.pose.method import Capture, FrameRng, PoseMethod, Start, StartPose, make_subject, other_rng
 from hmc.pose.objectives.multicue import CueSettings
 from hmc.pose.recovery import Recovery
 from hmc.pose.starts.da_vinci import find_da_vinci
@@ -17,12 +16,12 @@ from hmc.pose.starts.window import WindowStart
 from hmc.pose.steps.descent.step import descended, solid_subject, with_colors
 from hmc.pose.steps.descent.tracker import SmdPreset
 from hmc.pose.steps.polish import polished
-from hmc.pose.steps.presets import PosePreset, pose_preset
+from hmc.pose.steps.presets import PRESETS, PosePreset
 from hmc.pose.steps.proposal import as_proposed
 from hmc.pose.views.person_view import PersonView
 from hmc.search.meta_descent import SmdSettings
 
-__all__ = ["SMD_PRESETS", "DaVinciStart", "smd_method", "smd_preset"]
+__all__ = ["SMD_PRESETS", "DaVinciStart", "smd_method"]
 
 #: Of the random numbers with which a first pose settles.
 SETTLING = 1
@@ -42,19 +41,6 @@ SMD_PRESETS: dict[str, SmdPreset] = {
 }
 
 
-def smd_preset(name: str) -> SmdPreset:
-    """A preset by its name.
-
-    Raises
-    ------
-    InputError
-        When there is none of that name.
-    """
-    if name not in SMD_PRESETS:
-        raise InputError(f"--preset {name}: of the method smd there are {', '.join(SMD_PRESETS)}")
-    return SMD_PRESETS[name]
-
-
 @dataclass(frozen=True)
 class DaVinciStart:
     """The paper's start: the first frame of the window in which somebody stands as da Vinci's man does (section 6.3).
@@ -67,9 +53,11 @@ class DaVinciStart:
     """
 
     preset: SmdPreset
-    otherwise: Start = field(default_factory=lambda: WindowStart(replace(pose_preset("default"), start="spectral")))
+    otherwise: Start = field(default_factory=lambda: WindowStart(replace(PRESETS["default"], start="spectral")))
 
-    def __call__(self, frame_rng: FrameRng, views: Sequence[PersonView], capture: Capture, height_m: float | None = None) -> Started | None:
+    def __call__(
+        self, frame_rng: FrameRng, views: Sequence[PersonView], capture: Capture, height_m: float | None = None
+    ) -> StartPose | None:
         """The body and the first pose; without da Vinci's, the waist of what is found is taken into the trunk, as the body has none."""
         for k, view in enumerate(views):
             spread = None if view.skin is None else find_da_vinci(view.skin.points, capture.voxel_size_m, capture.floor_z, height_m)
@@ -78,7 +66,7 @@ class DaVinciStart:
             first = FirstPose(k, spread.body, spread.state)
             seen, targets = [one.skin for one in views], [one.target for one in views]
             tracker, settled = begin(other_rng(frame_rng(k), SETTLING), self.preset, first, seen, targets, height_m is not None)
-            return Started(make_subject(tracker.body.skeleton, capture), k, settled.state, with_colors(settled.colors))
+            return StartPose(make_subject(tracker.body.skeleton, capture), k, settled.state, with_colors(settled.colors))
         started = self.otherwise(frame_rng, views, capture, height_m)
         if started is None:
             return None

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hmc.body.solid_samples import SurfaceGrid
-from hmc.pose.objectives.cue_rows import Posed
+from hmc.pose.objectives.cue_rows import PosedBody
 from hmc.pose.objectives.surface_cue import VoxelCloud, nearest_voxels, place
 
 __all__ = ["ColorModel", "ColorSettings", "color_fits", "learn_colors", "update_colors"]
@@ -49,13 +49,13 @@ class ColorModel:
     deviation: np.ndarray
 
 
-def learn_colors(grid: SurfaceGrid, posed: Posed, cloud: VoxelCloud, colors: np.ndarray, settings: ColorSettings) -> ColorModel:
+def learn_colors(grid: SurfaceGrid, posed: PosedBody, cloud: VoxelCloud, colors: np.ndarray, settings: ColorSettings) -> ColorModel:
     """Colours of the patches of a body that is in place: of all its points, the nearest voxel's.
 
     Parameters
     ----------
     grid : SurfaceGrid
-    posed : Posed
+    posed : PosedBody
     cloud : VoxelCloud
         Its own table of colours is not used.
     colors : ndarray, shape (n, 3)
@@ -71,7 +71,7 @@ def learn_colors(grid: SurfaceGrid, posed: Posed, cloud: VoxelCloud, colors: np.
 
 
 def update_colors(
-    model: ColorModel, grid: SurfaceGrid, posed: Posed, cloud: VoxelCloud, colors: np.ndarray, settings: ColorSettings
+    model: ColorModel, grid: SurfaceGrid, posed: PosedBody, cloud: VoxelCloud, colors: np.ndarray, settings: ColorSettings
 ) -> ColorModel:
     """Move the means towards what is seen now, Eq. 16; arguments as for `learn_colors`."""
     now = learn_colors(grid, posed, cloud, colors, settings)
@@ -106,7 +106,7 @@ def color_fits(model: ColorModel, colors: np.ndarray, settings: ColorSettings) -
     return fits
 
 
-def _seen(grid: SurfaceGrid, posed: Posed, cloud: VoxelCloud, colors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _seen(grid: SurfaceGrid, posed: PosedBody, cloud: VoxelCloud, colors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The colour at every candidate of the surface, and whether it is known."""
     index, _ = nearest_voxels(replace(cloud, barred=None), place(posed, grid.points, grid.segment))
     found = colors[index]

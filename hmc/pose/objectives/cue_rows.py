@@ -16,14 +16,15 @@ from hmc.body.kinematics import dof_masks, joint_twists
 from hmc.body.solids import FREE, SolidBody
 
 __all__ = [
-    "Matches", "Posed", "evaluate", "gauss_newton_product", "jacobian", "joined", "leclerc", "leclerc_slope", "point_wrenches", "pose_body",
+    "Matches", "PosedBody", "evaluate", "gauss_newton_product", "jacobian", "joined", "leclerc", "leclerc_slope", "point_wrenches",
+    "pose_body",
 ]  # fmt: skip
 
 _MASKS = dof_masks()[:, FREE].astype(float)
 
 
 @dataclass(frozen=True)
-class Posed:
+class PosedBody:
     """A body in one pose.
 
     Parameters
@@ -76,12 +77,12 @@ def joined(matches: Sequence[Matches]) -> Matches:
     )
 
 
-def pose_body(body: SolidBody, state: np.ndarray) -> Posed:
+def pose_body(body: SolidBody, state: np.ndarray) -> PosedBody:
     """Segments and twists of a state (27,)."""
     axes, centres, rotations, positions = joint_twists(body.skeleton, state)
     twists = np.concatenate([axes, np.cross(centres, axes)], axis=1)
     twists[:3] = np.eye(6)[3:]
-    return Posed(rotations, positions, twists[FREE])
+    return PosedBody(rotations, positions, twists[FREE])
 
 
 def point_wrenches(points: np.ndarray) -> np.ndarray:
@@ -105,7 +106,7 @@ def leclerc_slope(error: np.ndarray, width: float) -> np.ndarray:
     return np.exp(-error / width) / width
 
 
-def jacobian(posed: Posed, matches: Matches) -> np.ndarray:
+def jacobian(posed: PosedBody, matches: Matches) -> np.ndarray:
     """How the residuals change with the 24 degrees of freedom, shape (n, 3, 24), matches held."""
     n = len(matches.residuals)
     out = (matches.wrenches.reshape(-1, 6) @ posed.twists.T).reshape(n, 3, -1)

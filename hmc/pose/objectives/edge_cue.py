@@ -11,7 +11,7 @@ from hmc.body.solid_samples import SampledBody
 from hmc.body.solids import GROUPS, to_world
 from hmc.camera.color_edges import ColorEdgeSettings, color_edges
 from hmc.camera.stacked import Views, project_in
-from hmc.pose.objectives.cue_rows import Matches, Posed, point_wrenches
+from hmc.pose.objectives.cue_rows import Matches, PosedBody, point_wrenches
 from hmc.pose.views.skin import Crop
 
 __all__ = ["EdgeMaps", "best_views", "edge_maps", "match_edges", "shown_contours"]
@@ -48,13 +48,13 @@ class EdgeMaps:
     shown: np.ndarray
 
 
-def shown_contours(sampled: SampledBody, posed: Posed, views: Views) -> np.ndarray:
+def shown_contours(sampled: SampledBody, posed: PosedBody, views: Views) -> np.ndarray:
     """Which contour points each camera sees.
 
     Parameters
     ----------
     sampled : SampledBody
-    posed : Posed
+    posed : PosedBody
     views : Views
 
     Returns
@@ -115,14 +115,14 @@ def edge_maps(views: Views, crops: list[Crop], shown: np.ndarray, settings: Colo
 
 
 def match_edges(
-    sampled: SampledBody, posed: Posed, maps: EdgeMaps, chosen: np.ndarray, view: np.ndarray, reach_m: float, weight: float
+    sampled: SampledBody, posed: PosedBody, maps: EdgeMaps, chosen: np.ndarray, view: np.ndarray, reach_m: float, weight: float
 ) -> Matches:
     """Match contour points with edges: both points of a circle of latitude as a pair (Eq. 12, 13), others singly (Eq. 14, 15).
 
     Parameters
     ----------
     sampled : SampledBody
-    posed : Posed
+    posed : PosedBody
     maps : EdgeMaps
     chosen : ndarray of int, shape (n,)
         Strips.

@@ -9,7 +9,7 @@ import numpy as np
 from hmc.body.solid_samples import SampledBody, draw_samples
 from hmc.camera.color_edges import ColorEdgeSettings
 from hmc.pose.objectives.color_cue import ColorSettings
-from hmc.pose.objectives.cue_rows import Matches, Posed, joined
+from hmc.pose.objectives.cue_rows import Matches, PosedBody, joined
 from hmc.pose.objectives.edge_cue import EdgeMaps, match_edges
 from hmc.pose.objectives.surface_cue import VoxelCloud, match_surface, match_voxels
 
@@ -140,13 +140,15 @@ def draw_of_groups(draw: Draw, sampled: SampledBody, wanted: np.ndarray) -> Draw
     )  # fmt: skip
 
 
-def match_cues(sampled: SampledBody, posed: Posed, cloud: VoxelCloud, maps: EdgeMaps | None, draw: Draw, settings: CueSettings) -> Matches:
+def match_cues(
+    sampled: SampledBody, posed: PosedBody, cloud: VoxelCloud, maps: EdgeMaps | None, draw: Draw, settings: CueSettings
+) -> Matches:
     """Match the drawn samples.
 
     Parameters
     ----------
     sampled : SampledBody
-    posed : Posed
+    posed : PosedBody
     cloud : VoxelCloud
     maps : EdgeMaps or None
         None: no edges.

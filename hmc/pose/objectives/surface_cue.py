@@ -9,7 +9,7 @@ import numpy as np
 
 from hmc.body.solid_samples import SurfaceGrid
 from hmc.body.solids import GROUPS, SolidBody
-from hmc.pose.objectives.cue_rows import Matches, Posed, point_wrenches
+from hmc.pose.objectives.cue_rows import Matches, PosedBody, point_wrenches
 
 __all__ = ["VoxelCloud", "match_surface", "match_voxels", "nearest_voxels", "place", "voxel_cloud"]
 
@@ -76,12 +76,12 @@ def nearest_voxels(cloud: VoxelCloud, points: np.ndarray, patches: np.ndarray | 
     return index, table[np.arange(len(points)), index] < BARRED / 2
 
 
-def place(posed: Posed, points: np.ndarray, segment: np.ndarray) -> np.ndarray:
+def place(posed: PosedBody, points: np.ndarray, segment: np.ndarray) -> np.ndarray:
     """Points of segments (n, 3) in the world."""
     return (posed.rotations[segment] @ points[..., None])[..., 0] + posed.positions[segment]
 
 
-def match_surface(body: SolidBody, grid: SurfaceGrid, chosen: np.ndarray, posed: Posed, cloud: VoxelCloud, weight: float) -> Matches:
+def match_surface(body: SolidBody, grid: SurfaceGrid, chosen: np.ndarray, posed: PosedBody, cloud: VoxelCloud, weight: float) -> Matches:
     """Match samples of the surface, Eq. 10.
 
     Parameters
@@ -90,7 +90,7 @@ def match_surface(body: SolidBody, grid: SurfaceGrid, chosen: np.ndarray, posed:
     grid : SurfaceGrid
     chosen : ndarray of int, shape (n,)
         Rows of the grid (`hmc.body.solid_samples.draw_samples`).
-    posed : Posed
+    posed : PosedBody
     cloud : VoxelCloud
     weight : float
         Of all of them together.
@@ -111,7 +111,7 @@ def match_surface(body: SolidBody, grid: SurfaceGrid, chosen: np.ndarray, posed:
 
 
 def match_voxels(
-    body: SolidBody, grid: SurfaceGrid, candidates: np.ndarray, posed: Posed, cloud: VoxelCloud, voxels: np.ndarray, weight: float
+    body: SolidBody, grid: SurfaceGrid, candidates: np.ndarray, posed: PosedBody, cloud: VoxelCloud, voxels: np.ndarray, weight: float
 ) -> Matches:
     """Match voxels with the body, the other way round: what no part of the body explains pulls the nearest part towards itself.
 

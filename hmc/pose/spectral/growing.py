@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 from scipy.spatial import cKDTree
 
-from hmc.pose.spectral.pieces import Pieces, PieceSettings, limb_pieces
+from hmc.pose.spectral.pieces import Branches, PieceSettings, limb_pieces
 
 __all__ = ["Branch", "GrowSettings", "baseline_growing", "ends_near_origin", "grow_branches"]
 
@@ -74,7 +74,7 @@ def baseline_growing() -> GrowSettings:
     return replace(GrowSettings(), stop="outliers", most_branches=6)
 
 
-def ends_near_origin(places: np.ndarray, edges: np.ndarray, core: np.ndarray, settings: GrowSettings | None = None) -> Pieces:
+def ends_near_origin(places: np.ndarray, edges: np.ndarray, core: np.ndarray, settings: GrowSettings | None = None) -> Branches:
     """Where branches end: near the origin, or where they meet. Arguments as for `grow_branches`, and:
 
     Parameters
@@ -92,14 +92,14 @@ def ends_near_origin(places: np.ndarray, edges: np.ndarray, core: np.ndarray, se
     return limb_pieces(edges, far, settings.origin_radius * trunk, settings.pieces)
 
 
-def grow_branches(places: np.ndarray, pieces: Pieces | None = None, settings: GrowSettings | None = None) -> list[Branch]:
+def grow_branches(places: np.ndarray, pieces: Branches | None = None, settings: GrowSettings | None = None) -> list[Branch]:
     """All branches of an embedding, the one with the farthest tip first.
 
     Parameters
     ----------
     places : ndarray, shape (n, k)
         Of the nodes in the eigenspace.
-    pieces : Pieces, optional
+    pieces : Branches, optional
         Where branches end (`ends_near_origin`); left out, each ends by Sundaresan's outliers.
     settings : GrowSettings, optional
 

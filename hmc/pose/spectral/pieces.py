@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["PieceSettings", "Pieces", "limb_pieces"]
+__all__ = ["Branches", "PieceSettings", "limb_pieces"]
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class PieceSettings:
 
 
 @dataclass(frozen=True)
-class Pieces:
+class Branches:
     """The branches of an embedded graph.
 
     Parameters
@@ -61,7 +61,7 @@ class Pieces:
         return int(self.labels.max(initial=-1)) + 1
 
 
-def limb_pieces(edges: np.ndarray, far: np.ndarray, nearest: float, settings: PieceSettings | None = None) -> Pieces:
+def limb_pieces(edges: np.ndarray, far: np.ndarray, nearest: float, settings: PieceSettings | None = None) -> Branches:
     """Find the branches.
 
     Parameters
@@ -151,7 +151,7 @@ def limb_pieces(edges: np.ndarray, far: np.ndarray, nearest: float, settings: Pi
         if places and pair[0] in tips and pair[1] in tips:
             touches.append((min(tips[pair[0]], tips[pair[1]]), max(tips[pair[0]], tips[pair[1]])))
             cut += places
-    return Pieces(labels, tuple(sorted(set(touches))), np.array(cut, int).reshape(-1, 2))
+    return Branches(labels, tuple(sorted(set(touches))), np.array(cut, int).reshape(-1, 2))
 
 
 class _Meeting:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from hmc.pose.spectral.segmentation import Segmentation, SegmentationSettings, segment_body
+from hmc.pose.spectral.segmentation import LimbSegmentationSettings, Segmentation, segment_body
 from hmc.pose.spectral.skeleton import SkeletonSettings, equally_spaced, extract_skeletons
 from hmc.pose.spectral.volume import BodyVolume, observe_volume
 
@@ -19,7 +19,7 @@ class ReadingSettings:
 
     Parameters
     ----------
-    segmentation : SegmentationSettings
+    segmentation : LimbSegmentationSettings
     skeleton : SkeletonSettings
     foot_share : float
         Length of a foot, over the stature, that is cut off the end of a leg's curve.
@@ -31,7 +31,7 @@ class ReadingSettings:
         Fewer curves, that of the trunk among them, are no body.
     """
 
-    segmentation: SegmentationSettings = field(default_factory=SegmentationSettings)
+    segmentation: LimbSegmentationSettings = field(default_factory=LimbSegmentationSettings)
     skeleton: SkeletonSettings = field(default_factory=SkeletonSettings)
     foot_share: float = 0.085
     longest_limb: float = 0.75

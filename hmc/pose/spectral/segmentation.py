@@ -13,14 +13,14 @@ from hmc.pose.spectral.eigenmap import eigenmap
 from hmc.pose.spectral.graph import GraphSettings, VoxelGraph, adjacency, build_graph, core_nodes
 from hmc.pose.spectral.growing import Branch, GrowSettings, baseline_growing, ends_near_origin, grow_branches
 from hmc.pose.spectral.parts import PART_NAMES, BranchShape, branch_shape, name_branches
-from hmc.pose.spectral.pieces import Pieces
+from hmc.pose.spectral.pieces import Branches
 from hmc.pose.spectral.touching import contacts, touching_parts
 
-__all__ = ["Segmentation", "SegmentationSettings", "baseline_segmentation", "segment_body"]
+__all__ = ["LimbSegmentationSettings", "Segmentation", "baseline_segmentation", "segment_body"]
 
 
 @dataclass(frozen=True)
-class SegmentationSettings:
+class LimbSegmentationSettings:
     """Parameters of the segmentation.
 
     Parameters
@@ -92,16 +92,16 @@ class Segmentation:
         return np.flatnonzero(self.labels == PART_NAMES.index(part))
 
 
-def baseline_segmentation() -> SegmentationSettings:
+def baseline_segmentation() -> LimbSegmentationSettings:
     """Sundaresan's method: plain weights, branches that end by outliers. Hsiao (2008), section 3.1.4.1."""
-    return SegmentationSettings(GraphSettings(shrink=0.0), baseline_growing())
+    return LimbSegmentationSettings(GraphSettings(shrink=0.0), baseline_growing())
 
 
 def segment_body(
     voxels: np.ndarray,
     points: np.ndarray,
     voxel_size_m: float,
-    settings: SegmentationSettings | None = None,
+    settings: LimbSegmentationSettings | None = None,
     votes: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> Segmentation:
     """Cut a person's voxels into parts.
@@ -112,7 +112,7 @@ def segment_body(
     points : ndarray, shape (n, 3)
         Their centres, world, metres.
     voxel_size_m : float
-    settings : SegmentationSettings, optional
+    settings : LimbSegmentationSettings, optional
     votes : (votes, voters), optional
         Colour votes over `face_neighbours` of the voxels (`hmc.pose.spectral.graph.color_votes`).
 
@@ -121,7 +121,7 @@ def segment_body(
     Segmentation
         Its status says why where there is none.
     """
-    settings = settings or SegmentationSettings()
+    settings = settings or LimbSegmentationSettings()
     n = len(voxels)
     if n < settings.least_voxels:
         return _nothing(n, f"{n} voxels are too few for a body")
@@ -135,8 +135,8 @@ def segment_body(
     graph = VoxelGraph(voxels[inside], number[graph.edges[kept]], graph.weights[kept])
     places = eigenmap(adjacency(graph), settings.dimensions).vectors
     core = core_nodes(graph.voxels, voxel_size_m, settings.graph.core_m)
-    limbs: Pieces | None = None
-    met: Pieces | None = None
+    limbs: Branches | None = None
+    met: Branches | None = None
     if settings.grow.stop == "origin":
         limbs = ends_near_origin(places, graph.edges, core, settings.grow)
         cut = np.concatenate([limbs.cut, *(_halves(graph.edges, limbs.labels == k, points[inside], settings) for k in range(limbs.count))])
@@ -184,7 +184,7 @@ def segment_body(
     return Segmentation(out, all_places, moved, {names[k]: shapes[k] for k in known}, edges, doubts, touching, "segmented", others)
 
 
-def _halves(edges: np.ndarray, own: np.ndarray, points: np.ndarray, settings: SegmentationSettings) -> np.ndarray:
+def _halves(edges: np.ndarray, own: np.ndarray, points: np.ndarray, settings: LimbSegmentationSettings) -> np.ndarray:
     """Where to cut a branch that is two limbs in one, pairs of neighbours: half-way between the two places where it meets the trunk."""
     none = np.zeros((0, 2), int)
     places = contacts(own.astype(int), edges, 1, 0)
@@ -222,7 +222,7 @@ def without_edges(graph: VoxelGraph, cut: np.ndarray) -> VoxelGraph:
     return VoxelGraph(graph.voxels, graph.edges[kept], graph.weights[kept])
 
 
-def bridged(graph: VoxelGraph, points: np.ndarray, voxel_size_m: float, settings: SegmentationSettings) -> VoxelGraph:
+def bridged(graph: VoxelGraph, points: np.ndarray, voxel_size_m: float, settings: LimbSegmentationSettings) -> VoxelGraph:
     """Join pieces of the hull that hardly lie apart: a silhouette that lost a wrist must not cost the hand.
 
     Parameters
@@ -231,7 +231,7 @@ def bridged(graph: VoxelGraph, points: np.ndarray, voxel_size_m: float, settings
     points : ndarray, shape (n, 3)
         Centres of the voxels, metres.
     voxel_size_m : float
-    settings : SegmentationSettings
+    settings : LimbSegmentationSettings
     """
     edges, weights = [graph.edges], [graph.weights]
     while True:

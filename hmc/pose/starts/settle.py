@@ -14,7 +14,7 @@ from hmc.pose.method import Capture, make_subject
 from hmc.pose.starts.fit_body import fit_body
 from hmc.pose.steps.descent.tracker import SmdPreset, SmdTracker, TrackState, make_tracker, track_init, track_step
 from hmc.pose.steps.polish import fine_objective
-from hmc.pose.steps.presets import pose_preset
+from hmc.pose.steps.presets import PRESETS
 from hmc.pose.views.hull_target import HullTarget
 from hmc.pose.views.skin import Skin
 
@@ -108,7 +108,7 @@ def fitted_body(
     """
     if len(states) < LEAST_FRAMES:
         return None
-    preset, subject = pose_preset("default"), make_subject(body, Capture())
+    preset, subject = PRESETS["default"], make_subject(body, Capture())
     if preset.fit_body is None:
         return None
     picks = np.unique(np.linspace(0, len(states) - 1, FIT_FRAMES).round().astype(int))

@@ -19,7 +19,7 @@ from hmc.body.kinematics import landmarks
 from hmc.body.limbs import LIMBS
 from hmc.body.model import BodyModel, neutral_state
 from hmc.body.proportions import canton_body, default_body
-from hmc.pose.method import Capture, FrameRng, PoseStep, Started, StepInfo, Subject, Tracked, begin_tracking
+from hmc.pose.method import Capture, FrameRng, PoseStep, StartPose, StepInfo, Subject, Tracked, begin_tracking
 from hmc.pose.objectives.objective import Objective, cost_at
 from hmc.pose.starts.fit_body import FitBodyInfo, fit_body
 from hmc.pose.starts.spectral import spectral_poses
@@ -141,7 +141,9 @@ class WindowStart:
     preset: PosePreset
     settings: StartSettings = field(default_factory=StartSettings)
 
-    def __call__(self, frame_rng: FrameRng, views: Sequence[PersonView], capture: Capture, height_m: float | None = None) -> Started | None:
+    def __call__(
+        self, frame_rng: FrameRng, views: Sequence[PersonView], capture: Capture, height_m: float | None = None
+    ) -> StartPose | None:
         """The body and the first pose of a person.
 
         Parameters
@@ -156,7 +158,7 @@ class WindowStart:
 
         Returns
         -------
-        Started or None
+        StartPose or None
             None where no frame of the window has a hull to start from.
         """
         # Of a fast recording, every so many frames decide, as many as of a slow one; then all are followed.
@@ -170,14 +172,14 @@ class WindowStart:
         found = self._decide(window, height_m)
         return replace(found, subject=replace(found.subject, capture=capture), anchor=found.anchor * stride)
 
-    def _decide(self, window: _Window, height_m: float | None) -> Started:
+    def _decide(self, window: _Window, height_m: float | None) -> StartPose:
         """The subject with the person's body, a frame and the pose in it, the candidates' costs and the fit."""
         preset, capture = self.preset, window.capture
         heights = (height_m,) if height_m else possible_heights([view.target for view in window.views], capture.floor_z)
         bodies = [canton_body(height) if preset.body == "canton" else default_body(height) for height in heights]
         subjects = [annealed_subject(body, capture, preset) for body in bodies]
         if preset.start == "neutral":
-            started = Started(subjects[0], window.usable[0], _neutral_start(bodies[0], window))
+            started = StartPose(subjects[0], window.usable[0], _neutral_start(bodies[0], window))
         else:
             starts = [_best_hypothesis(one, window, preset, self.settings) for one in subjects]
             child = int(len(starts) > 1 and starts[1].costs[0] < CHILD_GAIN * starts[0].costs[0])
@@ -285,7 +287,7 @@ def candidates(rng: np.random.Generator, subject: Subject, target: HullTarget, p
     return find(rng, subject, target, preset.symmetric, subject.capture.floor_z)
 
 
-def _best_hypothesis(subject: Subject, window: _Window, preset: PosePreset, settings: StartSettings) -> Started:
+def _best_hypothesis(subject: Subject, window: _Window, preset: PosePreset, settings: StartSettings) -> StartPose:
     """The frame and pose to start from, and the mean costs of all that were followed."""
     usable, velocities, body = window.usable, window.velocities, subject.body
     anchors = sorted({usable[round(q * (len(usable) - 1))] for q in np.linspace(0.1, 0.9, settings.anchors)})
@@ -312,7 +314,7 @@ def _best_hypothesis(subject: Subject, window: _Window, preset: PosePreset, sett
         chosen = [search_all(window.frame_rng(anchor), objective, state, preset.polish)[0] for state in chosen]
     scores = _followed_costs(subject, window, preset, settings, anchor, chosen)
     order = np.argsort(scores)
-    return Started(subject, anchor, chosen[order[0]], costs=np.array(scores)[order])
+    return StartPose(subject, anchor, chosen[order[0]], costs=np.array(scores)[order])
 
 
 def _followed_costs(subject, window, preset, settings, anchor, chosen) -> list[float]:

@@ -9,7 +9,6 @@ import numpy as np
 
 from hmc.body.marker_places import place_tips
 from hmc.body.model import BodyModel
-from hmc.errors import InputError
 from hmc.pose.method import Alternatives, PoseStep, StepInfo, Tracked, particles_of, unseen, with_particles
 from hmc.pose.objectives.epipolar import MarkerLikelihood, marker_cost
 from hmc.pose.steps.marker_limbs import explain_all, refine_to_points
@@ -18,7 +17,7 @@ from hmc.pose.views.markers import SeenMarkers
 from hmc.pose.views.person_view import PersonView
 from hmc.search.filters import AnnealedInfo, AnnealedSettings, annealed_step, particle_init
 
-__all__ = ["MARKER_PRESETS", "TIPS", "MarkerInfo", "MarkerPreset", "marker_frame", "marker_preset", "on_markers", "with_tips"]
+__all__ = ["MARKER_PRESETS", "TIPS", "MarkerInfo", "MarkerPreset", "marker_frame", "on_markers", "with_tips"]
 
 #: With fewer markers than this seen from two sides a frame has no pose.
 LEAST_MARKERS = 5
@@ -74,19 +73,6 @@ MARKER_PRESETS: dict[str, MarkerPreset] = {
         search=True,
     ),
 }
-
-
-def marker_preset(name: str) -> MarkerPreset:
-    """A preset by its name.
-
-    Raises
-    ------
-    InputError
-        When there is none of that name.
-    """
-    if name not in MARKER_PRESETS:
-        raise InputError(f"no preset of markers named {name!r}; there are {', '.join(sorted(MARKER_PRESETS))}")
-    return MARKER_PRESETS[name]
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from hmc.pose.steps.refine import RefineSettings
 from hmc.search.filters import AnnealedSettings
 from hmc.search.structural import StructuralSettings
 
-__all__ = ["PRESETS", "PosePreset", "drift", "pose_preset"]
+__all__ = ["PRESETS", "PosePreset", "drift"]
 
 # Half of the largest variation expected in a thirtieth of a second: metres for the translations, radians for the angles.
 _DRIFT = {
@@ -149,16 +149,3 @@ PRESETS: dict[str, PosePreset] = {
         structural=StructuralSettings(gamma=11.0, layers=2, inner=0.6, survival_rate=0.3, by_limb=True),
     ),
 }
-
-
-def pose_preset(name: str) -> PosePreset:
-    """A preset by its name.
-
-    Raises
-    ------
-    InputError
-        When there is none of that name.
-    """
-    if name not in PRESETS:
-        raise InputError(f"no preset named {name!r}; there are {', '.join(sorted(PRESETS))}")
-    return PRESETS[name]

@@ -14,7 +14,7 @@ from hmc.body.model import BodyModel
 from hmc.body.solid_samples import SampledBody, surface_grid
 from hmc.body.solids import CHAINS, FREE, GROUPS, solid_body
 from hmc.pose.objectives.color_cue import ColorModel, color_fits, learn_colors, update_colors
-from hmc.pose.objectives.cue_rows import Matches, Posed, evaluate, gauss_newton_product, jacobian, pose_body
+from hmc.pose.objectives.cue_rows import Matches, PosedBody, evaluate, gauss_newton_product, jacobian, pose_body
 from hmc.pose.objectives.edge_cue import EdgeMaps, best_views, edge_maps, shown_contours
 from hmc.pose.objectives.multicue import CueSettings, Draw, draw_cues, draw_of_groups, match_cues
 from hmc.pose.objectives.surface_cue import VoxelCloud, place, voxel_cloud
@@ -24,7 +24,7 @@ from hmc.pose.views.skin import Skin
 from hmc.search.meta_descent import Evaluation, SmdSettings, smd_run
 
 __all__ = [
-    "Scene", "SmdPreset", "SmdTracker", "TrackInfo", "TrackState", "evaluation", "make_scene", "make_tracker", "optimise",
+    "CueFrame", "SmdPreset", "SmdTracker", "TrackInfo", "TrackState", "evaluation", "make_cue_frame", "make_tracker", "optimise",
     "track_init", "track_step",
 ]  # fmt: skip
 
@@ -147,40 +147,40 @@ def track_step(rng: np.random.Generator, tracker: SmdTracker, before: TrackState
     preset, limits = tracker.preset, tracker.body.skeleton.limits
     low, high = limits.low[FREE], limits.high[FREE]
     start = np.clip((before.state + preset.predict * before.velocity)[FREE], low, high)
-    scene = make_scene(tracker, observed, start, before.colors, before.state)
-    parameters, first, _ = optimise(rng, scene, start, [np.arange(len(FREE))])
-    parameters, second, value = optimise(rng, scene, parameters, CHAINS, preset.refine_share)
-    parameters = _rescued(rng, scene, parameters)
+    frame = make_cue_frame(tracker, observed, start, before.colors, before.state)
+    parameters, first, _ = optimise(rng, frame, start, [np.arange(len(FREE))])
+    parameters, second, value = optimise(rng, frame, parameters, CHAINS, preset.refine_share)
+    parameters = _rescued(rng, frame, parameters)
     state = before.state.copy()
     state[FREE] = parameters
-    info = TrackInfo("fitted", value, np.concatenate([first, second]), scene.chosen)
-    return TrackState(state, state - before.state, _new_colors(scene, observed, parameters, before.colors)), info
+    info = TrackInfo("fitted", value, np.concatenate([first, second]), frame.chosen)
+    return TrackState(state, state - before.state, _new_colors(frame, observed, parameters, before.colors)), info
 
 
-def _rescued(rng: np.random.Generator, scene: Scene, parameters: np.ndarray) -> np.ndarray:
+def _rescued(rng: np.random.Generator, frame: CueFrame, parameters: np.ndarray) -> np.ndarray:
     """The parameters with a lost limb where it explains more."""
-    tracker, settings = scene.tracker, scene.tracker.preset.rescue
+    tracker, settings = frame.tracker, frame.tracker.preset.rescue
     if settings is None:
         return parameters
 
     def lost_at(at: np.ndarray) -> np.ndarray:
         grid = tracker.grid
-        points = place(_posed(tracker, at, scene.base), grid.points[::3], grid.segment[::3])
-        return unexplained(points, scene.cloud, settings.far_m)
+        points = place(_posed(tracker, at, frame.base), grid.points[::3], grid.segment[::3])
+        return unexplained(points, frame.cloud, settings.far_m)
 
     lost = lost_at(parameters)
-    if len(lost) < settings.share * len(scene.cloud.points):
+    if len(lost) < settings.share * len(frame.cloud.points):
         return parameters
-    found = propose_limb(rng, tracker.body, tracker.grid, scene.cloud, parameters, lost, settings)
+    found = propose_limb(rng, tracker.body, tracker.grid, frame.cloud, parameters, lost, settings)
     if found is None:
         return parameters
     chain, trial = found
-    trial, _, _ = optimise(rng, scene, trial, [CHAINS[chain]], tracker.preset.refine_share)
+    trial, _, _ = optimise(rng, frame, trial, [CHAINS[chain]], tracker.preset.refine_share)
     return trial if len(lost_at(trial)) <= settings.gain * len(lost) else parameters
 
 
 @dataclass(frozen=True)
-class Scene:
+class CueFrame:
     """A tracker and a frame made ready.
 
     Parameters
@@ -215,9 +215,9 @@ class Scene:
         return matches, jacobian(posed, matches)
 
 
-def make_scene(
+def make_cue_frame(
     tracker: SmdTracker, observed: Skin, parameters: np.ndarray, colors: ColorModel | None = None, base: np.ndarray | None = None
-) -> Scene:
+) -> CueFrame:
     """Sort out the voxels' colours, choose the views and find their edges.
 
     Parameters
@@ -237,22 +237,22 @@ def make_scene(
     cloud = voxel_cloud(observed.points, fits)
     usable = np.array([crop is not None for crop in observed.crops], bool)
     if cues.edge_weight == 0 or observed.views is None or not usable.any():
-        return Scene(tracker, cloud, None, np.zeros(0, int), base)
+        return CueFrame(tracker, cloud, None, np.zeros(0, int), base)
     shown = shown_contours(tracker, _posed(tracker, parameters, base), observed.views)
     chosen = best_views(shown, usable, cues.views)
     crops = [crop for k in chosen if (crop := observed.crops[k]) is not None]
-    return Scene(tracker, cloud, edge_maps(observed.views.select(chosen), crops, shown[chosen], cues.edges), chosen, base)
+    return CueFrame(tracker, cloud, edge_maps(observed.views.select(chosen), crops, shown[chosen], cues.edges), chosen, base)
 
 
 def optimise(
-    rng: np.random.Generator, scene: Scene, parameters: np.ndarray, groups: Sequence[np.ndarray], tolerance_share: float = 1.0
+    rng: np.random.Generator, frame: CueFrame, parameters: np.ndarray, groups: Sequence[np.ndarray], tolerance_share: float = 1.0
 ) -> tuple[np.ndarray, np.ndarray, float]:
     """Descend in some groups of parameters with the preset's optimiser.
 
     Parameters
     ----------
     rng : numpy.random.Generator
-    scene : Scene
+    frame : CueFrame
     parameters : ndarray, shape (24,)
     groups : sequence of ndarray of int
         All parameters, or the chains.
@@ -266,16 +266,16 @@ def optimise(
     value : float
         Of the objective at the last iteration's parameters and samples.
     """
-    preset, limits = scene.tracker.preset, scene.tracker.body.skeleton.limits
+    preset, limits = frame.tracker.preset, frame.tracker.body.skeleton.limits
     low, high = limits.low[FREE], limits.high[FREE]
     trunk = any((group < 6).any() for group in groups)  # the chains leave it where it is
     moved = np.array([_moved_groups(group) for group in groups])
-    first = scene.draw(rng, trunk)
+    first = frame.draw(rng, trunk)
 
     def matched(at: np.ndarray, going: np.ndarray, drawn: Draw) -> tuple[Matches, np.ndarray]:
         """What has come to rest needs no samples."""
         still = moved[going].any(axis=0)
-        return scene.match(at, drawn if still.all() else draw_of_groups(drawn, scene.tracker, still))
+        return frame.match(at, drawn if still.all() else draw_of_groups(drawn, frame.tracker, still))
 
     if preset.optimiser == "lm":
         alone = np.eye(len(groups), dtype=bool)
@@ -283,7 +283,7 @@ def optimise(
         return lm_run(by_group, parameters, low, high, groups, preset.cues.width, preset.levenberg)
 
     def objective(at: np.ndarray, going: np.ndarray) -> Evaluation:
-        return evaluation(*matched(at, going, scene.draw(rng, trunk) if preset.optimiser == "smd" else first), preset.cues.width)
+        return evaluation(*matched(at, going, frame.draw(rng, trunk) if preset.optimiser == "smd" else first), preset.cues.width)
 
     tolerance = tolerance_share * np.where(FREE < 3, preset.tolerance_m, np.radians(preset.tolerance_deg))
     found, info = smd_run(objective, parameters, (low, high), tolerance, preset.descent, groups, _UNITS)
@@ -308,18 +308,18 @@ def evaluation(matches: Matches, rows: np.ndarray, width: float) -> Evaluation:
     return Evaluation(value, gradient, lambda vector: gauss_newton_product(rows, slopes, vector), curvature)
 
 
-def _new_colors(scene: Scene, observed: Skin, parameters: np.ndarray, colors: ColorModel | None) -> ColorModel | None:
+def _new_colors(frame: CueFrame, observed: Skin, parameters: np.ndarray, colors: ColorModel | None) -> ColorModel | None:
     """Colours of the patches after a frame."""
-    settings, tracker = scene.tracker.preset.cues.colors, scene.tracker
+    settings, tracker = frame.tracker.preset.cues.colors, frame.tracker
     if settings is None or observed.colors is None:
         return colors
-    posed = _posed(tracker, parameters, scene.base)
+    posed = _posed(tracker, parameters, frame.base)
     if colors is None:
-        return learn_colors(tracker.grid, posed, scene.cloud, observed.colors, settings)
-    return update_colors(colors, tracker.grid, posed, scene.cloud, observed.colors, settings)
+        return learn_colors(tracker.grid, posed, frame.cloud, observed.colors, settings)
+    return update_colors(colors, tracker.grid, posed, frame.cloud, observed.colors, settings)
 
 
-def _posed(tracker: SmdTracker, parameters: np.ndarray, base: np.ndarray) -> Posed:
+def _posed(tracker: SmdTracker, parameters: np.ndarray, base: np.ndarray) -> PosedBody:
     state = base.copy()
     state[FREE] = parameters
     return pose_body(tracker.body, state)

@@ -16,8 +16,18 @@ from hmc.pose.objectives.volume import volume_error
 from hmc.search.swarm import PsoSettings, pso_run
 
 __all__ = [
-    "PARTS", "FitSettings", "Fitted", "Prior", "bounds_around", "fine_tune", "fit_around", "fit_cost", "fit_flat", "fit_hierarchical",
-    "rest_state", "torso_moves",
+    "PARTS",
+    "FitSettings",
+    "Prior",
+    "SkeletonFit",
+    "bounds_around",
+    "fine_tune",
+    "fit_around",
+    "fit_cost",
+    "fit_flat",
+    "fit_hierarchical",
+    "rest_state",
+    "torso_moves",
 ]  # fmt: skip
 
 #: Lowest and highest value of every parameter, shape (23,) each.
@@ -94,7 +104,7 @@ class FitSettings:
 
 
 @dataclass(frozen=True)
-class Fitted:
+class SkeletonFit:
     """A fitted frame.
 
     Parameters
@@ -171,7 +181,7 @@ def fit_hierarchical(
     settings: FitSettings | None = None,
     spin_range: float = np.pi,
     weight: float = 0.004,
-) -> Fitted:
+) -> SkeletonFit:
     """Fit a frame of which nothing is known but the rough place: stage by stage, each with more parameters, then fine tuning.
 
     Parameters
@@ -189,7 +199,7 @@ def fit_hierarchical(
 
     Returns
     -------
-    Fitted
+    SkeletonFit
     """
     settings = settings or FitSettings()
     state, evaluations = start.copy(), 0
@@ -220,7 +230,7 @@ def fit_around(
     box: Box,
     swarm: PsoSettings,
     prior: Prior | None = None,
-) -> Fitted:
+) -> SkeletonFit:
     """All parameters within a box, from several starts: temporal PSO (section 3.2.2.5).
 
     Parameters
@@ -257,7 +267,7 @@ def fit_flat(
     start: np.ndarray,
     swarm: PsoSettings,
     spin_range: float = np.pi,
-) -> Fitted:
+) -> SkeletonFit:
     """All 23 parameters at once, for comparison; arguments as for `fit_hierarchical`."""
     low, high = bounds_around(model, start, 0.25, 4 * np.pi)
     low[6], high[6] = start[6] - spin_range, start[6] + spin_range
@@ -272,7 +282,7 @@ def fine_tune(
     state: np.ndarray,
     settings: FitSettings,
     prior: Prior | None = None,
-) -> Fitted:
+) -> SkeletonFit:
     """Section 3.2.2.4: torso, head, arms and legs one after the other, near where they are."""
     evaluations, goal = 0, _Goal(model, observed, prior)
     swarm = replace(settings.swarm, particles=settings.tune_particles, iterations=settings.tune_iterations)
@@ -356,7 +366,7 @@ def torso_moves(model: SkeletonModel, state: np.ndarray) -> np.ndarray:
     return np.concatenate([np.eye(7), give.T], axis=1)
 
 
-def _fitted(model: SkeletonModel, observed: SampledCurves, state: np.ndarray, evaluations: int) -> Fitted:
+def _fitted(model: SkeletonModel, observed: SampledCurves, state: np.ndarray, evaluations: int) -> SkeletonFit:
     errors, choice = skeleton_error(model, state[None], observed)
     cost = float(fit_cost(model, state[None], observed)[0])
-    return Fitted(state, float(errors[0]), cost, observed.parts_of(int(choice[0])), evaluations)
+    return SkeletonFit(state, float(errors[0]), cost, observed.parts_of(int(choice[0])), evaluations)

@@ -14,8 +14,8 @@ from hmc.pose.objectives.curves import curves_near, curves_of, observe_curves
 from hmc.pose.spectral.reading import BodyReading
 from hmc.pose.steps.swarm.fit import (
     FitSettings,
-    Fitted,
     Prior,
+    SkeletonFit,
     bounds_around,
     fine_tune,
     fit_around,
@@ -150,7 +150,7 @@ def start_fits(
     heading: np.ndarray | None,
     settings: SwarmSettings,
     last: np.ndarray | None = None,
-) -> list[Fitted]:
+) -> list[SkeletonFit]:
     """Poses from one frame alone, the likeliest first: either way round, weighed by the heading and the last pose where there are any.
 
     Parameters
@@ -267,7 +267,7 @@ def swarm_step(
 
 def fit_near(
     rng: np.random.Generator, model: SkeletonModel, state: SwarmState, reading: BodyReading, fps: float, settings: SwarmSettings
-) -> Fitted:
+) -> SkeletonFit:
     """The pose near the last one that explains a frame best: a swarm within the temporal constraint, then every part tuned.
 
     Parameters
@@ -303,5 +303,5 @@ def missed(state: SwarmState | None) -> SwarmState | None:
     return None if state is None else replace(state, velocity=np.zeros_like(state.velocity), missed=state.missed + 1)
 
 
-def _info(found: Fitted, started: bool, turned: bool, spent: int, doubts: tuple[str, ...]) -> SwarmInfo:
+def _info(found: SkeletonFit, started: bool, turned: bool, spent: int, doubts: tuple[str, ...]) -> SwarmInfo:
     return SwarmInfo("fitted", found.error_m, started, turned, found.evaluations + spent, doubts, found.cost_m)
