@@ -46,8 +46,8 @@ def make_images(rig, n_people: int, rng) -> tuple[list, list]:
         images = []
         for camera, wall in zip(rig, walls, strict=True):
             image = wall.copy()
-            for start, colour in zip(starts + np.array([0.01 * t, 0]), clothes, strict=True):
-                image[silhouette(camera, people([start]))] = colour
+            for start, color in zip(starts + np.array([0.01 * t, 0]), clothes, strict=True):
+                image[silhouette(camera, people([start]))] = color
             images.append(noisy(image))
         frames.append(images)
     return empty, frames

@@ -41,7 +41,7 @@ def pose(second: float) -> np.ndarray:
 
 
 def observed(tracker, rig, grid, tables, second: float):
-    """Hull, colours and images of the body at one time."""
+    """Hull, colors and images of the body at one time."""
     points = place(pose_body(tracker.body, pose(second)), tracker.grid.points, tracker.grid.segment)
     masks, images = [], []
     for camera in rig:

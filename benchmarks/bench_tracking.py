@@ -45,7 +45,7 @@ def scene(voxel_size_m: float) -> Observation:
 
 
 def colored(observation: Observation, around: Surroundings, rng: np.random.Generator) -> Surroundings:
-    """The surroundings with made-up colours on the outer voxels: colouring is part of the input (Canton 2009, Eq. 4.30)."""
+    """The surroundings with made-up colors on the outer voxels: coloring is part of the input (Canton 2009, Eq. 4.30)."""
     occupied = np.zeros(np.array(observation.grid.shape) + 2, bool)
     inner = observation.indices + 1
     occupied[tuple(inner.T)] = True
@@ -54,7 +54,7 @@ def colored(observation: Observation, around: Surroundings, rng: np.random.Gener
 
 
 def sparse_sampling(rng: np.random.Generator) -> list[bool]:
-    """Row 10: a whole frame of Sparse Sampling, 1,000 coloured samples a person, at 4 cm."""
+    """Row 10: a whole frame of Sparse Sampling, 1,000 colored samples a person, at 4 cm."""
     observation, settings = scene(0.04), SparseSettings()
     predicted = np.column_stack([PLACES, np.full(3, 0.95)])
     tracks = tuple(Track(k, place, place, np.zeros(3), 0.08, 0, 0) for k, place in enumerate(predicted))
@@ -67,7 +67,7 @@ def sparse_sampling(rng: np.random.Generator) -> list[bool]:
     still = np.zeros((3, 3))
     samples, person = propagate(rng, state.memories, still, observation, around, settings)
 
-    # The bare gather: occupancy and colour of every voxel in every sample's neighbourhood, from volumes of the whole room.
+    # The bare gather: occupancy and color of every voxel in every sample's neighbourhood, from volumes of the whole room.
     grid = observation.grid
     shape = np.array(grid.shape) + 4
     volumes = [np.zeros(int(shape.prod()), np.int32) for _ in range(2)]
@@ -161,7 +161,7 @@ def whole_chain(rng: np.random.Generator) -> list[bool]:
             strict, tolerant, _ = timed("carving", hulls, whole, doubtful)
             observation = timed("components", observe, grid, tolerant, strict, FrameViews(rig, whole, tuple(images)))
             state, info = timed("life cycle", tracker.step, rng, state, frame, observation)
-            for stage, seconds in (("colour", info.color_s), ("filter", info.filter_s)):
+            for stage, seconds in (("color", info.color_s), ("filter", info.filter_s)):
                 spent[stage] += seconds
                 spent["life cycle"] -= seconds
             names |= {track.person for track in state.tracks}

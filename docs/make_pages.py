@@ -33,9 +33,9 @@ pre.output { background: none; border-left: 3px solid #d4dae4; border-radius: 0;
 
 def page(title: str, body: str) -> str:
     """A page around a body of HTML."""
-    colours = HtmlFormatter(style="friendly").get_style_defs(".highlight")
+    colors = HtmlFormatter(style="friendly").get_style_defs(".highlight")
     head = f'<meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1"><title>{html.escape(title)}</title>'
-    return f'<!DOCTYPE html>\n<html lang="en"><head>{head}\n<style>{STYLE}{colours}</style></head>\n<body>\n{body}\n</body></html>\n'
+    return f'<!DOCTYPE html>\n<html lang="en"><head>{head}\n<style>{STYLE}{colors}</style></head>\n<body>\n{body}\n</body></html>\n'
 
 
 def prose(text: str) -> str:

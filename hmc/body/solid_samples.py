@@ -14,7 +14,7 @@ from hmc.body.superellipsoids import inside_outside, points_at
 
 __all__ = ["BANDS", "SECTORS", "SampledBody", "SurfaceGrid", "draw_samples", "surface_grid"]
 
-#: A patch, which has one colour, is one of so many bands of a solid by so many sectors around it.
+#: A patch, which has one color, is one of so many bands of a solid by so many sectors around it.
 BANDS, SECTORS = 3, 4
 #: Cells of the lattice by which areas are measured.
 _ETAS, _OMEGAS = 48, 48

@@ -40,7 +40,7 @@ def stable_background(images: Sequence[np.ndarray], share: float = 0.25) -> tupl
     background : ndarray of uint8, shape (height, width, 3)
     unseen : ndarray of bool, shape (height, width)
         Where the images do not agree closely enough, so that somebody may have been there all the time; small gaps are closed. Somebody
-        of one even colour who never moves is taken for background.
+        of one even color who never moves is taken for background.
 
     Raises
     ------

@@ -1,7 +1,7 @@
-"""Edges of colour images: where colours differ, not where brightness does. Kehl (2006), section 4.2.
+"""Edges of color images: where colors differ, not where brightness does. Kehl (2006), section 4.2.
 
-The distance of two colours is Euclidean where they are dark and the sine of the angle between them where both are bright (Wesolkowski and
-Jernigan 1999); so shadows and folds, which change brightness and hardly the direction of a colour, leave little. The gradient is that of
+The distance of two colors is Euclidean where they are dark and the sine of the angle between them where both are bright (Wesolkowski and
+Jernigan 1999); so shadows and folds, which change brightness and hardly the direction of a color, leave little. The gradient is that of
 the difference-vector operator (Trahanias and Venetsanopoulos 1993; Yang 1995): the largest of the distances across a pixel, between the
 four pairs of its neighbours that lie opposite.
 """
@@ -30,7 +30,7 @@ class ColorEdgeSettings:
     Parameters
     ----------
     bright : float
-        Intensity (mean of the channels, 0 to 255) at which a colour counts half as bright.
+        Intensity (mean of the channels, 0 to 255) at which a color counts half as bright.
     slope : float
         How sharply, in one over grey levels.
     sigma_px : float
@@ -62,7 +62,7 @@ class ColorEdges:
 
 
 def color_distance(first: np.ndarray, second: np.ndarray, settings: ColorEdgeSettings | None = None) -> np.ndarray:
-    """How far colours are from one another.
+    """How far colors are from one another.
 
     Parameters
     ----------
@@ -157,7 +157,7 @@ def color_edges(image: np.ndarray, settings: ColorEdgeSettings | None = None) ->
 
 
 def _brightness(intensity: np.ndarray, settings: ColorEdgeSettings) -> np.ndarray:
-    """Square root of how bright a colour counts, 0 to 1, so that the product of two says how bright both are."""
+    """Square root of how bright a color counts, 0 to 1, so that the product of two says how bright both are."""
     return 1 / np.sqrt(1 + np.exp(np.float32(settings.slope) * (np.float32(settings.bright) - intensity)))
 
 

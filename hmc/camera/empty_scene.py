@@ -5,7 +5,7 @@ scene is, in turns:
 
 - the scene as it is known so far: what differs from it may be a person, and so may what is where nothing is known;
 - the other cameras: only what lies in a visual hull of all views can be a person, not a mirror image, a shadow or somebody far away;
-- colour: a graph cut between the colours of this camera's people and those of its surroundings (`hmc.camera.people_cut`).
+- color: a graph cut between the colors of this camera's people and those of its surroundings (`hmc.camera.people_cut`).
 
 The scene is the median of what is left. A place that is hardly ever left free is not filled in but told: `unseen`.
 """
@@ -106,7 +106,7 @@ def _of(frames: Sequence[Masks], camera: int) -> list[np.ndarray]:
 
 
 def _find_people(small, known, views: Views, run, n_round: int) -> tuple[list[list[np.ndarray]], list[PeopleColors | None]]:
-    """Where people are in each camera's samples, as the scene known so far, the other cameras and the colours tell; their colours."""
+    """Where people are in each camera's samples, as the scene known so far, the other cameras and the colors tell; their colors."""
     masks = [[None if image is None else _differs(image, *known[c]) for c, image in enumerate(frame)] for frame in small]
     agreed = list(run(views, masks))
     cases: list[list[View]] = [[] for _ in known]
@@ -114,7 +114,7 @@ def _find_people(small, known, views: Views, run, n_round: int) -> tuple[list[li
         for c, (image, differ) in enumerate(zip(images, differs, strict=True)):
             if image is not None and differ is not None:
                 unseen = known[c][1]
-                # At first, what changes all the time is people; later, where the scene is not known, colours decide.
+                # At first, what changes all the time is people; later, where the scene is not known, colors decide.
                 differ = differ if n_round == 0 else differ & ~unseen
                 cases[c].append(View(image, differ, surely[c], possibly[c], unseen))
     colors = list(run(learn_colors, cases))

@@ -1,8 +1,8 @@
 """Which pixels look like the people of a recording and not like what surrounds them there.
 
-A person's colour is rarely unique in a whole image: skin before a beige wall, black trousers before a black door. But a limb that stands
-before a mat differs from the mat, and has the colours that the same people show elsewhere. So a pixel's colour is compared with all the
-people's colours on the one hand, and on the other with those of the pixels on rings around it that are wider than a limb: a ratio of
+A person's color is rarely unique in a whole image: skin before a beige wall, black trousers before a black door. But a limb that stands
+before a mat differs from the mat, and has the colors that the same people show elsewhere. So a pixel's color is compared with all the
+people's colors on the one hand, and on the other with those of the pixels on rings around it that are wider than a limb: a ratio of
 kernel density estimates (Elgammal et al. (2000), "Non-parametric model for background subtraction", take the same over time).
 """
 
@@ -17,20 +17,20 @@ from sklearn.cluster import KMeans
 
 __all__ = ["Palette", "learn_palette", "looks_like_people"]
 
-#: Spread of the kernels, grey levels, and the density that any colour has.
+#: Spread of the kernels, grey levels, and the density that any color has.
 SPREAD = 12.0
 ANY_COLOR = 1e-3
 #: Radii of the rings on which the surroundings are looked at, pixels of an image whose longer side is 320, and points on each.
 RINGS_PX = (12, 18, 26)
 RING_POINTS = 8
-#: People's colours: so many cluster centres, of at most so many pixels.
+#: People's colors: so many cluster centres, of at most so many pixels.
 COLORS = 16
 MOST_PIXELS = 5000
 
 
 @dataclass(frozen=True)
 class Palette:
-    """People's colours.
+    """People's colors.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class Palette:
 
 
 def learn_palette(pixels: Sequence[np.ndarray]) -> Palette | None:
-    """People's colours.
+    """People's colors.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def learn_palette(pixels: Sequence[np.ndarray]) -> Palette | None:
 
 
 def looks_like_people(image: np.ndarray, people: np.ndarray, palette: Palette, log_ratio: float = 1.0) -> np.ndarray:
-    """Where a pixel has the colour of people rather than that of its surroundings.
+    """Where a pixel has the color of people rather than that of its surroundings.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def looks_like_people(image: np.ndarray, people: np.ndarray, palette: Palette, l
 
 
 def _surroundings(picture: np.ndarray, free: np.ndarray) -> np.ndarray:
-    """Density of each pixel's colour among the pixels on rings around it that are free of people."""
+    """Density of each pixel's color among the pixels on rings around it that are free of people."""
     height, width = free.shape
     density, weight = np.zeros_like(free), np.zeros_like(free)
     reach = max(height, width) / 320
@@ -104,5 +104,5 @@ def _surroundings(picture: np.ndarray, free: np.ndarray) -> np.ndarray:
 
 
 def _kernel(difference: np.ndarray) -> np.ndarray:
-    """Gaussian of a difference of colours, 1 at none."""
+    """Gaussian of a difference of colors, 1 at none."""
     return cv2.exp(cv2.transform(cv2.multiply(difference, difference), np.full((1, 3), -0.5 / SPREAD**2)))

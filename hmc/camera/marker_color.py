@@ -1,4 +1,4 @@
-"""A detector of coloured markers: blobs whose colour is that of labelled points (Canton 2009, section 6.6.2)."""
+"""A detector of colored markers: blobs whose color is that of labelled points (Canton 2009, section 6.6.2)."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ import numpy as np
 
 from hmc.errors import InputError
 
-__all__ = ["ColourSettings", "MarkerColour", "detect_markers", "learn_marker_colour"]
+__all__ = ["MarkerColor", "MarkerColorSettings", "detect_markers", "learn_marker_color"]
 
 
 @dataclass(frozen=True)
-class ColourSettings:
+class MarkerColorSettings:
     """Settings of the detector.
 
     Parameters
     ----------
     threshold : float
-        Largest Mahalanobis distance of a marker's colour.
+        Largest Mahalanobis distance of a marker's color.
     radius_px : int
-        Half-width of the neighbourhood of a labelled point of which the colour is learnt.
+        Half-width of the neighbourhood of a labelled point of which the color is learnt.
     least_px : int
         Smallest blob, pixels.
     most : int
@@ -51,8 +51,8 @@ class ColourSettings:
 
 
 @dataclass(frozen=True)
-class MarkerColour:
-    """The colour of markers: a Gaussian over Cr and Cb.
+class MarkerColor:
+    """The color of markers: a Gaussian over Cr and Cb.
 
     Parameters
     ----------
@@ -65,36 +65,36 @@ class MarkerColour:
     inverse: np.ndarray
 
 
-def learn_marker_colour(samples: Iterable[tuple[np.ndarray, np.ndarray]], settings: ColourSettings | None = None) -> MarkerColour:
-    """Learn the markers' colour from labelled points.
+def learn_marker_color(samples: Iterable[tuple[np.ndarray, np.ndarray]], settings: MarkerColorSettings | None = None) -> MarkerColor:
+    """Learn the markers' color from labelled points.
 
-    Of the pixels around each point those count that are about as colourful as the most colourful of them, so that a point beside the
+    Of the pixels around each point those count that are about as colorful as the most colorful of them, so that a point beside the
     marker's middle and what shows around a small marker do no harm.
 
     Parameters
     ----------
     samples : iterable of (ndarray, ndarray)
         Images (h, w, 3), BGR, each with its points (n, 2), pixels.
-    settings : ColourSettings, optional
+    settings : MarkerColorSettings, optional
 
     Returns
     -------
-    MarkerColour
+    MarkerColor
 
     Raises
     ------
     InputError
         When there is no point inside an image.
     """
-    settings = settings or ColourSettings()
+    settings = settings or MarkerColorSettings()
     radius, pixels = settings.radius_px, []
     for image, points in samples:
         chroma = _chroma(image)
         for u, v in np.rint(points).astype(int):
             patch = chroma[max(v - radius, 0) : v + radius + 1, max(u - radius, 0) : u + radius + 1].reshape(-1, 2)
             if 0 <= u < image.shape[1] and 0 <= v < image.shape[0]:
-                colourful = np.linalg.norm(patch - 128.0, axis=1)
-                pixels.append(patch[colourful >= 0.7 * colourful.max()])
+                colorful = np.linalg.norm(patch - 128.0, axis=1)
+                pixels.append(patch[colorful >= 0.7 * colorful.max()])
     if not pixels:
         raise InputError("no labelled marker lies inside an image; give points (frame, camera, u, v) on markers")
     values = np.concatenate(pixels)
@@ -103,11 +103,11 @@ def learn_marker_colour(samples: Iterable[tuple[np.ndarray, np.ndarray]], settin
     off = np.linalg.norm(values - mean, axis=1)
     values = values[off <= 2.5 * max(float(np.median(off)), 1.0)]
     covariance = np.atleast_2d(np.cov(values.T)) if len(values) > 2 else np.zeros((2, 2))
-    return MarkerColour(values.mean(axis=0), np.linalg.inv(covariance + settings.spread**2 * np.eye(2)))
+    return MarkerColor(values.mean(axis=0), np.linalg.inv(covariance + settings.spread**2 * np.eye(2)))
 
 
 def detect_markers(
-    image: np.ndarray, colour: MarkerColour, settings: ColourSettings | None = None, background: np.ndarray | None = None
+    image: np.ndarray, color: MarkerColor, settings: MarkerColorSettings | None = None, background: np.ndarray | None = None
 ) -> np.ndarray:
     """Find markers in an image.
 
@@ -115,20 +115,20 @@ def detect_markers(
     ----------
     image : ndarray, shape (h, w, 3)
         BGR, uint8.
-    colour : MarkerColour
-    settings : ColourSettings, optional
+    color : MarkerColor
+    settings : MarkerColorSettings, optional
     background : ndarray, shape (h, w, 3), optional
-        The empty scene: what has the markers' colour there already is no marker.
+        The empty scene: what has the markers' color there already is no marker.
 
     Returns
     -------
     ndarray, shape (n, 2)
-        Centroids of the blobs, weighed by how near each pixel's colour is; pixels.
+        Centroids of the blobs, weighed by how near each pixel's color is; pixels.
     """
-    settings = settings or ColourSettings()
+    settings = settings or MarkerColorSettings()
     chroma = _chroma(image)
-    off = chroma - colour.mean.astype(np.float32)
-    (a, b), (_, c) = colour.inverse.astype(np.float32)
+    off = chroma - color.mean.astype(np.float32)
+    (a, b), (_, c) = color.inverse.astype(np.float32)
     squared = a * off[..., 0] ** 2 + 2 * b * off[..., 0] * off[..., 1] + c * off[..., 1] ** 2
     mask = squared <= settings.threshold**2
     if background is not None:

@@ -29,10 +29,10 @@ LEAST_VARIANCE, LEAST_HIDDEN_VARIANCE = 4.0, 12.0
 HIDDEN_BELOW, SEEN_ABOVE = 1.6, 1.9
 #: Variance of blue, green and red together for one of luma, and for one of chroma (both axes alike).
 OF_LUMA, OF_CHROMA = 3.0, 5.7
-#: Each row and column of which one in so many tells; a pixel is coloured whose channels differ by more than so many grey levels; an
+#: Each row and column of which one in so many tells; a pixel is colored whose channels differ by more than so many grey levels; an
 #: image is, if more than this share of it is.
 STEP = 8
-LEAST_COLOUR, MOST_COLOURED = 8, 0.001
+LEAST_COLOR, MOST_COLORED = 8, 0.001
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ def noise_floor(deviation: np.ndarray) -> Floor:
 
 
 def is_grey(image: np.ndarray) -> bool:
-    """Whether a BGR image has no colour, as from a monochrome camera."""
+    """Whether a BGR image has no color, as from a monochrome camera."""
     few = image[::STEP, ::STEP].astype(np.int16)
-    coloured = np.ptp(few, axis=-1) > LEAST_COLOUR
-    return bool(coloured.mean() <= MOST_COLOURED)
+    colored = np.ptp(few, axis=-1) > LEAST_COLOR
+    return bool(colored.mean() <= MOST_COLORED)

@@ -1,8 +1,8 @@
-"""People cut out of one camera's images by colour, where it is known roughly where they are: for scenes that were never seen empty.
+"""People cut out of one camera's images by color, where it is known roughly where they are: for scenes that were never seen empty.
 
-Colours of people and of the scene are learnt from pixels of which it is known what they show (`learn_colors`). Then a graph cut (Rother
+Colors of people and of the scene are learnt from pixels of which it is known what they show (`learn_colors`). Then a graph cut (Rother
 et al. (2004), "GrabCut") decides between the two, pixel by pixel and with its neighbours. Limbs that never move do not differ from the
-scene as it is known; those are found by their colour, which is that of the people and not that of what surrounds them
+scene as it is known; those are found by their color, which is that of the people and not that of what surrounds them
 (`hmc.camera.local_color`), and held in the cut.
 """
 
@@ -24,13 +24,13 @@ CORE_PX = 5
 LIMB_PX = 9
 THIN_PX = 3
 AROUND_PX = 20
-#: Fewer pixels than this do not tell what colours people or the scene have.
+#: Fewer pixels than this do not tell what colors people or the scene have.
 FEWEST_PX = 50
 
 
 @dataclass(frozen=True)
 class View:
-    """What is known of one image before colours are looked at.
+    """What is known of one image before colors are looked at.
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ class View:
 
 @dataclass(frozen=True)
 class PeopleColors:
-    """Colours of people and of their surroundings in one camera.
+    """Colors of people and of their surroundings in one camera.
 
     Attributes
     ----------
@@ -69,9 +69,9 @@ class PeopleColors:
 
 
 def learn_colors(views: Sequence[View]) -> PeopleColors | None:
-    """Colours of people and of the scene, one model for all images of a camera.
+    """Colors of people and of the scene, one model for all images of a camera.
 
-    Colours of people are learnt where the image differs from a scene that is known, colours of the scene away from that: what stands
+    Colors of people are learnt where the image differs from a scene that is known, colors of the scene away from that: what stands
     still between the two may be either, so it teaches nothing.
 
     Parameters
@@ -81,7 +81,7 @@ def learn_colors(views: Sequence[View]) -> PeopleColors | None:
     Returns
     -------
     PeopleColors or None
-        None where too little is known of either's colours.
+        None where too little is known of either's colors.
     """
     hints = [_hints(view) for view in views]
     palette = learn_palette([view.image[_near(labels) & telling] for view, (labels, telling) in zip(views, hints, strict=True)])
@@ -92,7 +92,7 @@ def learn_colors(views: Sequence[View]) -> PeopleColors | None:
     labels = np.concatenate([labels[telling] for labels, telling in hints])
     if min(np.count_nonzero(_near(labels)), np.count_nonzero(~_near(labels))) < FEWEST_PX:
         return None
-    cv2.setRNGSeed(0)  # the colours are clustered with OpenCV's own generator
+    cv2.setRNGSeed(0)  # the colors are clustered with OpenCV's own generator
     models = np.zeros((1, 65)), np.zeros((1, 65))
     cv2.grabCut(pixels[None], labels[None], None, *models, 0, cv2.GC_INIT_WITH_MASK)  # type: ignore[call-overload]
     scene, people = models
@@ -140,7 +140,7 @@ def _limbs(view: View, labels: np.ndarray, palette: Palette) -> np.ndarray:
 
 
 def _hints(view: View, limbs: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """What a graph cut starts from, and which pixels teach it their colours."""
+    """What a graph cut starts from, and which pixels teach it their colors."""
     differs = view.differs if limbs is None else view.differs | limbs
     near = cv2.morphologyEx((differs & view.possibly).view(np.uint8), cv2.MORPH_CLOSE, disc(differs, LIMB_PX)).view(bool)
     around = cv2.dilate(near.view(np.uint8), disc(differs, LIMB_PX)).view(bool)

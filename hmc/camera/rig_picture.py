@@ -52,16 +52,16 @@ def draw_rig(rig: Rig, room: np.ndarray, ax=None):
     ax.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, fill=False, color="tab:red", linewidth=2, label="room"))
     length = 0.5 * float(np.ptp(corners, axis=0).max())
     for index, camera in enumerate(rig):
-        colour = f"C{index % 10}"
+        color = f"C{index % 10}"
         x, y, z = camera.centre
         cone = view_cone(camera, length, room[0, 2])
-        ax.fill(*cone.T, facecolor=colour, alpha=0.08)
-        ax.plot(*cone.T, color=colour, linewidth=0.8)
-        ax.plot(x, y, "o", color=colour, markersize=8)
+        ax.fill(*cone.T, facecolor=color, alpha=0.08)
+        ax.plot(*cone.T, color=color, linewidth=0.8)
+        ax.plot(x, y, "o", color=color, markersize=8)
         side = 1 if x < corners[:, 0].mean() else -1
         where = {"xytext": (7 * side, 7), "textcoords": "offset points", "ha": "left" if side > 0 else "right"}
         box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 1.5}
-        ax.annotate(f"{camera.name} ({z:.1f} m)", (x, y), color=colour, weight="bold", bbox=box, **where)
+        ax.annotate(f"{camera.name} ({z:.1f} m)", (x, y), color=color, weight="bold", bbox=box, **where)
     ax.plot(0, 0, "k+", markersize=12)
     ax.annotate("origin", (0, 0), xytext=(4, -12), textcoords="offset points", fontsize=8)
     ax.set(
@@ -142,9 +142,9 @@ def draw_view(camera: Camera, room: np.ndarray, image: np.ndarray | None, ax=Non
     return ax
 
 
-def _draw_line(ax, camera: Camera, start: np.ndarray, stop: np.ndarray, colour: str, width: float) -> None:
+def _draw_line(ax, camera: Camera, start: np.ndarray, stop: np.ndarray, color: str, width: float) -> None:
     uv, valid = project(camera, start + np.linspace(0, 1, LINE_POINTS)[:, None] * (stop - start))
-    ax.plot(*np.where(valid[:, None], uv, np.nan).T, color=colour, linewidth=width)
+    ax.plot(*np.where(valid[:, None], uv, np.nan).T, color=color, linewidth=width)
 
 
 def save_rig_picture(path: str | Path, rig: Rig, room: np.ndarray, images: Sequence[np.ndarray | None], title: str = "") -> None:

@@ -80,8 +80,8 @@ class SegmentationSettings:
     gap_threshold, gap_shadow_factor : float
         Standard deviations, and shadow factor, of the weaker evidence that fills gaps and bays of what the mixture found (measured).
     grey_shadow_factor, grey_gap_shadow_factor : float
-        Shadow factors for images without colour. There a shadow looks like anything darker: most shadows are lighter than .7, and
-        with the factors for colour a third of the people goes with them (measured).
+        Shadow factors for images without color. There a shadow looks like anything darker: most shadows are lighter than .7, and
+        with the factors for color a third of the people goes with them (measured).
     reach_threshold : float
         Standard deviations of the evidence that lets a silhouette grow outwards a little (measured).
     halo_share : float
@@ -149,7 +149,7 @@ class BackgroundModel:
     blur : int
         Images are smoothed first by a Gaussian of this side, pixels, since this camera is noisy; 0: they are not.
     grey : bool
-        The empty scene has no colour: images without any may come from a monochrome camera.
+        The empty scene has no color: images without any may come from a monochrome camera.
     """
 
     mixture: cv2.BackgroundSubtractorMOG2
@@ -198,15 +198,15 @@ def train_background(
     for count, frame in enumerate(chain(first, frames), start=1):
         frame = blurred(frame, blur)
         mixture.apply(frame, learningRate=1.0 / count)
-        colour = cv2.cvtColor(frame, cv2.COLOR_BGR2YCrCb).astype(np.float32)
+        color = cv2.cvtColor(frame, cv2.COLOR_BGR2YCrCb).astype(np.float32)
         if mean is None or square is None:
-            mean, square = colour, np.zeros_like(colour)
+            mean, square = color, np.zeros_like(color)
             continue
-        if colour.shape != mean.shape:
-            raise InputError(f"background frames differ in size: {mean.shape[1::-1]} and {colour.shape[1::-1]} pixels")
-        step = colour - mean
+        if color.shape != mean.shape:
+            raise InputError(f"background frames differ in size: {mean.shape[1::-1]} and {color.shape[1::-1]} pixels")
+        step = color - mean
         mean += step / count
-        square += step * (colour - mean)
+        square += step * (color - mean)
     if mean is None or square is None:
         raise InputError("there is no background frame to learn from: give some, or a median of the recording")
     if count < FEWEST_FRAMES:
@@ -448,9 +448,9 @@ def _adapt_to_switch(model: BackgroundModel, image: np.ndarray, settings: Segmen
 
 def _luma_chroma(image: np.ndarray) -> np.ndarray:
     """A BGR image in YCrCb, with luma 1 at least so that one may divide by it."""
-    colour = cv2.cvtColor(image, cv2.COLOR_BGR2YCrCb)
-    np.maximum(colour[..., 0], 1, out=colour[..., 0])
-    return colour
+    color = cv2.cvtColor(image, cv2.COLOR_BGR2YCrCb)
+    np.maximum(color[..., 0], 1, out=color[..., 0])
+    return color
 
 
 def _as_image(mean: np.ndarray) -> np.ndarray:

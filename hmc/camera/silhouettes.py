@@ -1,11 +1,11 @@
 """From the pixels that a background model calls foreground to whole silhouettes: gaps filled, halos cut.
 
-A mixture of Gaussians answers yes or no, and what it misses are parts of people whose colour is close to what is behind them: a pale
+A mixture of Gaussians answers yes or no, and what it misses are parts of people whose color is close to what is behind them: a pale
 shirt before a pale wall, a face before bricks. A missing part costs more than a slightly fat outline, since it is cut from the visual
 hull. So next to the mixture each pixel has one plain Gaussian in luma and chroma, whose lower thresholds decide where the mixture
 already saw something near.
 
-Shadows are told apart as in Canton (2009), section 2.2.3 (Landabaso's rule): the background's colour, darkened but not beyond a factor.
+Shadows are told apart as in Canton (2009), section 2.2.3 (Landabaso's rule): the background's color, darkened but not beyond a factor.
 """
 
 from __future__ import annotations
@@ -82,10 +82,10 @@ def evidence(image: np.ndarray, mean: np.ndarray, deviation: np.ndarray) -> Evid
     -------
     Evidence
     """
-    colour = cv2.cvtColor(image, cv2.COLOR_BGR2YCrCb)
+    color = cv2.cvtColor(image, cv2.COLOR_BGR2YCrCb)
     # Plane by plane: `cv2.split` takes several times longer of a part of an image. Noise is rougher than people: a 3 x 3 average halves it.
     luma, red, blue = (
-        cv2.GaussianBlur(np.subtract(cv2.extractChannel(colour, channel), mean[..., channel], dtype=np.float32), (3, 3), 0)
+        cv2.GaussianBlur(np.subtract(cv2.extractChannel(color, channel), mean[..., channel], dtype=np.float32), (3, 3), 0)
         for channel in range(3)
     )
     contrast, spare = np.abs(luma), np.abs(red)

@@ -1,4 +1,4 @@
-"""``hmc pose`` on markers: detections from a table, or from the images by the markers' colour."""
+"""``hmc pose`` on markers: detections from a table, or from the images by the markers' color."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def add_marker_options(parser: argparse.ArgumentParser) -> None:
         "--labels",
         type=Path,
         metavar="FILE",
-        help="points on markers in some images (frame, camera, u, v), of which the markers' colour is learnt to detect them in all "
+        help="points on markers in some images (frame, camera, u, v), of which the markers' color is learnt to detect them in all "
         "images; default: markers/labels.csv of the recording",
     )
     group.add_argument(
@@ -63,9 +63,9 @@ class Markers:
     @property
     def parameters(self) -> dict[str, Any]:
         """What a run depends on."""
-        from hmc.camera.marker_color import ColourSettings
+        from hmc.camera.marker_color import MarkerColorSettings
 
-        where = {"detections": self.used.resolve()} if self.ready else {"labels": self.used.resolve(), "colour": ColourSettings()}
+        where = {"detections": self.used.resolve()} if self.ready else {"labels": self.used.resolve(), "color": MarkerColorSettings()}
         return {"markers": self.markers, **where}
 
     @property
@@ -75,14 +75,14 @@ class Markers:
 
     def table(self, args: argparse.Namespace, key: str, problems: list[str]):
         """The detections of the recording's selection; learnt and looked for in the images where there are only labels."""
-        from hmc.camera.marker_color import ColourSettings
+        from hmc.camera.marker_color import MarkerColorSettings
         from hmc.errors import InputError
         from hmc.io.detections import write_detections
 
         if self.ready:
             table = _read(self.used, self.recording)
         else:
-            table = _detect(args, self.recording, self.used, ColourSettings(), args.out / MARKERS_JOURNAL, key, problems)
+            table = _detect(args, self.recording, self.used, MarkerColorSettings(), args.out / MARKERS_JOURNAL, key, problems)
             write_detections(args.out / "detections.csv", table)
         if not len(table.frames):
             raise InputError(f"{self.used}: no marker in these frames; check the labelled points or the detections")
@@ -109,7 +109,7 @@ def _source(args: argparse.Namespace, recording) -> tuple[Path, bool]:
     from hmc.errors import InputError
 
     if args.detections and args.labels:
-        raise InputError("--detections and --labels: give one of them; with detections no colour is learnt")
+        raise InputError("--detections and --labels: give one of them; with detections no color is learnt")
     for name, given in (("--detections", args.detections), ("--labels", args.labels)):
         if given and not given.is_file():
             raise InputError(f"{name} {given}: no such file")
@@ -120,7 +120,7 @@ def _source(args: argparse.Namespace, recording) -> tuple[Path, bool]:
             return recording.path / path, path == DETECTIONS
     raise InputError(
         f"{recording.path}: has neither {DETECTIONS} nor {LABELS}; give --detections FILE (where markers were seen), or --labels FILE "
-        "(some points on markers, to learn their colour from): tables with the columns frame,camera,u,v"
+        "(some points on markers, to learn their color from): tables with the columns frame,camera,u,v"
     )
 
 
@@ -135,10 +135,10 @@ def _read(path: Path, recording):
 
 
 def _detect(args: argparse.Namespace, recording, labels: Path, settings, journal: Path, key: str, problems: list[str]):
-    """Learn the colour and detect in every image; what is done is kept in the journal."""
+    """Learn the color and detect in every image; what is done is kept in the journal."""
     import numpy as np
 
-    from hmc.camera.marker_color import detect_markers, learn_marker_colour
+    from hmc.camera.marker_color import detect_markers, learn_marker_color
     from hmc.errors import InputError
     from hmc.io.detections import DetectionTable, read_detections
     from hmc.io.journal import append_journal, open_journal
@@ -152,7 +152,7 @@ def _detect(args: argparse.Namespace, recording, labels: Path, settings, journal
             raise InputError(f"{labels}: frame {frame} is not in the recording, which has {whole.n_frames} frames")
         (images,) = (one.images for one in iterate_frames(whole, first=frame, last=frame + 1))
         samples += [(image, uv) for image, uv in zip(images, points.in_frame(frame, whole.rig.names), strict=True) if image is not None]
-    colour = learn_marker_colour(samples, settings)
+    color = learn_marker_color(samples, settings)
     empty = []
     for camera in range(len(recording.rig)):
         without = list(background_frames(recording, camera, limit=BACKGROUND_FRAMES))
@@ -162,7 +162,7 @@ def _detect(args: argparse.Namespace, recording, labels: Path, settings, journal
     steps = iterate_frames(recording, first=first, on_problem=problems.append) if first < recording.start + recording.n_frames else iter(())
     for frame in progress(steps, recording.start + recording.n_frames - first, "markers", args.quiet):
         found = [
-            np.zeros((0, 2)) if image is None else detect_markers(image, colour, settings, back)
+            np.zeros((0, 2)) if image is None else detect_markers(image, color, settings, back)
             for image, back in zip(frame.images, empty, strict=True)
         ]
         records.append({"frame": frame.index, "uv": [uv.tolist() for uv in found]})

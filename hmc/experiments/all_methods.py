@@ -17,7 +17,7 @@ import numpy as np
 from hmc.experiments.by_action import pose_scores
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs
-from hmc.experiments.engine.style import COLOURS
+from hmc.experiments.engine.style import COLORS
 from hmc.experiments.five_actions import action_title
 from hmc.experiments.markerless_runs import VOXEL_M, action_sources, pose_results, run_method, tracked
 from hmc.experiments.truth import stature_m
@@ -165,11 +165,11 @@ def _scores(cells: Sequence[Cell]) -> dict[str, Any]:
 def _draw(rows: Sequence[dict[str, Any]]) -> plt.Figure:
     """Mean error and frames a second, a mark an action."""
     figure, axes = plt.subplots(figsize=(5.2, 3.4))
-    colours = list(dict.fromkeys(COLOURS.values()))
+    colors = list(dict.fromkeys(COLORS.values()))
     for k, name in enumerate(dict.fromkeys(row["method"] for row in rows)):
         own = [row for row in rows if row["method"] == name and row["frames_per_s"]]
         speed, error = [row["frames_per_s"] for row in own], [row["mean_mm"] for row in own]
-        axes.scatter(speed, error, s=18, color=colours[k % len(colours)], label=name)
+        axes.scatter(speed, error, s=18, color=colors[k % len(colors)], label=name)
     axes.set(xlabel="frames a second", ylabel="mean error (mm)", xscale="log", yscale="log")
     axes.legend(fontsize=7)
     return figure

@@ -13,7 +13,7 @@ import numpy as np
 
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs
-from hmc.experiments.engine.style import COLOURS
+from hmc.experiments.engine.style import COLORS
 from hmc.experiments.toy_likelihood import BOUNDS, PEAKS, log_mixture
 from hmc.search import AnnealedSettings, filter_layer, normalise, particle_init, sir_step, spread_scale, truncated_drift
 
@@ -62,17 +62,17 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     width = next(width for _, place, width in PEAKS if abs(place - best) < 0.5)
     figure, panels = plt.subplots(len(METHODS), 2, figsize=(8, 6), width_ratios=(2, 1))
     rows, off = [], {}
-    for (left, right), name, colour in zip(panels, METHODS, (COLOURS["particle"], COLOURS["sparse"], COLOURS["naive"]), strict=True):
+    for (left, right), name, color in zip(panels, METHODS, (COLORS["particle"], COLORS["sparse"], COLORS["naive"]), strict=True):
         own = [one.results for one in cells if one.parameters["method"] == name]
-        left.plot(places, likelihood, color=COLOURS["paper"], linewidth=1)
+        left.plot(places, likelihood, color=COLORS["paper"], linewidth=1)
         for layer, shown in enumerate(own[0]["layers"]):
             size = 400 * np.array(shown["weight"])
-            left.scatter(shown["x"], np.full(len(size), -0.12 * (layer + 1)), s=np.maximum(size, 0.3), color=colour, alpha=0.6, linewidth=0)
-        left.axvline(own[0]["estimate"], color=colour, linestyle="--", linewidth=1)
+            left.scatter(shown["x"], np.full(len(size), -0.12 * (layer + 1)), s=np.maximum(size, 0.3), color=color, alpha=0.6, linewidth=0)
+        left.axvline(own[0]["estimate"], color=color, linestyle="--", linewidth=1)
         left.set(ylabel=name, yticks=(0, 0.5, 1))
         estimates = np.array([one["estimate"] for one in own])
-        right.hist(estimates, bins=np.linspace(*BOUNDS, 41), color=colour)
-        right.axvline(best, color=COLOURS["paper"], linewidth=1)
+        right.hist(estimates, bins=np.linspace(*BOUNDS, 41), color=color)
+        right.axvline(best, color=COLORS["paper"], linewidth=1)
         off[name] = np.abs(estimates - best)
         rows.append({"method": name, "particles": LAYERS * PARTICLES, "mean_estimate": estimates.mean(), "global_maximum": best,
                      "mean_distance": off[name].mean(), "on_the_maximum": float((off[name] < 2 * width).mean())})  # fmt: skip

@@ -1,6 +1,6 @@
-"""Figure 4.12: two people who meet and go past each other, followed by Sparse Sampling with and without colour.
+"""Figure 4.12: two people who meet and go past each other, followed by Sparse Sampling with and without color.
 
-Source: Canton (2009), section 4.4.2. Without colour the thesis's tracks change identity where people cross; with colour they do not.
+Source: Canton (2009), section 4.4.2. Without color the thesis's tracks change identity where people cross; with color they do not.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ LEAST_HEIGHT_M = 1.4
 
 
 def grid(plan: Plan) -> list[dict]:
-    """Both presets with and without colour, several times."""
+    """Both presets with and without color, several times."""
     sources = plan.recordings or (rendered("meeting_pass"),)
     return [
         runs.parameters_of(source.label, VOXEL_M, ("sparse", color), SAMPLES, preset, repeat)
@@ -83,9 +83,9 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=len(handles))
     claims = tuple(
         Claim(
-            f"{preset}: no identity changes with colour, some without",
+            f"{preset}: no identity changes with color, some without",
             means[preset, True] == 0 < means[preset, False],
-            f"{means[preset, False]:.1f} mismatches a run without, {means[preset, True]:.1f} with colour",
+            f"{means[preset, False]:.1f} mismatches a run without, {means[preset, True]:.1f} with color",
         )
         for preset in runs.PRESETS
     )
@@ -93,4 +93,4 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     return Report((Table("fig-4.12", caption, rows),), {"fig-4.12": figure}, claims)
 
 
-EXPERIMENT = Experiment("fig-4.12", "a crossing, with and without colour", "Canton, Figure 4.12", grid, cell, report)
+EXPERIMENT = Experiment("fig-4.12", "a crossing, with and without color", "Canton, Figure 4.12", grid, cell, report)

@@ -68,7 +68,7 @@ def _claims(preset: str, rows: list[dict]) -> list[Claim]:
             all(gain > 0 for gain in ahead),
             ", ".join(f"{gain:+.1f} mm" for gain in ahead) + " less at each voxel size, raw and color, from fine to coarse",
         ),
-        Claim(f"{preset}: colour costs time", min(costs) > 1, f"{min(costs):.2f} to {max(costs):.2f} times"),
+        Claim(f"{preset}: color costs time", min(costs) > 1, f"{min(costs):.2f} to {max(costs):.2f} times"),
         Claim(
             f"{preset}: finer voxels cost time",
             means[fine] < means[coarse],

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs
-from hmc.experiments.engine.style import COLOURS
+from hmc.experiments.engine.style import COLORS
 from hmc.experiments.person_features import features_of, test_sources
 from hmc.tracking.appearance import bhattacharyya
 from hmc.tracking.features import FEATURES
@@ -90,7 +90,7 @@ def _histograms(data: dict[float, tuple[np.ndarray, np.ndarray]]) -> Figure:
         for label, wanted in CLASSES.items():
             for size, (features, is_person) in data.items():
                 style = {"label": label, "alpha": 1.0} if size == min(data) else {"alpha": 0.35}
-                ax.stairs(_shares(features[is_person == wanted], k), edges, color=COLOURS[label], **style)
+                ax.stairs(_shares(features[is_person == wanted], k), edges, color=COLORS[label], **style)
         ax.set(xlabel=name, xlim=RANGES[k])
     for ax in axes[:, 0]:
         ax.set_ylabel("share of the components")
@@ -109,7 +109,7 @@ def _scatter(features: np.ndarray, is_person: np.ndarray) -> Figure:
                 continue
             for label, wanted in CLASSES.items():
                 some = features[is_person == wanted]
-                ax.plot(some[:, column], some[:, row], ".", color=COLOURS[label], markersize=1.5, alpha=0.5)
+                ax.plot(some[:, column], some[:, row], ".", color=COLORS[label], markersize=1.5, alpha=0.5)
             ax.set(xlim=RANGES[column], ylim=RANGES[row])
             if row == n - 1:
                 ax.set_xlabel(FEATURES[column])

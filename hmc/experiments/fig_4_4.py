@@ -14,7 +14,7 @@ import numpy as np
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs
 from hmc.experiments.engine.store import digest
-from hmc.experiments.engine.style import COLOURS
+from hmc.experiments.engine.style import COLORS
 from hmc.tracking.features import FEATURES
 from hmc.tracking.person_tree import LEAF, default_tree
 
@@ -53,10 +53,10 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
             axes.plot([x, places[child][0]], [y, places[child][1]], color="0.6", linewidth=1, zorder=1)
         if tree["feature"][k] == LEAF:
             person = tree["share"][k] >= 0.5
-            text, colour = f"{'person' if person else 'other'}\n{tree['share'][k]:.2f}", COLOURS["person" if person else "other"]
+            text, color = f"{'person' if person else 'other'}\n{tree['share'][k]:.2f}", COLORS["person" if person else "other"]
         else:
-            text, colour = f"{FEATURES[tree['feature'][k]]}\n≤ {tree['threshold'][k]:.3g}", "0.3"
-        box = {"boxstyle": "round,pad=0.25", "facecolor": "white", "edgecolor": colour}
+            text, color = f"{FEATURES[tree['feature'][k]]}\n≤ {tree['threshold'][k]:.3g}", "0.3"
+        box = {"boxstyle": "round,pad=0.25", "facecolor": "white", "edgecolor": color}
         axes.text(x, y, text, ha="center", va="center", fontsize=6.5, bbox=box, zorder=2)
     axes.set(xlim=(-0.6, leaves - 0.4), ylim=(-deepest - 0.5, 0.5))
     axes.axis("off")

@@ -14,7 +14,7 @@ import numpy as np
 from hmc.experiments.ellipsoid import VOXEL_M, person_voxels
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs
-from hmc.experiments.engine.style import COLOURS
+from hmc.experiments.engine.style import COLORS
 
 __all__ = ["EXPERIMENT"]
 
@@ -46,7 +46,7 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     rows = [{**{key: one.parameters[key] for key in ("voxels", "fraction")}, **one.results} for one in cells]
     figure, (left, right) = plt.subplots(1, 2, figsize=(7, 3), sharey=True)
     means = {}
-    for name, colour in zip(SETS, (COLOURS["sparse"], COLOURS["particle"]), strict=True):
+    for name, color in zip(SETS, (COLORS["sparse"], COLORS["particle"]), strict=True):
         part = [row for row in rows if row["voxels"] == name]
         means[name] = np.array([row["mean_mm"] for row in part])
         spread = np.array([row["sd_mm"] for row in part])
@@ -54,8 +54,8 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
         for axes, key in ((left, "fraction"), (right, "n_voxels")):
             at = np.array([row[key] for row in part])[shown]
             low, high = means[name] - spread, means[name] + spread
-            axes.plot(at, means[name][shown], "o-", color=colour, label=name)
-            axes.fill_between(at, np.maximum(low, 0.01)[shown], high[shown], color=colour, alpha=0.15, linewidth=0)
+            axes.plot(at, means[name][shown], "o-", color=color, label=name)
+            axes.fill_between(at, np.maximum(low, 0.01)[shown], high[shown], color=color, alpha=0.15, linewidth=0)
             axes.set(xscale="log", yscale="log")
     left.set(xlabel="fraction of the voxels", ylabel="error of the centroid (mm)", ylim=(0.1, None))
     right.set(xlabel="number of voxels")

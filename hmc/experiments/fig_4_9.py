@@ -15,7 +15,7 @@ from scipy.ndimage import uniform_filter
 from hmc.experiments.ellipsoid import VOXEL_M, person_voxels
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs
-from hmc.experiments.engine.style import COLOURS
+from hmc.experiments.engine.style import COLORS
 from hmc.search import systematic
 
 __all__ = ["EXPERIMENT"]
@@ -88,7 +88,7 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     shown = pictures.subplots(2, len(SHOWN), sharex=True, sharey=True)
     upper, lower = curves.subplots(2, 1, sharex=True)
     rows, mean_spread = [], {}
-    for row, (name, colour) in enumerate(zip(LIKELIHOODS, (COLOURS["sparse"], COLOURS["particle"]), strict=True)):
+    for row, (name, color) in enumerate(zip(LIKELIHOODS, (COLORS["sparse"], COLORS["particle"]), strict=True)):
         own = [one.results for one in cells if one.parameters["likelihood"] == name]
         spread, error = (np.mean([one[key] for one in own], axis=0) for key in ("spread", "error_mm"))
         mean_spread[name] = spread.mean()
@@ -98,12 +98,12 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
         ]
         for axes, step in zip(shown[row], SHOWN, strict=True):
             points = np.array(own[0]["shown_m"][str(step)])
-            axes.plot(points[:, 0], points[:, 2], ".", color=colour, markersize=1.5)
+            axes.plot(points[:, 0], points[:, 2], ".", color=color, markersize=1.5)
             axes.set_xlabel("x (m)" if row else "")
             axes.set(aspect="equal", title=f"step {step}" if row == 0 else "", xlim=(-0.4, 0.4), ylim=(-1.1, 1.1), xticks=(-0.3, 0.3))
         shown[row][0].set_ylabel(f"{name}\nz (m)")
-        upper.plot(spread, color=colour, label=name)
-        lower.plot(error, color=colour)
+        upper.plot(spread, color=color, label=name)
+        lower.plot(error, color=color)
     upper.set(ylabel="spread\n(of uniform samples: 1)", ylim=(0, 1.1))
     upper.legend()
     lower.set(xlabel="step", ylabel="error of the centroid (mm)", ylim=(0, None))

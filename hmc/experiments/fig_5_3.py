@@ -13,7 +13,7 @@ import numpy as np
 
 from hmc.experiments import pose_runs as runs
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
-from hmc.experiments.engine.style import COLOURS
+from hmc.experiments.engine.style import COLORS
 from hmc.landmarks import BONES, LANDMARKS
 from hmc.metrics.landmarks import landmark_errors, score
 
@@ -64,15 +64,15 @@ def _draw(axes, estimate: np.ndarray, truth: np.ndarray, errors: np.ndarray) -> 
     """Both stick figures, seen from the side on which they are broadest; landmarks that are not matched in red."""
     centred = truth[:, :2] - truth[:, :2].mean(axis=0)
     across = np.linalg.svd(centred)[2][0]
-    for points, colour in ((truth, COLOURS["paper"]), (estimate, COLOURS["particle"])):
+    for points, color in ((truth, COLORS["paper"]), (estimate, COLORS["particle"])):
         flat = np.stack([points[:, :2] @ across, points[:, 2]], axis=1)
         for bone in BONES:
             ends = flat[[LANDMARKS.index(name) for name in bone]]
-            axes.plot(ends[:, 0], ends[:, 1], color=colour, linewidth=1.5)
+            axes.plot(ends[:, 0], ends[:, 1], color=color, linewidth=1.5)
         if points is estimate:
             lost = errors > runs.PAPER_THRESHOLD_MM
-            axes.plot(*flat[~lost].T, "o", color=COLOURS["person"], linestyle="none", label="matched")
-            axes.plot(*flat[lost].T, "o", color=COLOURS["other"], linestyle="none", label="not matched")
+            axes.plot(*flat[~lost].T, "o", color=COLORS["person"], linestyle="none", label="matched")
+            axes.plot(*flat[lost].T, "o", color=COLORS["other"], linestyle="none", label="not matched")
     axes.set(aspect="equal", xlabel="metres")
     axes.legend()
 

@@ -13,7 +13,7 @@ from scipy.stats import norm
 
 from hmc.experiments import pose_runs as runs
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
-from hmc.experiments.engine.style import COLOURS
+from hmc.experiments.engine.style import COLORS
 from hmc.metrics.threshold import choose_threshold, lilliefors_statistic, normal_quantiles, quantile_r2
 
 __all__ = ["EXPERIMENT"]
@@ -30,15 +30,15 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
         upper, lower = panels[:, column]
         edges = np.linspace(0, np.quantile(errors, 0.995), 50)
         upper.hist(errors, edges, density=True, color="0.8")
-        for values, colour, label in ((errors, COLOURS["other"], "all errors"), (within, COLOURS["person"], "below the threshold")):
+        for values, color, label in ((errors, COLORS["other"], "all errors"), (within, COLORS["person"], "below the threshold")):
             share = len(values) / len(errors)
-            upper.plot(edges, share * norm.pdf(edges, values.mean(), values.std()), color=colour, label=label)
+            upper.plot(edges, share * norm.pdf(edges, values.mean(), values.std()), color=color, label=label)
         upper.set(title=title, xlabel="error (mm)", yticks=[])
         quantiles = normal_quantiles(len(errors))
-        lower.plot(quantiles, errors, ".", color=COLOURS["particle"], markersize=2)
+        lower.plot(quantiles, errors, ".", color=COLORS["particle"], markersize=2)
         middle = np.quantile(errors, [0.25, 0.75])
         slope = (middle[1] - middle[0]) / (norm.ppf(0.75) - norm.ppf(0.25))
-        lower.plot(quantiles, middle.mean() + slope * quantiles, color=COLOURS["other"], linewidth=1)
+        lower.plot(quantiles, middle.mean() + slope * quantiles, color=COLORS["other"], linewidth=1)
         lower.set(xlabel="quantile of a Gaussian", ylabel="error (mm)" if column == 0 else "")
         straight[method] = quantile_r2(errors)
         rows.append({"method": title, "errors": len(errors), "mean_mm": errors.mean(), "deviation_mm": errors.std(),

@@ -13,7 +13,7 @@ from scipy.stats import norm
 
 from hmc.experiments import pose_runs as runs
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
-from hmc.experiments.engine.style import COLOURS
+from hmc.experiments.engine.style import COLORS
 from hmc.metrics.landmarks import score
 from hmc.metrics.threshold import choose_threshold
 
@@ -34,22 +34,22 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
         upper, lower = panels[:, column]
         edges = np.linspace(0, np.quantile(known, 0.995), 50)
         within = known[known <= choices[0].threshold]
-        upper.hist([within, known[known > choices[0].threshold]], edges, stacked=True, color=[COLOURS["person"], "0.8"])
+        upper.hist([within, known[known > choices[0].threshold]], edges, stacked=True, color=[COLORS["person"], "0.8"])
         scale = len(within) * (edges[1] - edges[0])
-        upper.plot(edges, scale * norm.pdf(edges, within.mean(), within.std()), color=COLOURS["particle"])
+        upper.plot(edges, scale * norm.pdf(edges, within.mean(), within.std()), color=COLORS["particle"])
         upper.set(title=title, xlabel="error (mm)", yticks=[])
-        lower.plot(choices[0].candidates, choices[0].values, color=COLOURS["particle"])
+        lower.plot(choices[0].candidates, choices[0].values, color=COLORS["particle"])
         lower.set(xlabel="threshold (mm)", xlim=(0, edges[-1]), ylim=(0, 0.4))
         twin = lower.twinx()
-        twin.plot(choices[1].candidates, choices[1].values, color=COLOURS["sparse"])
+        twin.plot(choices[1].candidates, choices[1].values, color=COLORS["sparse"])
         twin.set(ylim=(0.6, 1))
         twin.grid(False)
-        for axes, choice, colour in ((lower, choices[0], COLOURS["particle"]), (lower, choices[1], COLOURS["sparse"])):
-            axes.axvline(choice.threshold, color=colour, linestyle="--", linewidth=1)
+        for axes, choice, color in ((lower, choices[0], COLORS["particle"]), (lower, choices[1], COLORS["sparse"])):
+            axes.axvline(choice.threshold, color=color, linestyle="--", linewidth=1)
         if column == 0:
-            lower.set_ylabel("Lilliefors", color=COLOURS["particle"])
+            lower.set_ylabel("Lilliefors", color=COLORS["particle"])
         if column == len(runs.METHODS) - 1:
-            twin.set_ylabel("R^2", color=COLOURS["sparse"])
+            twin.set_ylabel("R^2", color=COLORS["sparse"])
         at = score(errors, choices[0].threshold)
         ratios[title] = abs(np.log(choices[0].threshold / choices[1].threshold))
         rows.append({"method": title, "threshold_lilliefors_mm": choices[0].threshold, "threshold_R2_mm": choices[1].threshold,

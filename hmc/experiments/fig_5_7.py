@@ -13,7 +13,7 @@ import numpy as np
 
 from hmc.experiments import pose_runs as runs
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
-from hmc.experiments.engine.style import COLOURS
+from hmc.experiments.engine.style import COLORS
 from hmc.metrics.angles import REFERENCE_ANGLES, angular_errors, reference_angles, score_angles
 
 __all__ = ["EXPERIMENT"]
@@ -33,9 +33,9 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     for axes, name in zip(panels, SHOWN, strict=True):
         k = names.index(name)
         true, ours = (np.degrees(reference_angles(points)[:, k]) for points in (truth, estimate))
-        axes.plot(seconds, true, color=COLOURS["paper"], label="truth")
-        axes.plot(seconds, ours, color=COLOURS["particle"], label="estimate")
-        axes.plot(seconds, np.degrees(angular_errors(estimate, truth)[:, k]), color=COLOURS["other"], label="error")
+        axes.plot(seconds, true, color=COLORS["paper"], label="truth")
+        axes.plot(seconds, ours, color=COLORS["particle"], label="estimate")
+        axes.plot(seconds, np.degrees(angular_errors(estimate, truth)[:, k]), color=COLORS["other"], label="error")
         axes.set(ylabel=f"{name.replace('_', ' ')}\n(degrees)")
     panels[0].legend(ncols=3)
     panels[-1].set_xlabel("seconds")

@@ -21,7 +21,7 @@ from hmc.body.joints import DOF_NAMES
 from hmc.body.proportions import canton_body
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs
-from hmc.experiments.engine.style import COLOURS
+from hmc.experiments.engine.style import COLORS
 from hmc.experiments.markerless_runs import FRONTEND, MASKS_KEY, action_sources, tracked
 from hmc.experiments.truth import HEIGHT_M, first_truth, standing_state, stature_m
 from hmc.io.masks import kept_masks
@@ -145,12 +145,12 @@ def _draw(one: Cell) -> plt.Figure:
     """Log-likelihood below the best, with modes and the truth: on a plain scale all but the best point would look the same."""
     figure, panels = plt.subplots(2, 2, figsize=(7.4, 6), sharex=True, sharey=True)
     first, second = np.array(one.results["degrees"])
-    colours = ScalarMappable(Normalize(-DEPTH, 0), "viridis")
+    colors = ScalarMappable(Normalize(-DEPTH, 0), "viridis")
     for k, (axes, panel) in enumerate(zip(panels.flat, PANELS, strict=True)):
         values = np.array(one.results["log_likelihood"][k])
-        axes.pcolormesh(first, second, (values - values.max()).T, norm=colours.norm, cmap="viridis", shading="nearest")
+        axes.pcolormesh(first, second, (values - values.max()).T, norm=colors.norm, cmap="viridis", shading="nearest")
         i, j = np.nonzero(_modes(values)[0])
-        axes.plot(first[i], second[j], "o", color=COLOURS["other"], fillstyle="none", label="mode")
+        axes.plot(first[i], second[j], "o", color=COLORS["other"], fillstyle="none", label="mode")
         axes.plot(*one.results["true_degrees"], "+", color="white", markersize=9, markeredgewidth=1.5, label="truth")
         axes.grid(False)
         n = count_modes(values)
@@ -160,7 +160,7 @@ def _draw(one: Cell) -> plt.Figure:
     for axes in panels[:, 0]:
         axes.set_ylabel(f"{ANGLES[1]} (degrees)")
     panels[0, 0].legend(facecolor="0.6", frameon=True)
-    figure.colorbar(colours, ax=panels, label="log-likelihood below the best")
+    figure.colorbar(colors, ax=panels, label="log-likelihood below the best")
     return figure
 
 

@@ -49,7 +49,7 @@ def grid(plan: Plan) -> list[dict]:
 
 
 def report(cells: Sequence[Cell], plan: Plan) -> Report:
-    """MMTA in colour: blocks by false positives and variance, in each layers by particles."""
+    """MMTA in color: blocks by false positives and variance, in each layers by particles."""
     rows: list[dict[str, Any]] = []
     figures: dict[str, Figure] = {}
     claims: list[Claim] = []
@@ -69,7 +69,7 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
         claims += _claims(mmta, likelihood)
     caption = (
         "Marker-based filter with the thesis's parameters: MMTA at 100 mm by detector, layers and particles a layer. "
-        "The paper: Canton, Figure 6.13, in colour without numbers."
+        "The paper: Canton, Figure 6.13, in color without numbers."
     )
     return Report((Table("fig-6.13", caption, rows),), figures, tuple(claims))
 

@@ -55,7 +55,7 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
             Claim(f"{annealing} annealing: smaller voxels are better", means[2] > means[1], detail),
         ]
     mmta_bar(figure, panels)
-    caption = "MMTA at 100 mm by cameras, voxels, layers and particles. The paper: Canton, Figure 6.16, in colour without numbers."
+    caption = "MMTA at 100 mm by cameras, voxels, layers and particles. The paper: Canton, Figure 6.16, in color without numbers."
     return Report((Table("fig-6.16", caption, rows),), {"fig-6.16": figure}, tuple(claims))
 
 

@@ -70,7 +70,7 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
                 )
             )
     mmta_bar(figure, panels)
-    caption = "MMTA at 100 mm by likelihood, layers and particles. The paper: Canton, Figure 6.17, in colour without numbers."
+    caption = "MMTA at 100 mm by likelihood, layers and particles. The paper: Canton, Figure 6.17, in color without numbers."
     seeds = _seed_rows(compared)
     ahead = [action for action in dict.fromkeys(row["action"] for row in seeds) if _gain(seeds, action) > 0]
     claims.append(

@@ -12,7 +12,7 @@ import matplotlib.pyplot as plt
 
 from hmc.experiments import filter_runs as runs
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
-from hmc.experiments.engine.style import COLOURS
+from hmc.experiments.engine.style import COLORS
 from hmc.experiments.filter_grids import filter_grid, grouped_rows
 
 __all__ = ["EXPERIMENT"]
@@ -32,12 +32,12 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     rows = grouped_rows(cells, ("annealing", "density"))
     figure, panels = plt.subplots(1, 2, figsize=(7.5, 3))
     claims = []
-    for annealing, colour in zip(runs.ANNEALING, (COLOURS["particle"], COLOURS["sparse"]), strict=True):
+    for annealing, color in zip(runs.ANNEALING, (COLORS["particle"], COLORS["sparse"]), strict=True):
         own = [row for row in rows if row["annealing"] == annealing]
         densities = [row["density"] for row in own]
         mmta, spread = [row["MMTA_percent"] for row in own], [row["MMTA_deviation_percent"] for row in own]
-        panels[0].errorbar(densities, mmta, spread, marker="o", capsize=2, color=colour, label=annealing)
-        panels[1].plot(densities, [row["filter_frames_per_s"] for row in own], "o-", color=colour, label=annealing)
+        panels[0].errorbar(densities, mmta, spread, marker="o", capsize=2, color=color, label=annealing)
+        panels[1].plot(densities, [row["filter_frames_per_s"] for row in own], "o-", color=color, label=annealing)
         one, twice, most = (next(row for row in own if row["density"] == density) for density in (1.0, 2.0, max(densities)))
         claims += [
             Claim(

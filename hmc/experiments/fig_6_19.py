@@ -12,7 +12,7 @@ import numpy as np
 
 from hmc.experiments import markerless_runs as runs
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
-from hmc.experiments.engine.style import COLOURS
+from hmc.experiments.engine.style import COLORS
 from hmc.experiments.table_6_4 import PRESETS
 from hmc.experiments.table_6_4 import grid as table_grid
 from hmc.experiments.truth import estimates
@@ -55,8 +55,8 @@ def _draw(estimate: np.ndarray, truth: np.ndarray, seconds: np.ndarray) -> plt.F
     for line, name in zip(panels, SHOWN, strict=True):
         place = LANDMARKS.index(name)
         for k, axes in enumerate(line):
-            axes.plot(seconds, truth[:, place, k], color=COLOURS["paper"], label="truth")
-            axes.plot(seconds, estimate[:, place, k], color=COLOURS["other"], linewidth=1, label="estimate")
+            axes.plot(seconds, truth[:, place, k], color=COLORS["paper"], label="truth")
+            axes.plot(seconds, estimate[:, place, k], color=COLORS["other"], linewidth=1, label="estimate")
         line[0].set_ylabel(f"{name.replace('_', ' ')}\n(m)")
     for axes, name in zip(panels[0], "xyz", strict=True):
         axes.set_title(name)

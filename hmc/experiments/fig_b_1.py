@@ -82,10 +82,10 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     axes = left.subplots()
     squares = iter(right.subplots(2, 2).ravel())
     rows, at_45 = [], {}
-    for one, colour in zip(cells, plt.get_cmap("viridis")(np.linspace(0, 0.9, len(cells))), strict=True):
+    for one, color in zip(cells, plt.get_cmap("viridis")(np.linspace(0, 0.9, len(cells))), strict=True):
         alpha, results = one.parameters["alpha"], one.results
         degrees, area = np.array(results["angle_deg"]), np.array(results["area_left"])
-        axes.plot(degrees, 100 * area, color=colour, label=f"{alpha:g}")
+        axes.plot(degrees, 100 * area, color=color, label=f"{alpha:g}")
         k = int(np.abs(degrees - 45).argmin())
         at_45[alpha] = 100 * area[k]
         paper = {1.0: 84.0, 0.7: 100.0}.get(alpha)

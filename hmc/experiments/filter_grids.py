@@ -85,7 +85,7 @@ def matrix(rows: Sequence[dict[str, Any]], layers: Sequence[int], particles: Seq
 
 
 def layer_map(axes: Axes, values: np.ndarray, layers: Sequence[int], particles: Sequence[int]) -> None:
-    """MMTA in colour and in numbers, layers by particles."""
+    """MMTA in color and in numbers, layers by particles."""
     axes.imshow(values, origin="lower", vmin=0, vmax=100, aspect="auto", cmap="viridis")
     axes.grid(False)
     axes.set_xticks(range(len(particles)), [str(size) for size in particles])
@@ -95,5 +95,5 @@ def layer_map(axes: Axes, values: np.ndarray, layers: Sequence[int], particles: 
 
 
 def mmta_bar(figure: Figure, panels: np.ndarray) -> None:
-    """A colour bar for maps of MMTA, percent."""
+    """A color bar for maps of MMTA, percent."""
     figure.colorbar(ScalarMappable(Normalize(0, 100), "viridis"), ax=panels, label="MMTA (%)")

@@ -27,7 +27,7 @@ HUMANEVA = {"Walking": "walk", "Jog": "jog", "ThrowCatch": "throw_catch", "Gestu
 ACTORS = {
     "man": ActorRecipe(
         height_m=1.86, build="sturdy", sex="man", shirt=(0.55, 0.20, 0.16), trousers=(0.16, 0.18, 0.26), pattern="stripes",
-        pattern_colour=(0.30, 0.10, 0.10),
+        pattern_color=(0.30, 0.10, 0.10),
     ),
     "woman": ActorRecipe(
         height_m=1.60, build="slim", sex="woman", shirt=(0.16, 0.40, 0.46), trousers=(0.20, 0.20, 0.22), hair=(0.30, 0.20, 0.10),

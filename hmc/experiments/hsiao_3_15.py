@@ -22,12 +22,12 @@ from hmc.pose.spectral.skeleton import baseline_skeletons, extract_skeletons
 from hmc.synthetic.actor import PARTS
 from hmc.synthetic.truth import true_parts
 
-__all__ = ["COLOURS_OF_PARTS", "EXPERIMENT", "FAMILY", "cell", "grid", "share_right"]
+__all__ = ["COLORS_OF_PARTS", "EXPERIMENT", "FAMILY", "cell", "grid", "share_right"]
 
 FAMILY = "hsiao-parts"
 #: Every so many frames are looked at.
 EVERY = 3
-COLOURS_OF_PARTS = ("0.55", "gold", "tab:red", "tab:blue", "tab:cyan", "tab:orange", "black")
+COLORS_OF_PARTS = ("0.55", "gold", "tab:red", "tab:blue", "tab:cyan", "tab:orange", "black")
 _NAMES = ("s1_wave", "s3_throw_item", "s4_struggle", "s6_close_door")
 
 
@@ -122,16 +122,16 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
 def draw(shown: dict) -> plt.Figure:
     """Both segmentations in the eigenspace and in the room, as Figure 3-15."""
     figure = plt.figure(figsize=(9, 6))
-    points, colours = np.array(shown["points"]), np.array(COLOURS_OF_PARTS, object)
+    points, colors = np.array(shown["points"]), np.array(COLORS_OF_PARTS, object)
     for row, (labels, places, title) in enumerate(
         ((shown["baseline"], shown["plain_places"], "Sundaresan's"), (shown["ours"], shown["places"], "modified"))
     ):
-        colour = colours[np.array(labels, int)].tolist()
+        color = colors[np.array(labels, int)].tolist()
         first = figure.add_subplot(2, 2, 2 * row + 1, projection="3d")
-        first.scatter(*np.array(places).T, s=2, c=colour)
+        first.scatter(*np.array(places).T, s=2, c=color)
         first.set_title(f"{title}: first three dimensions")
         second = figure.add_subplot(2, 2, 2 * row + 2, projection="3d")
-        second.scatter(*points.T, s=3, c=colour)
+        second.scatter(*points.T, s=3, c=color)
         second.set_box_aspect(np.ptp(points, axis=0))
         second.view_init(8, 20)
         second.set_title("in the room")

@@ -11,7 +11,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
-from hmc.experiments.hsiao_3_15 import COLOURS_OF_PARTS, FAMILY, cell, grid
+from hmc.experiments.hsiao_3_15 import COLORS_OF_PARTS, FAMILY, cell, grid
 from hmc.landmarks import LANDMARKS
 from hmc.pose.spectral.parts import PART_NAMES
 
@@ -59,8 +59,8 @@ def draw(shown: Sequence) -> plt.Figure:
         points = np.array(frame["points"])
         ax.scatter(*points[::4].T, s=1, c="0.8")
         for part, curve in frame["curves"].items():
-            colour = COLOURS_OF_PARTS[PART_NAMES.index(part)] if part in PART_NAMES else "black"
-            ax.plot(*np.array(curve).T, color=colour, linewidth=2)
+            color = COLORS_OF_PARTS[PART_NAMES.index(part)] if part in PART_NAMES else "black"
+            ax.plot(*np.array(curve).T, color=color, linewidth=2)
         ax.scatter(*np.array(frame["joints"]).T, s=12, c="black")
         ax.set_box_aspect(np.ptp(points, axis=0))
         ax.view_init(8, 20)

@@ -65,7 +65,7 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
         table.append(
             {
                 "cameras": one.parameters["cameras"], "frames": len(rows), "legs": rows[:, 1].mean(), "most_legs": rows[:, 1].max(),
-                "removed_by_colour": rows[:, 2].mean(), "litres": rows[:, 3].mean(), "litres_far_from_body": rows[:, 4].mean(),
+                "removed_by_color": rows[:, 2].mean(), "litres": rows[:, 3].mean(), "litres_far_from_body": rows[:, 4].mean(),
                 "litres_far_after_removal": rows[:, 5].mean(), "said": "; ".join(one.results["texts"]),
             }
         )  # fmt: skip

@@ -13,7 +13,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
-from hmc.experiments.engine.style import COLOURS
+from hmc.experiments.engine.style import COLORS
 from hmc.experiments.hsiao_runs import pose_cell, sequences
 from hmc.experiments.nine_actions import NINE_ACTIONS, QUICK_SUFFIX
 from hmc.experiments.truth import estimates
@@ -25,7 +25,7 @@ __all__ = ["EXPERIMENT"]
 EASY = ("s1_wave", "s2_throw_ball", "s3_throw_item", "s8_walk")
 LEAST_MMTA = 0.85
 #: Of the method `pso`, and how they are drawn.
-PRESETS = {"default": COLOURS["sparse"], "hsiao2008": COLOURS["paper"]}
+PRESETS = {"default": COLORS["sparse"], "hsiao2008": COLORS["paper"]}
 
 
 def grid(plan: Plan) -> list[dict]:

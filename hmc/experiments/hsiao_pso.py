@@ -16,7 +16,7 @@ from scipy.optimize import differential_evolution, dual_annealing
 from hmc.body.spin_skeleton import model_of_height, skeleton_landmarks
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs
-from hmc.experiments.engine.style import COLOURS
+from hmc.experiments.engine.style import COLORS
 from hmc.experiments.hsiao_runs import VOXEL_M, person_hulls, sequences
 from hmc.experiments.truth import HEIGHT_M, first_truth, stature_m
 from hmc.pose.objectives.curves import curves_of, observe_curves, skeleton_error
@@ -138,7 +138,7 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
         ),
     )
     figure, ax = plt.subplots(figsize=(7, 3.2))
-    ax.boxplot([rows[rows[:, 1] == k, 2] for k in range(len(METHODS))], tick_labels=METHODS, medianprops={"color": COLOURS["sparse"]})
+    ax.boxplot([rows[rows[:, 1] == k, 2] for k in range(len(METHODS))], tick_labels=METHODS, medianprops={"color": COLORS["sparse"]})
     ax.tick_params(axis="x", rotation=30)
     ax.set_ylabel("error (mm)")
     return Report((Table("hsiao-pso", "Optimisers at equal evaluations.", table),), {"hsiao-pso": figure}, claims)

@@ -46,7 +46,7 @@ def scene_of(label: str) -> Scene:
 
 
 def person_hulls(recording: Recording, voxel_size_m: float = VOXEL_M) -> Iterator[tuple[HullStep, VoxelGrid, np.ndarray, tuple]]:
-    """Every frame's strict hull of the only person, voxels (n, 3), with the frame, the grid and the colour votes."""
+    """Every frame's strict hull of the only person, voxels (n, 3), with the frame, the grid and the color votes."""
     grid = VoxelGrid.from_room(recording.room, voxel_size_m, len(recording.rig))
     for step in stream_hulls(recording, grid, FRONTEND, on_problem=lambda line: None):
         blobs = components(step.strict, grid, 20)

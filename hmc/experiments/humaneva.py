@@ -2,7 +2,7 @@
 
 Source: the dataset's release (Sigal, Balan and Black 2010) and its support code, v1.1. A subject's folder has
 ``Calibration_Data/C1.cal``, ``Image_Data/Walking_1_(C1).avi``, ``Mocap_Data/Walking_1.c3d`` and ``Sync_Data/Walking_1_(C1).ofs``, for the
-cameras C1 to C3 (colour) and BW1 to BW4; ``Background/Background_1_(C1).avi`` and so on lie beside the subjects. Videos are not copied: the
+cameras C1 to C3 (color) and BW1 to BW4; ``Background/Background_1_(C1).avi`` and so on lie beside the subjects. Videos are not copied: the
 recording links to them.
 """
 

@@ -1,4 +1,4 @@
-"""Table 1 and figure 3: reconstruction and colouring at 64^3 and 128^3 from 4, 5 and 9 views, incremental and from scratch.
+"""Table 1 and figure 3: reconstruction and coloring at 64^3 and 128^3 from 4, 5 and 9 views, incremental and from scratch.
 
 Source: Kehl (2006), section 4.1, on a Pentium IV of 3 GHz. Silhouettes are those of the superellipsoid body as it swings its arms, 15
 frames a second, so that nothing but the reconstruction is measured. Times are processor times of one thread. Takes about 2 minutes.
@@ -22,7 +22,7 @@ from hmc.body.solids import SolidBody, solid_body
 from hmc.camera.model import Rig, look_at, project
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs
-from hmc.experiments.engine.style import COLOURS
+from hmc.experiments.engine.style import COLORS
 from hmc.pose.objectives.cue_rows import pose_body
 from hmc.pose.objectives.surface_cue import place
 from hmc.voxels.carving import carve, make_tables
@@ -121,10 +121,10 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
         })  # fmt: skip
     figure, axes = plt.subplots(figsize=(7, 3.5))
     place_of = np.arange(len(rows))
-    names = {"incremental_ms": ("incremental", COLOURS["sparse"]), "scratch_ms": ("from scratch", COLOURS["particle"]),
-             "blocks_ms": ("by blocks", COLOURS["person"]), "paper_reconstruction_ms": ("paper", COLOURS["paper"])}  # fmt: skip
-    for k, (column, (title, colour)) in enumerate(names.items()):
-        axes.bar(place_of + 0.2 * (k - 1.5), [row[column] for row in rows], 0.2, color=colour, label=title)
+    names = {"incremental_ms": ("incremental", COLORS["sparse"]), "scratch_ms": ("from scratch", COLORS["particle"]),
+             "blocks_ms": ("by blocks", COLORS["person"]), "paper_reconstruction_ms": ("paper", COLORS["paper"])}  # fmt: skip
+    for k, (column, (title, color)) in enumerate(names.items()):
+        axes.bar(place_of + 0.2 * (k - 1.5), [row[column] for row in rows], 0.2, color=color, label=title)
     axes.set(yscale="log", ylabel="ms a frame", xticks=place_of, xticklabels=[f"{row['views']} views\n{row['side']}^3" for row in rows])
     axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     axes.yaxis.set_major_formatter("{x:g}")

@@ -1,7 +1,7 @@
 """Figure 11: single cues against several, with the arms close to the body.
 
 Source: Kehl (2006), section 7.2: with the surface alone an arm gets stuck to the body; with edges the whole sequence is followed. Here
-colours and all cues besides; shirt and skin are alike, as there. Takes about 10 minutes.
+colors and all cues besides; shirt and skin are alike, as there. Takes about 10 minutes.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from hmc.landmarks import LANDMARKS
 
 __all__ = ["EXPERIMENT"]
 
-CUES = ("surface", "surface, edges", "surface, colour", "SMD")
+CUES = ("surface", "surface, edges", "surface, color", "SMD")
 TITLES = {"SMD": "all cues"}
 ARMS = [LANDMARKS.index(name) for name in ("l_elbow", "l_wrist", "r_elbow", "r_wrist")]
 SHOWN_S = (1.9, 3.2, 6.2)

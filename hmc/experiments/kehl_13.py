@@ -13,11 +13,11 @@ import numpy as np
 
 from hmc.experiments import kehl_runs
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
-from hmc.experiments.engine.style import COLOURS
+from hmc.experiments.engine.style import COLORS
 
 __all__ = ["EXPERIMENT"]
 
-METHODS = {"SMD": COLOURS["sparse"], "LM": COLOURS["naive"], "LM, 5 times the points": COLOURS["particle"]}
+METHODS = {"SMD": COLORS["sparse"], "LM": COLORS["naive"], "LM, 5 times the points": COLORS["particle"]}
 #: In the table alone: what the comparison owes to the stop of LM, and to the axes of the descent.
 BESIDE = ("LM that stops early", "SMD along the parameters")
 PAPER = {"SMD": (28.9, 1.3), "LM, 5 times the points": (42.7, 0.73)}

@@ -11,7 +11,7 @@ import numpy as np
 
 from hmc.experiments import kehl_runs
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
-from hmc.experiments.engine.style import COLOURS
+from hmc.experiments.engine.style import COLORS
 from hmc.landmarks import LANDMARKS
 
 __all__ = ["EXPERIMENT"]
@@ -42,9 +42,9 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
             "paper_largest_turn_deg": PAPER_DEG,
         })  # fmt: skip
         if k == 0:
-            above.plot(one.results["frames"], true, color=COLOURS["paper"], linewidth=1, label="true")
-            above.plot(one.results["frames"], found, color=COLOURS["sparse"], label="estimated")
-        below.plot(one.results["frames"], errors, color=COLOURS["sparse"], alpha=0.6)
+            above.plot(one.results["frames"], true, color=COLORS["paper"], linewidth=1, label="true")
+            above.plot(one.results["frames"], found, color=COLORS["sparse"], label="estimated")
+        below.plot(one.results["frames"], errors, color=COLORS["sparse"], alpha=0.6)
     above.set(ylabel="right upper arm\nabove the level, degrees")
     above.legend()
     below.set(ylabel="mean joint error, mm", xlabel="frame")

@@ -1,4 +1,4 @@
-"""Figures 7 and 17: holding an object. Source: Kehl (2006), sections 6.1.3 and 7.5: a green cube prolongs the arm, and the colours of the
+"""Figures 7 and 17: holding an object. Source: Kehl (2006), sections 6.1.3 and 7.5: a green cube prolongs the arm, and the colors of the
 arm's patches keep the cube's voxels out of it. Takes about 5 minutes.
 """
 
@@ -15,13 +15,13 @@ from hmc.landmarks import LANDMARKS
 
 __all__ = ["EXPERIMENT"]
 
-CUES = {"SMD": "with colours", "surface, edges": "without colours"}
+CUES = {"SMD": "with colors", "surface, edges": "without colors"}
 ARM = [LANDMARKS.index(name) for name in ("r_elbow", "r_wrist")]
 SHOWN_S = (1.3, 2.0, 4.3)
 
 
 def grid(plan: Plan) -> list[dict]:
-    """With colours and without, three times each."""
+    """With colors and without, three times each."""
     return kehl_runs.cell_grid(plan.quick, plan.recordings, "play_cube", list(CUES), 3, SHOWN_S)
 
 
@@ -41,7 +41,7 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
             "holding_arm_within_50mm": float(np.mean([(e[:, ARM] <= 50).mean() for e in errors])),
         })  # fmt: skip
     detail = ", ".join(f"{CUES[name]} {value:.1f} mm" for name, value in arm.items())
-    claims = (Claim("colours bring the arm that holds the cube nearer", arm["SMD"] < arm["surface, edges"], detail),)
+    claims = (Claim("colors bring the arm that holds the cube nearer", arm["SMD"] < arm["surface, edges"], detail),)
     caption = "A cube in the right hand; holding arm: right elbow and wrist. The paper shows pictures only: Kehl, Figure 17."
     return Report((Table("kehl-17", caption, rows),), {"kehl-17": figure}, claims)
 

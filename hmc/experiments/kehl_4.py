@@ -1,4 +1,4 @@
-"""Figure 4: colour edges against Canny's on grey images, where shadows fall.
+"""Figure 4: color edges against Canny's on grey images, where shadows fall.
 
 Source: Kehl (2006), section 4.2, which shows one image. Here both detectors' thresholds are varied, and clutter is compared at equal
 recall: recall is the share of the true outline with an edge within 2 pixels, clutter what lies 4 to 60 pixels from the person and is not
@@ -19,16 +19,16 @@ from hmc.camera.color_edges import ColorEdgeSettings, color_edges
 from hmc.errors import InputError
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs, rendered
-from hmc.experiments.engine.style import COLOURS
+from hmc.experiments.engine.style import COLORS
 from hmc.io.recording import Recording, background_frames, iterate_frames
 
 __all__ = ["EXPERIMENT"]
 
 SETTINGS = ColorEdgeSettings()
-THRESHOLDS = {"colour": np.geomspace(0.01, 0.4, 14), "grey": np.geomspace(8, 400, 14)}
+THRESHOLDS = {"color": np.geomspace(0.01, 0.4, 14), "grey": np.geomspace(8, 400, 14)}
 RECALLS = (0.9, 0.95, 0.99)
 NEAR_PX, CLEAR_PX, AROUND_PX = 2, 4, 60
-TITLES = {"colour": "colour edges", "grey": "Canny, grey"}
+TITLES = {"color": "color edges", "grey": "Canny, grey"}
 
 
 def grid(plan: Plan) -> list[dict]:
@@ -99,7 +99,7 @@ def _images(recording: Recording, most: int):
 
 def _edges(name: str, image: np.ndarray) -> list[np.ndarray]:
     """One detector's edges at every threshold."""
-    if name == "colour":
+    if name == "color":
         strength = color_edges(image, replace(SETTINGS, threshold=float(THRESHOLDS[name][0]))).strength
         return [strength >= threshold for threshold in THRESHOLDS[name]]
     grey = cv2.GaussianBlur(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), (0, 0), SETTINGS.sigma_px)
@@ -115,9 +115,9 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     one = cells[0].results
     figure, panels = plt.subplots(1, 4, figsize=(12, 3.6), width_ratios=(1.6, 1, 1, 1))
     rows, at = [], {}
-    for name, colour in (("colour", COLOURS["sparse"]), ("grey", COLOURS["naive"])):
+    for name, color in (("color", COLORS["sparse"]), ("grey", COLORS["naive"])):
         recall, clutter = np.array(one["recall"][name], float), np.array(one["clutter_px"][name], float)
-        panels[0].plot(recall, clutter, "o-", color=colour, label=TITLES[name])
+        panels[0].plot(recall, clutter, "o-", color=color, label=TITLES[name])
         order = np.argsort(recall)
         at[name] = [float(np.interp(want, recall[order], clutter[order], right=np.nan)) for want in RECALLS]
         thresholds = [float(np.interp(want, recall[order], THRESHOLDS[name][order])) for want in RECALLS]
@@ -139,11 +139,11 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
         panel.imshow(picture[top:bottom, left:right].astype(np.uint8))
         panel.set(xticks=[], yticks=[], title=title)
         panel.grid(False)
-    pairs = list(zip(RECALLS, at["colour"], at["grey"], strict=True))
-    detail = ", ".join(f"{colour:.1f} and {grey:.1f} pixels at recall {want}" for want, colour, grey in pairs)
-    claims = (Claim("colour edges leave less clutter at equal recall", all(colour < grey for _, colour, grey in pairs), detail),)
+    pairs = list(zip(RECALLS, at["color"], at["grey"], strict=True))
+    detail = ", ".join(f"{color:.1f} and {grey:.1f} pixels at recall {want}" for want, color, grey in pairs)
+    claims = (Claim("color edges leave less clutter at equal recall", all(color < grey for _, color, grey in pairs), detail),)
     caption = "Edges around a person: clutter at equal recall of the outline. The paper shows one image: Kehl, Figure 4."
     return Report((Table("kehl-4", caption, rows),), {"kehl-4": figure}, claims)
 
 
-EXPERIMENT = Experiment("kehl-4", "colour edges against grey ones", "Kehl, Figure 4", grid, cell, report)
+EXPERIMENT = Experiment("kehl-4", "color edges against grey ones", "Kehl, Figure 4", grid, cell, report)

@@ -20,7 +20,7 @@ from hmc.body.solids import CHAINS, FREE, FREE_NAMES, GROUPS
 from hmc.experiments import kehl_runs
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs, rendered
-from hmc.experiments.engine.style import COLOURS
+from hmc.experiments.engine.style import COLORS
 from hmc.experiments.truth import HEIGHT_M, first_truth, standing_state, stature_m
 from hmc.landmarks import LANDMARKS
 from hmc.pose.steps.descent.tracker import make_cue_frame, make_tracker, optimise
@@ -59,9 +59,9 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
     # The paper has 10 points on the arm's surface and 10 on each contour.
     preset = replace(preset, cues=replace(preset.cues, surface_points=(60, 20, 10, 20, 20, 20), colors=None))
     dense = make_tracker(skeleton, replace(preset, times=5))
-    scene = make_cue_frame(dense, seen, state[FREE])
-    best, _, _ = optimise(rng, scene, state[FREE], [np.arange(len(FREE))])
-    best, _, _ = optimise(rng, scene, best, CHAINS, 0.5)
+    ready = make_cue_frame(dense, seen, state[FREE])
+    best, _, _ = optimise(rng, ready, state[FREE], [np.arange(len(FREE))])
+    best, _, _ = optimise(rng, ready, best, CHAINS, 0.5)
     goal = _ends(skeleton, best)
     distance: dict[str, list[float]] = {name: [] for name in METHODS}
     sizes = []
@@ -75,8 +75,8 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
         sizes.append(size)
         for name in METHODS:
             tracker = make_tracker(skeleton, replace(preset, optimiser=kehl_runs.preset_of(name).optimiser))
-            scene = make_cue_frame(tracker, seen, start)
-            found, _, _ = optimise(np.random.default_rng(seed), scene, start, [ARM], 0.5)
+            ready = make_cue_frame(tracker, seen, start)
+            found, _, _ = optimise(np.random.default_rng(seed), ready, start, [ARM], 0.5)
             distance[name].append(float(np.linalg.norm(_ends(skeleton, found) - goal, axis=1).max()))
     return {"distance_m": distance, "degrees": sizes}
 
@@ -94,11 +94,11 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     for name, title in METHODS.items():
         distance = np.concatenate([np.array(one.results["distance_m"][name], float) for one in cells])
         escaped[name] = int((distance < NEAR_M).sum())
-        colour = COLOURS["sparse"] if name == "SMD" else COLOURS["naive"]
-        axes.plot(np.sort(1000 * distance), np.arange(1, len(distance) + 1), color=colour, label=title, drawstyle="steps-post")
+        color = COLORS["sparse"] if name == "SMD" else COLORS["naive"]
+        axes.plot(np.sort(1000 * distance), np.arange(1, len(distance) + 1), color=color, label=title, drawstyle="steps-post")
         rows.append({"sampling": title, "displacements": len(distance), "led_back": escaped[name],
                      "median_distance_mm": float(1000 * np.median(distance))})  # fmt: skip
-    axes.axvline(1000 * NEAR_M, color=COLOURS["paper"], linewidth=1, linestyle="--")
+    axes.axvline(1000 * NEAR_M, color=COLORS["paper"], linewidth=1, linestyle="--")
     axes.set(xlabel="elbow or wrist off the best pose, the farther, mm", ylabel="displacements")
     axes.legend()
     detail = f"{escaped['SMD']} and {escaped['deterministic']} of {rows[0]['displacements']}"

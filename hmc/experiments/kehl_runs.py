@@ -1,7 +1,7 @@
 """One person followed by multi-cue descent through a rendered recording: what the experiments of Kehl (2006), section 7, share.
 
 The recordings are rendered after the paper's descriptions, for its own are not public: five cameras (four in corners, one overhead), 15
-frames a second, 640 x 480 pixels; each begins in the pose of da Vinci's man. Only the tracker is timed: hulls and colours are made before.
+frames a second, 640 x 480 pixels; each begins in the pose of da Vinci's man. Only the tracker is timed: hulls and colors are made before.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from hmc.camera.model import project
 from hmc.errors import InputError
 from hmc.experiments.engine.experiment import Cell, Parameters, Results, Source
 from hmc.experiments.engine.inputs import Inputs, rendered
-from hmc.experiments.engine.style import COLOURS
+from hmc.experiments.engine.style import COLORS
 from hmc.experiments.truth import first_truth, stature_m
 from hmc.io.recording import Recording
 from hmc.landmarks import BONES, LANDMARKS
@@ -55,7 +55,7 @@ VARIANTS: dict[str, tuple[dict, dict]] = {
     "SMD along the parameters": ({}, {"descent": ALONG_PARAMETERS, "tolerance_m": 0.005, "tolerance_deg": 0.5}),
     "surface": (_SURFACE, {}),
     "surface, edges": ({"colors": None}, {}),
-    "surface, colour": ({"edge_weight": 0.0}, {}),
+    "surface, color": ({"edge_weight": 0.0}, {}),
 }
 
 
@@ -177,6 +177,6 @@ def shown(axes, picture: dict, title: str) -> None:
         return
     axes.imshow(image[..., ::-1])
     for start, end in BONES:
-        side = {"l_": COLOURS["sparse"], "r_": COLOURS["particle"]}.get(end[:2], COLOURS["person"])
+        side = {"l_": COLORS["sparse"], "r_": COLORS["particle"]}.get(end[:2], COLORS["person"])
         axes.plot(*uv[[LANDMARKS.index(start), LANDMARKS.index(end)]].T, color=side)
     axes.set(xlim=(0, image.shape[1]), ylim=(image.shape[0], 0))

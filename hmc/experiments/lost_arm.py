@@ -18,7 +18,7 @@ import numpy as np
 from hmc.camera.model import Camera, Rig, project
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Source, Table
 from hmc.experiments.engine.inputs import Inputs, once, rendered
-from hmc.experiments.engine.style import COLOURS
+from hmc.experiments.engine.style import COLORS
 from hmc.experiments.markerless_runs import MASKS_KEY, VOXEL_M, run_method, tracked
 from hmc.experiments.truth import estimate_of, first_truth
 from hmc.io.masks import MaskStep, keep_masks, kept_masks
@@ -147,9 +147,9 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
                 "mean_after_mm": 1000 * float(np.nanmean(after[GIVEN:])),
             }
         )
-        axes.plot(frames - last, 1000 * errors, color=COLOURS["particle"], alpha=0.5, linewidth=0.8)
-    axes.axvspan(first - last, 0, color=COLOURS["paper"], alpha=0.1)
-    axes.axvline(GIVEN, color=COLOURS["other"], linewidth=0.8)
+        axes.plot(frames - last, 1000 * errors, color=COLORS["particle"], alpha=0.5, linewidth=0.8)
+    axes.axvspan(first - last, 0, color=COLORS["paper"], alpha=0.1)
+    axes.axvline(GIVEN, color=COLORS["other"], linewidth=0.8)
     axes.set(xlabel="frames since the arm can be seen again", ylabel="worse of elbow and wrist (mm)", ylim=(0, None))
     lost = [row for row in rows if row["worst_while_gone_mm"] > 1000 * LOST_M]
     slow = [row for row in rows if row["frames_until_taken_back"] is None or row["frames_until_taken_back"] > GIVEN]

@@ -16,7 +16,7 @@ import numpy as np
 from hmc.experiments.by_action import pose_scores
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs, rendered
-from hmc.experiments.engine.style import COLOURS
+from hmc.experiments.engine.style import COLORS
 from hmc.experiments.five_actions import LONG_SUFFIX, action_name, action_title
 from hmc.experiments.markerless_runs import VOXEL_M, action_sources, change_hulls, pose_results, run_method, tracked
 from hmc.experiments.truth import estimates
@@ -210,8 +210,8 @@ def _gap_rows(cells: Sequence[Cell]) -> tuple[list[dict[str, Any]], plt.Figure]:
                 "last_quarter_second_mm": float(np.nanmean(after[-max(1, round(fps / 4)) :])),
             }
         )
-        axes.plot((frames - last) / fps, errors, color=COLOURS["particle" if way == DEFAULT else "sparse"], label=way)
-    axes.axvspan(-(GONE_S[1] - GONE_S[0]), 0, color=COLOURS["paper"], alpha=0.1)
+        axes.plot((frames - last) / fps, errors, color=COLORS["particle" if way == DEFAULT else "sparse"], label=way)
+    axes.axvspan(-(GONE_S[1] - GONE_S[0]), 0, color=COLORS["paper"], alpha=0.1)
     axes.set(xlabel="seconds since the walker can be seen again", ylabel="mean error (mm)", ylim=(0, None))
     handles = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
     axes.legend(handles.values(), handles.keys())

@@ -1,4 +1,4 @@
-"""Table 4.3 and Figure 4.11: MOTP and MOTA of the three trackers by voxel size, number of samples or particles, and colour.
+"""Table 4.3 and Figure 4.11: MOTP and MOTA of the three trackers by voxel size, number of samples or particles, and color.
 
 Source: Canton (2009), section 4.4.2. Two presets are run: ``canton2009``, the parameters as the thesis prints them, and ``default``, ours.
 """
@@ -142,7 +142,7 @@ def _claims(preset: str, scores: dict[Configuration, runs.Score]) -> list[Claim]
         return float(np.mean([getattr(s, key) for (v, m, n), s in own.items() if where.get("v", v) == v and where.get("m", m) == m]))
 
     per_voxel = {key: [mean(key, v=voxel) for voxel in voxels] for key in ("motp_mm", "mota")}
-    colour = {key: [mean(key, m=f"{name} color") - mean(key, m=f"{name} raw") for name in ("SS", "PF")] for key in ("motp_mm", "mota")}
+    color = {key: [mean(key, m=f"{name} color") - mean(key, m=f"{name} raw") for name in ("SS", "PF")] for key in ("motp_mm", "mota")}
     numbers = {name: sorted({n for _, m, n in own if m == name and n}) for name in ("SS raw", "SS color", "PF raw", "PF color")}
     few, many = (float(np.mean([own[v, name, some[place]].motp_mm for name, some in numbers.items() for v in voxels])) for place in (0, -1))
     return [
@@ -157,10 +157,10 @@ def _claims(preset: str, scores: dict[Configuration, runs.Score]) -> list[Claim]
             ", ".join(f"{100 * v:g} cm {p:.0f} mm {100 * a:.1f} %" for v, p, a in zip(voxels, *per_voxel.values(), strict=True)),
         ),
         Claim(
-            f"{preset}: colour is better, in MOTP and MOTA, of SS and PF",
-            max(colour["motp_mm"]) < 0 and min(colour["mota"]) > 0,
-            f"SS {colour['motp_mm'][0]:+.1f} mm {100 * colour['mota'][0]:+.2f} %, "
-            f"PF {colour['motp_mm'][1]:+.1f} mm {100 * colour['mota'][1]:+.2f} %",
+            f"{preset}: color is better, in MOTP and MOTA, of SS and PF",
+            max(color["motp_mm"]) < 0 and min(color["mota"]) > 0,
+            f"SS {color['motp_mm'][0]:+.1f} mm {100 * color['mota'][0]:+.2f} %, "
+            f"PF {color['motp_mm'][1]:+.1f} mm {100 * color['mota'][1]:+.2f} %",
         ),
         Claim(f"{preset}: more samples or particles lower MOTP", many < few, f"{few:.0f} mm with the fewest, {many:.0f} mm with the most"),
     ]  # fmt: skip

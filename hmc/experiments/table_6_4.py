@@ -14,7 +14,7 @@ import numpy as np
 from hmc.experiments import markerless_runs as runs
 from hmc.experiments.by_action import AVERAGE, action_rows
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
-from hmc.experiments.engine.style import COLOURS
+from hmc.experiments.engine.style import COLORS
 
 __all__ = ["EXPERIMENT", "PAPER", "PRESETS"]
 
@@ -27,7 +27,7 @@ PAPER = {
     AVERAGE: (121.18, 45.92, 90.17, 71.36, 10.12, 3.33),
 }
 PRESETS = ("default", "canton2009")
-_COLOURS = (COLOURS["particle"], COLOURS["sparse"], COLOURS["person"], COLOURS["other"])
+_COLORS = (COLORS["particle"], COLORS["sparse"], COLORS["person"], COLORS["other"])
 
 
 def grid(plan: Plan) -> list[dict]:
@@ -74,8 +74,8 @@ def bars(rows: Sequence[dict], methods: Sequence[str], paper: dict) -> plt.Figur
     for axes, column, k, label in zip(panels, ("mean_mm", "MMTA_percent"), (0, 3), ("mean error (mm)", "MMTA at 100 mm (%)"), strict=True):
         series = {name: [next(r[column] for r in shown if (r["method"], r["action"]) == (name, a)) for a in actions] for name in methods}
         series["the paper"] = [paper[action][k] if action in paper else np.nan for action in actions]
-        for j, (values, colour) in enumerate(zip(series.items(), _COLOURS[: len(methods)] + (COLOURS["paper"],), strict=True)):
-            axes.bar(np.arange(len(actions)) + j * width, values[1], width, label=values[0], color=colour)
+        for j, (values, color) in enumerate(zip(series.items(), _COLORS[: len(methods)] + (COLORS["paper"],), strict=True)):
+            axes.bar(np.arange(len(actions)) + j * width, values[1], width, label=values[0], color=color)
         axes.set_xticks(np.arange(len(actions)) + width * len(methods) / 2, actions, rotation=30, ha="right")
         axes.set_ylabel(label)
     panels[0].legend()

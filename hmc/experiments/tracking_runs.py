@@ -14,7 +14,7 @@ import numpy as np
 
 from hmc.experiments.engine.experiment import Cell, Parameters, Plan, Results, Source
 from hmc.experiments.engine.inputs import Inputs, rendered
-from hmc.experiments.engine.style import COLOURS
+from hmc.experiments.engine.style import COLORS
 from hmc.io.recording import iterate_frames
 from hmc.io.results import TrackTable, read_centroids
 from hmc.metrics.scores import evaluate_tracks
@@ -107,7 +107,7 @@ def method_name(parameters: Parameters) -> str:
 
 def style_of(tracker: str, color: bool) -> dict[str, str]:
     """How a tracker's lines are drawn: with color whole, without dashed where it could use colors."""
-    return {"color": COLOURS.get(tracker, COLOURS["other"]), "linestyle": "-" if color or not TRACKERS[tracker].uses_colors else "--"}
+    return {"color": COLORS.get(tracker, COLORS["other"]), "linestyle": "-" if color or not TRACKERS[tracker].uses_colors else "--"}
 
 
 def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Results:

@@ -15,7 +15,7 @@ import numpy as np
 from hmc.experiments import markerless_runs as runs
 from hmc.experiments.by_action import pose_scores
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
-from hmc.experiments.engine.style import COLOURS
+from hmc.experiments.engine.style import COLORS
 
 __all__ = ["EXPERIMENT"]
 
@@ -84,9 +84,9 @@ def _draw(rows: Sequence[dict], cameras: Sequence[int]) -> plt.Figure:
     for axes, number in zip(panels[0], cameras, strict=True):
         own = [row for row in rows if row["cameras"] == (number or "all")]
         places = np.arange(len(own))[::-1]
-        colours = [COLOURS["paper"] if row["without"] not in runs.SWITCHES else COLOURS["particle"] for row in own]
-        axes.barh(places, [row["mean_mm"] for row in own], xerr=[row["mean_spread_mm"] for row in own], color=colours, capsize=2)
-        axes.axvline(own[0]["mean_mm"], color=COLOURS["paper"], linewidth=0.8)
+        colors = [COLORS["paper"] if row["without"] not in runs.SWITCHES else COLORS["particle"] for row in own]
+        axes.barh(places, [row["mean_mm"] for row in own], xerr=[row["mean_spread_mm"] for row in own], color=colors, capsize=2)
+        axes.axvline(own[0]["mean_mm"], color=COLORS["paper"], linewidth=0.8)
         axes.set_yticks(places, [row["without"] for row in own])
         axes.set(xlabel="mean error (mm)", title=f"{number or 'all'} cameras, without")
     return figure

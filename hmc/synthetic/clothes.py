@@ -1,4 +1,4 @@
-"""What actors wear, and the colour of every point of them."""
+"""What actors wear, and the color of every point of them."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from hmc.synthetic.skeleton import BONE_NAMES, PosedSkeleton
 
 __all__ = ["PATTERNS", "Clothes", "dress"]
 
-#: `markers` is plain, with little balls of the pattern's colour on the joints (`hmc.synthetic.markers`).
+#: `markers` is plain, with little balls of the pattern's color on the joints (`hmc.synthetic.markers`).
 PATTERNS = ("plain", "stripes", "checks", "dots", "markers")
 
 
 @dataclass(frozen=True)
 class Clothes:
-    """What an actor wears; colours are sRGB triples in [0, 1].
+    """What an actor wears; colors are sRGB triples in [0, 1].
 
     Parameters
     ----------
     shirt, trousers, skin, hair, shoes : tuple of float
     pattern : {"plain", "stripes", "checks", "dots", "markers"}
         Of the shirt.
-    pattern_colour : tuple of float
+    pattern_color : tuple of float
     sleeves, legs : {"long", "short"}
     long_hair : bool
     loose_m : float
@@ -37,7 +37,7 @@ class Clothes:
     hair: tuple[float, float, float] = (0.22, 0.15, 0.10)
     shoes: tuple[float, float, float] = (0.10, 0.10, 0.11)
     pattern: str = "plain"
-    pattern_colour: tuple[float, float, float] = (0.85, 0.85, 0.80)
+    pattern_color: tuple[float, float, float] = (0.85, 0.85, 0.80)
     sleeves: str = "short"
     legs: str = "long"
     long_hair: bool = False
@@ -45,7 +45,7 @@ class Clothes:
 
 
 def dress(region: np.ndarray, vertices: np.ndarray, posed: PosedSkeleton, clothes: Clothes, rng: np.random.Generator) -> np.ndarray:
-    """The colour of every point of a skin: face, hair and clothes, with the folds of cloth.
+    """The color of every point of a skin: face, hair and clothes, with the folds of cloth.
 
     Parameters
     ----------
@@ -87,25 +87,25 @@ def dress(region: np.ndarray, vertices: np.ndarray, posed: PosedSkeleton, clothe
     head = vertices - joints[BONE_NAMES.index("head")]
     scalp = np.isin(region, ["head"]) & ((head[:, 2] > 0.095) | ((head[:, 0] < -0.005) & (head[:, 2] > 0.0)))
     hair = scalp | np.isin(region, ["hair", "long_hair"])
-    colour = np.tile(np.array(clothes.skin, float), (len(vertices), 1))
+    color = np.tile(np.array(clothes.skin, float), (len(vertices), 1))
     for mask, value in (
         (shirt, clothes.shirt),
         (trousers, clothes.trousers),
         (hair, clothes.hair),
         (np.isin(region, ["foot", "toes"]), clothes.shoes),
     ):
-        colour[mask] = value
-    colour[shirt & _pattern(clothes.pattern, vertices)] = clothes.pattern_colour
-    colour[trousers & (height > 0.165) & (height <= 0.20)] *= 0.5  # a belt
+        color[mask] = value
+    color[shirt & _pattern(clothes.pattern, vertices)] = clothes.pattern_color
+    color[trousers & (height > 0.165) & (height <= 0.20)] *= 0.5  # a belt
     face = (region == "head") & (head[:, 0] > 0.07)
     scale = skeleton.height_m / 1.75
     eyes = face & (np.abs(head[:, 2] - 0.040 * scale) < 0.010) & (np.abs(np.abs(vertices[:, 1]) - 0.031 * scale) < 0.014)
     mouth = face & (np.abs(head[:, 2] + 0.035 * scale) < 0.007) & (np.abs(vertices[:, 1]) < 0.024 * scale)
-    colour[eyes] *= 0.45
-    colour[mouth] *= [0.85, 0.55, 0.55]
+    color[eyes] *= 0.45
+    color[mouth] *= [0.85, 0.55, 0.55]
     cloth = shirt | trousers
     folds = sum(np.sin(vertices @ rng.normal(0, 45, 3) + rng.uniform(0, 2 * np.pi)) for _ in range(6)) / 6
-    linear = colour[:, ::-1] ** 2.2
+    linear = color[:, ::-1] ** 2.2
     return linear * np.where(cloth, 1 + 0.16 * folds, 1 + 0.04 * folds)[:, None]
 
 

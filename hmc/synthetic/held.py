@@ -17,7 +17,7 @@ __all__ = ["with_cube"]
 _EDGE_M = 0.03
 
 
-def with_cube(actor: Actor, side_m: float, colour: tuple[float, float, float]) -> Actor:
+def with_cube(actor: Actor, side_m: float, color: tuple[float, float, float]) -> Actor:
     """An actor who holds a cube; it counts as part of the arm in what is rendered as truth of silhouettes.
 
     Parameters
@@ -25,7 +25,7 @@ def with_cube(actor: Actor, side_m: float, colour: tuple[float, float, float]) -
     actor : Actor
     side_m : float
         Metres.
-    colour : tuple of float
+    color : tuple of float
         sRGB in [0, 1].
 
     Returns
@@ -37,7 +37,7 @@ def with_cube(actor: Actor, side_m: float, colour: tuple[float, float, float]) -
     outwards = outwards / np.linalg.norm(outwards)
     reach = float(((actor.vertices - actor.bind_joints[hand])[actor.bones == hand] @ outwards).max())
     centre = actor.bind_joints[hand] + (0.8 * reach + side_m / 2) * outwards
-    box = Box(centre, np.full(3, side_m / 2), 0.0, "plain", colour)
+    box = Box(centre, np.full(3, side_m / 2), 0.0, "plain", color)
     vertices, normals, albedo, triangles = paint_boxes((box,), _EDGE_M, 0)
     n = len(vertices)
     weights = sparse.csr_matrix((np.ones(n), (np.arange(n), np.full(n, hand))), shape=(n, len(BONE_NAMES)))

@@ -97,7 +97,7 @@ def make_backdrop(scene: Scene, camera: Camera, furniture: tuple[ShadowMap, ...]
     width, height = camera.size
     v, u = np.mgrid[0:height, 0:width]
     pixels = np.stack([u.ravel(), v.ravel()], axis=1).astype(float)
-    # Colours are averaged over each pixel; light, which changes slowly, is taken at its middle.
+    # Colors are averaged over each pixel; light, which changes slowly, is taken at its middle.
     albedo = np.zeros((len(pixels), 3))
     for offset in ((-0.25, -0.25), (0.25, -0.25), (-0.25, 0.25), (0.25, 0.25)):
         albedo += cast_rays(scene.room, camera.centre, backproject(camera, pixels + offset)).albedo / 4
@@ -196,11 +196,11 @@ def picture(scene: Scene, camera: Camera, backdrop: Backdrop, lit: LitCrowd) -> 
         pixel = row // SAMPLES * width + column // SAMPLES
         free = seen.depth < backdrop.depth[pixel]  # furniture and walls may stand before the person
         pixel, triangles, weights = pixel[free], crowd.triangles[seen.triangles[free]], seen.weights[free]
-        colour = np.einsum("nk,nkc->nc", weights, lit.radiance[triangles]) * backdrop.gain
+        color = np.einsum("nk,nkc->nc", weights, lit.radiance[triangles]) * backdrop.gain
         touched, place = np.unique(pixel, return_inverse=True)
         share = 1.0 / SAMPLES**2
         coverage = np.bincount(place, minlength=len(touched)) * share
-        added = np.stack([np.bincount(place, colour[:, c], len(touched)) for c in range(3)], axis=1) * share
+        added = np.stack([np.bincount(place, color[:, c], len(touched)) for c in range(3)], axis=1) * share
         radiance[touched] = radiance[touched] * (1 - coverage)[:, None] + added * backdrop.vignette[touched, None]
         # Furniture that moves is -1, so its row comes first and gives 0.
         whose = crowd.persons[triangles[:, 0]]
@@ -250,7 +250,7 @@ def develop(radiance: np.ndarray, size: tuple[int, int], scene: Scene, rng: np.r
     # The gamma curve from a table: a power for every value would be the slowest step of all.
     place = np.clip(radiance * np.float32(gain * (_GAMMA.size - 1)), 0, _GAMMA.size - 1).astype(np.int32)
     grey = _GAMMA[place]
-    # Neighbouring pixels share noise, as after the interpolation of a colour sensor.
+    # Neighbouring pixels share noise, as after the interpolation of a color sensor.
     white = rng.standard_normal((size[1], size[0], 3), dtype=np.float32)
     noise = np.asarray(cv2.GaussianBlur(white, (5, 5), _GRAIN_SIGMA)).reshape(grey.shape)
     grey += noise * np.sqrt(np.float32(sensor.read_noise**2) + np.float32(sensor.shot_noise**2 / 255) * grey) / _GRAIN_SPREAD

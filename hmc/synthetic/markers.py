@@ -1,4 +1,4 @@
-"""Little coloured balls on an actor's joints, as marker-based motion capture has them."""
+"""Little colored balls on an actor's joints, as marker-based motion capture has them."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ _PLACES: tuple[tuple[str, str, tuple[float, float, float]], ...] = (
 _BESIDE_M, _ALONG_M = 0.025, 0.3
 
 
-def with_balls(actor: Actor, colour: tuple[float, float, float]) -> Actor:
+def with_balls(actor: Actor, color: tuple[float, float, float]) -> Actor:
     """An actor with a ball beside each of fifteen joints.
 
     Parameters
     ----------
     actor : Actor
-    colour : tuple of float
+    color : tuple of float
         sRGB in [0, 1].
 
     Returns
@@ -53,7 +53,7 @@ def with_balls(actor: Actor, colour: tuple[float, float, float]) -> Actor:
         normals.append(ball)
         weights.append(sparse.csr_matrix(np.repeat(actor.weights[[skin]].toarray(), len(ball), axis=0)))
         on += [skin] * len(ball)
-    paint = np.tile(np.array(colour, float)[::-1] ** 2.2, (len(on), 1))
+    paint = np.tile(np.array(color, float)[::-1] ** 2.2, (len(on), 1))
     return replace(
         actor,
         vertices=np.concatenate(vertices),

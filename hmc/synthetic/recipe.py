@@ -28,7 +28,7 @@ __all__ = [
     "shipped_recipes",
 ]
 
-Colour = tuple[float, float, float]
+Color = tuple[float, float, float]
 
 _CHECKOUT = Path(__file__).resolve().parents[2] / "data" / "synthetic"
 #: Shipped recipes: in a checkout, else where an installation puts its data (pyproject.toml).
@@ -46,7 +46,7 @@ MOST_ACTORS = 5
 
 @dataclass(frozen=True)
 class RoomRecipe:
-    """Walls and floor; colours are sRGB in [0, 1]. One texture or colour serves all four walls, or there are four.
+    """Walls and floor; colors are sRGB in [0, 1]. One texture or color serves all four walls, or there are four.
 
     A door is a wall (0 x low, 1 x high, 2 y low, 3 y high) and the place of its middle along it, metres: a dark opening through which the
     actors of scripts come and go.
@@ -54,9 +54,9 @@ class RoomRecipe:
 
     size_m: tuple[float, float, float] = (6.4, 5.6, 3.2)
     walls: tuple[str, ...] = ("plaster",)
-    wall_colours: tuple[Colour, ...] = ((0.72, 0.74, 0.70),)
+    wall_colors: tuple[Color, ...] = ((0.72, 0.74, 0.70),)
     floor: str = "tiles"
-    floor_colour: Colour = (0.60, 0.58, 0.56)
+    floor_color: Color = (0.60, 0.58, 0.56)
     posters: int = 5
     doors: tuple[tuple[int, float], ...] = ()
 
@@ -90,7 +90,7 @@ class FurnitureRecipe:
     at_m: tuple[float, float]
     heading_deg: float = 0.0
     size_m: tuple[float, float, float] | None = None
-    colour: Colour = (0.55, 0.42, 0.30)
+    color: Color = (0.55, 0.42, 0.30)
     texture: str = "wood"
     moves: tuple[tuple[float, float, float, float], ...] = ()
 
@@ -140,7 +140,7 @@ class ActorRecipe:
     build : str or float
         thin, slim, average, sturdy, heavy, or a number from -1 to 1.
     sex : {"man", "woman"}
-    shirt, trousers, skin, hair, shoes, pattern_colour : tuple of float
+    shirt, trousers, skin, hair, shoes, pattern_color : tuple of float
         sRGB in [0, 1].
     pattern : {"plain", "stripes", "checks", "dots"}
         Of the shirt.
@@ -150,7 +150,7 @@ class ActorRecipe:
         How far clothes stand off the body, metres.
     cube_m : float
         Side of a cube in the right hand, metres; 0: none.
-    cube_colour : tuple of float
+    cube_color : tuple of float
         sRGB in [0, 1].
     motion : str
         One of `MOTIONS`.
@@ -173,19 +173,19 @@ class ActorRecipe:
     height_m: float = 1.75
     build: str | float = "average"
     sex: str = "man"
-    shirt: Colour = (0.16, 0.32, 0.55)
-    trousers: Colour = (0.25, 0.24, 0.22)
-    skin: Colour = (0.82, 0.62, 0.50)
-    hair: Colour = (0.22, 0.15, 0.10)
-    shoes: Colour = (0.10, 0.10, 0.11)
+    shirt: Color = (0.16, 0.32, 0.55)
+    trousers: Color = (0.25, 0.24, 0.22)
+    skin: Color = (0.82, 0.62, 0.50)
+    hair: Color = (0.22, 0.15, 0.10)
+    shoes: Color = (0.10, 0.10, 0.11)
     pattern: str = "plain"
-    pattern_colour: Colour = (0.85, 0.85, 0.80)
+    pattern_color: Color = (0.85, 0.85, 0.80)
     sleeves: str = "short"
     legs: str = "long"
     long_hair: bool = False
     loose_m: float = 0.007
     cube_m: float = 0.0
-    cube_colour: Colour = (0.15, 0.55, 0.20)
+    cube_color: Color = (0.15, 0.55, 0.20)
     motion: str = "walk"
     start_m: tuple[float, float] = (0.0, 0.0)
     heading_deg: float = 0.0
@@ -362,9 +362,9 @@ def _check(recipe: Recipe, where: str) -> None:
     among(recipe.rig.kind, RIGS, "rig kind")
     for texture in (*recipe.room.walls, recipe.room.floor, *(item.texture for item in recipe.furniture)):
         among(texture, TEXTURES, "texture")
-    for count in (len(recipe.room.walls), len(recipe.room.wall_colours)):
+    for count in (len(recipe.room.walls), len(recipe.room.wall_colors)):
         if count not in (1, 4):
-            raise InputError(f"{where}: [room] takes one wall texture and colour or four of each; got {count}")
+            raise InputError(f"{where}: [room] takes one wall texture and color or four of each; got {count}")
     for item in recipe.furniture:
         among(item.kind, FURNITURE, "furniture")
     for wall, _ in recipe.room.doors:

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hmc.errors import InputError
-from hmc.synthetic.textures import colour_of, poster_colour
+from hmc.synthetic.textures import color_of, poster_color
 
 __all__ = ["DOOR_M", "FURNITURE", "Box", "Hits", "Room", "box_mesh", "cast_rays", "furnish", "paint_boxes"]
 
-Colour = tuple[float, float, float]
+Color = tuple[float, float, float]
 Point = tuple[float, float, float]
 
 
@@ -26,7 +26,7 @@ class Box:
     yaw : float
         Radians.
     texture : str
-    colour : tuple of float
+    color : tuple of float
         sRGB.
     """
 
@@ -34,7 +34,7 @@ class Box:
     half: np.ndarray
     yaw: float
     texture: str
-    colour: Colour
+    color: Color
 
     @property
     def axes(self) -> np.ndarray:
@@ -51,9 +51,9 @@ class Room:
     ----------
     corners : ndarray, shape (2, 3)
         Lowest and highest corner, metres; the floor is at z = 0.
-    walls : tuple of (texture, colour)
+    walls : tuple of (texture, color)
         Four walls: x low, x high, y low, y high.
-    floor : (texture, colour)
+    floor : (texture, color)
     boxes : tuple of Box
     posters : tuple of (wall, along, height, width, tall), metres
     doors : tuple of (wall, along), metres
@@ -63,13 +63,13 @@ class Room:
     """
 
     corners: np.ndarray
-    walls: tuple[tuple[str, Colour], ...]
-    floor: tuple[str, Colour]
+    walls: tuple[tuple[str, Color], ...]
+    floor: tuple[str, Color]
     boxes: tuple[Box, ...] = ()
     posters: tuple[tuple[int, float, float, float, float], ...] = ()
     seed: int = 0
     doors: tuple[tuple[int, float], ...] = ()
-    ceiling: tuple[str, Colour] = field(default=("plain", (0.85, 0.85, 0.84)))
+    ceiling: tuple[str, Color] = field(default=("plain", (0.85, 0.85, 0.84)))
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,7 @@ FURNITURE = {
 
 
 def furnish(
-    kind: str, at_m, heading_deg: float = 0.0, size_m=None, colour: Colour = (0.55, 0.42, 0.30), texture: str = "wood"
+    kind: str, at_m, heading_deg: float = 0.0, size_m=None, color: Color = (0.55, 0.42, 0.30), texture: str = "wood"
 ) -> tuple[Box, ...]:
     """The boxes of a piece of furniture.
 
@@ -133,7 +133,7 @@ def furnish(
     heading_deg : float
         Where its own x points.
     size_m : (width, depth, height), optional
-    colour : tuple of float
+    color : tuple of float
         sRGB.
     texture : str
 
@@ -154,7 +154,7 @@ def furnish(
     boxes = []
     for centre, half in build(*(size_m or default)):
         place = np.append(turn @ np.array(centre[:2]) + np.array(at_m), centre[2])
-        boxes.append(Box(place, np.array(half), yaw, texture, colour))
+        boxes.append(Box(place, np.array(half), yaw, texture, color))
     return tuple(boxes)
 
 
@@ -183,14 +183,14 @@ def cast_rays(room: Room, origin: np.ndarray, rays: np.ndarray) -> Hits:
     albedo = np.zeros_like(point)
     surfaces = [*((0, False, room.walls[0]), (0, True, room.walls[1]), (1, False, room.walls[2]), (1, True, room.walls[3]))]
     surfaces += [(2, False, room.floor), (2, True, room.ceiling)]
-    for k, (a, side, (texture, colour)) in enumerate(surfaces):
+    for k, (a, side, (texture, color)) in enumerate(surfaces):
         seen = (axis == a) & (positive == side)
         u, v = point[seen][:, [i for i in range(3) if i != a]].T
-        albedo[seen] = colour_of(texture, colour, u, v, room.seed + 31 * k)
+        albedo[seen] = color_of(texture, color, u, v, room.seed + 31 * k)
     for k, (wall, along, height, width, tall) in enumerate(room.posters):
         u, v = (point[:, 1 - wall // 2] - along) / width + 0.5, (point[:, 2] - height) / tall + 0.5
         seen = (axis == wall // 2) & (positive == bool(wall % 2)) & (u >= 0) & (u < 1) & (v >= 0) & (v < 1)
-        albedo[seen] = poster_colour(u[seen], v[seen], room.seed + 101 * k)
+        albedo[seen] = poster_color(u[seen], v[seen], room.seed + 101 * k)
     for wall, along in room.doors:
         aside, up = np.abs(point[:, 1 - wall // 2] - along), point[:, 2]
         seen = (axis == wall // 2) & (positive == bool(wall % 2)) & (aside < DOOR_M[0] / 2 + 0.06) & (up < DOOR_M[1] + 0.06)
@@ -225,7 +225,7 @@ def _meet_box(
     local = start + t[:, None] * turned
     others = np.array([[1, 2], [0, 2], [0, 1]])[axis]
     u, v = np.take_along_axis(local, others, axis=1).T
-    albedo[index] = colour_of(box.texture, box.colour, u, v, seed)
+    albedo[index] = color_of(box.texture, box.color, u, v, seed)
 
 
 def box_mesh(boxes: tuple[Box, ...], edge_m: float = 0.06) -> tuple[np.ndarray, np.ndarray]:
@@ -252,7 +252,7 @@ def box_mesh(boxes: tuple[Box, ...], edge_m: float = 0.06) -> tuple[np.ndarray, 
 
 
 def paint_boxes(boxes: tuple[Box, ...], edge_m: float, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """The mesh of `box_mesh` with normals and colours, for furniture that moves.
+    """The mesh of `box_mesh` with normals and colors, for furniture that moves.
 
     Returns
     -------
@@ -266,5 +266,5 @@ def paint_boxes(boxes: tuple[Box, ...], edge_m: float, seed: int) -> tuple[np.nd
     # Every vertex belongs to one face, so any of its triangles tells its normal.
     normals[triangles] = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, None]
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    albedo = colour_of(boxes[0].texture, boxes[0].colour, vertices[:, 0] + vertices[:, 1], vertices[:, 2], seed)
+    albedo = color_of(boxes[0].texture, boxes[0].color, vertices[:, 0] + vertices[:, 1], vertices[:, 2], seed)
     return vertices, normals, albedo, triangles

@@ -125,24 +125,24 @@ def build_scene(recipe: Recipe, seed: int | None = None) -> Scene:
     corners = np.array([[-x / 2, -y / 2, 0.0], [x / 2, y / 2, z]])
     rig = make_rig(recipe.rig, corners, rng_rig)
     walls = recipe.room.walls * (4 // len(recipe.room.walls))
-    colours = recipe.room.wall_colours * (4 // len(recipe.room.wall_colours))
+    colors = recipe.room.wall_colors * (4 // len(recipe.room.wall_colors))
     fixed = [item for item in recipe.furniture if not item.moves]
-    boxes = tuple(box for f in fixed for box in furnish(f.kind, f.at_m, f.heading_deg, f.size_m, f.colour, f.texture))
+    boxes = tuple(box for f in fixed for box in furnish(f.kind, f.at_m, f.heading_deg, f.size_m, f.color, f.texture))
     posters = tuple(
         (k % 4, float(rng_room.uniform(-0.33, 0.33) * (y if k % 4 < 2 else x)), float(rng_room.uniform(1.5, 1.9)), 0.5, 0.65)
         for k in range(recipe.room.posters)
     )
     room = Room(
         corners,
-        tuple(zip(walls, colours, strict=True)),
-        (recipe.room.floor, recipe.room.floor_colour),
+        tuple(zip(walls, colors, strict=True)),
+        (recipe.room.floor, recipe.room.floor_color),
         boxes,
         posters,
         int(rng_room.integers(2**16)),
         recipe.room.doors,
     )
     props = tuple(
-        Prop(f, *paint_boxes(furnish(f.kind, f.at_m, f.heading_deg, f.size_m, f.colour, f.texture), _PROP_EDGE_M, room.seed))
+        Prop(f, *paint_boxes(furnish(f.kind, f.at_m, f.heading_deg, f.size_m, f.color, f.texture), _PROP_EDGE_M, room.seed))
         for f in recipe.furniture
         if f.moves
     )
@@ -151,11 +151,11 @@ def build_scene(recipe: Recipe, seed: int | None = None) -> Scene:
     actors, motions = [], []
     for k, a in enumerate(recipe.actors):
         clothes = Clothes(
-            a.shirt, a.trousers, a.skin, a.hair, a.shoes, a.pattern, a.pattern_colour, a.sleeves, a.legs, a.long_hair, a.loose_m
+            a.shirt, a.trousers, a.skin, a.hair, a.shoes, a.pattern, a.pattern_color, a.sleeves, a.legs, a.long_hair, a.loose_m
         )
         actor = make_actor(a.height_m, a.build, rng_actors[2 * k], a.sex, clothes, recipe.cell_m)
-        actor = with_balls(actor, a.pattern_colour) if a.pattern == "markers" else actor
-        actors.append(with_cube(actor, a.cube_m, a.cube_colour) if a.cube_m > 0 else actor)
+        actor = with_balls(actor, a.pattern_color) if a.pattern == "markers" else actor
+        actors.append(with_cube(actor, a.cube_m, a.cube_color) if a.cube_m > 0 else actor)
         motions.append(make_motion(a, actor.skeleton, times, rng_actors[2 * k + 1], recipe.furniture))
         if (first := _first_in_wall(a, motions[-1], room)) is not None:
             raise InputError(

@@ -1,4 +1,4 @@
-"""Procedural surfaces of a room: colours as a function of the place on a wall or floor, in metres."""
+"""Procedural surfaces of a room: colors as a function of the place on a wall or floor, in metres."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from hmc.errors import InputError
 
-__all__ = ["TEXTURES", "colour_of"]
+__all__ = ["TEXTURES", "color_of"]
 
 
 def _hash(*cells: np.ndarray, seed: int = 0) -> np.ndarray:
@@ -74,15 +74,15 @@ TEXTURES = {
 }  # fmt: skip
 
 
-def colour_of(texture: str, colour: tuple[float, float, float], u: np.ndarray, v: np.ndarray, seed: int) -> np.ndarray:
+def color_of(texture: str, color: tuple[float, float, float], u: np.ndarray, v: np.ndarray, seed: int) -> np.ndarray:
     """Linear reflectance, BGR, of places (u, v) on a surface.
 
     Parameters
     ----------
     texture : str
         A name of `TEXTURES`.
-    colour : tuple of float
-        Base colour, sRGB in [0, 1].
+    color : tuple of float
+        Base color, sRGB in [0, 1].
     u, v : ndarray, shape (n,)
         Along the surface, metres.
     seed : int
@@ -99,11 +99,11 @@ def colour_of(texture: str, colour: tuple[float, float, float], u: np.ndarray, v
     """
     if texture not in TEXTURES:
         raise InputError(f"texture {texture!r} is unknown; use one of {', '.join(TEXTURES)}")
-    base = np.array(colour, float)[::-1] ** 2.2
+    base = np.array(color, float)[::-1] ** 2.2
     return np.clip(base * TEXTURES[texture](u, v, seed)[:, None], 0, 1)
 
 
-def poster_colour(u: np.ndarray, v: np.ndarray, seed: int) -> np.ndarray:
-    """A poster of coloured fields, (u, v) in [0, 1): linear reflectance, BGR, (n, 3)."""
+def poster_color(u: np.ndarray, v: np.ndarray, seed: int) -> np.ndarray:
+    """A poster of colored fields, (u, v) in [0, 1): linear reflectance, BGR, (n, 3)."""
     i, j = np.floor(u * 4), np.floor(v * 5)
     return np.stack([0.05 + 0.6 * _hash(i, j, seed=seed + k) for k in range(3)], axis=-1)

@@ -19,7 +19,7 @@ from hmc.errors import InputError
 from hmc.io.recording import Frame, Recording, iterate_frames
 from hmc.io.results import PoseStates, PoseTable, TrackTable, read_joints, read_pose, read_tracks
 from hmc.landmarks import landmark_index
-from hmc.view.overlay import LEFT, RIGHT, draw_label, draw_outline, draw_paths, draw_sticks, draw_track, person_colour
+from hmc.view.overlay import LEFT, RIGHT, draw_label, draw_outline, draw_paths, draw_sticks, draw_track, person_color
 from hmc.view.scene import BACKGROUND, draw_floor, draw_rig, draw_voxels, from_above, viewpoint
 from hmc.voxels.grid import VoxelGrid
 from hmc.voxels.hulls import HullStep, stream_hulls
@@ -321,7 +321,7 @@ def draw_trails(image: np.ndarray, camera: Camera, result: Result, frame: int) -
     recent = table.where((table.frames <= frame) & (table.frames > frame - TRAIL_FRAMES))
     for number in np.unique(recent.persons):
         way = recent.of(number).positions * np.array([1, 1, 0])
-        draw_paths(image, camera, way, person_colour(int(number)), 1)
+        draw_paths(image, camera, way, person_color(int(number)), 1)
 
 
 def _draw_number(image: np.ndarray, camera: Camera, person: Person) -> None:
@@ -335,4 +335,4 @@ def _draw_number(image: np.ndarray, camera: Camera, person: Person) -> None:
         return
     uv, valid = project(camera, top)
     if valid and (np.abs(uv) < 10_000).all():
-        draw_label(image, str(person.number), uv + np.array([4, -2]), person_colour(person.number), 0.5)
+        draw_label(image, str(person.number), uv + np.array([4, -2]), person_color(person.number), 0.5)

@@ -1,6 +1,6 @@
 """Drawing people into an image: stick figures, outlines of the flesh, tracks, labels. Every function draws into the image it is given.
 
-Left limbs are orange and right limbs blue, whoever's they are; trunk, head, outline and label have the person's colour. Colours are BGR.
+Left limbs are orange and right limbs blue, whoever's they are; trunk, head, outline and label have the person's color. Colors are BGR.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from hmc.body.model import BodyModel
 from hmc.camera.model import Camera, project
 from hmc.landmarks import BONES, landmark_index
 
-__all__ = ["LEFT", "RIGHT", "draw_label", "draw_outline", "draw_paths", "draw_sticks", "draw_track", "person_colour"]
+__all__ = ["LEFT", "RIGHT", "draw_label", "draw_outline", "draw_paths", "draw_sticks", "draw_track", "person_color"]
 
-Colour = tuple[int, int, int]
+Color = tuple[int, int, int]
 
-LEFT: Colour = (40, 140, 255)
-RIGHT: Colour = (255, 160, 60)
-PERSONS: tuple[Colour, ...] = ((120, 230, 110), (220, 110, 235), (70, 225, 250), (225, 225, 90), (150, 150, 255), (200, 200, 200))
-DARK: Colour = (25, 22, 20)
+LEFT: Color = (40, 140, 255)
+RIGHT: Color = (255, 160, 60)
+PERSONS: tuple[Color, ...] = ((120, 230, 110), (220, 110, 235), (70, 225, 250), (225, 225, 90), (150, 150, 255), (200, 200, 200))
+DARK: Color = (25, 22, 20)
 
 #: Sub-pixel bits of OpenCV's drawing functions.
 SHIFT = 4
@@ -36,8 +36,8 @@ TRACK_POINTS = 24
 TRACK_RADIUS_M = 0.3
 
 
-def person_colour(person: int) -> Colour:
-    """The colour of a person's number; six of them, over and over."""
+def person_color(person: int) -> Color:
+    """The color of a person's number; six of them, over and over."""
     return PERSONS[person % len(PERSONS)]
 
 
@@ -52,17 +52,17 @@ def draw_sticks(image: np.ndarray, camera: Camera, points: np.ndarray, person: i
     points : ndarray, shape (15, 3)
         Landmarks, world, metres; bones with a missing (NaN) end are left out.
     person : int
-        Number that decides the colour.
+        Number that decides the color.
     width : float
         Of a bone, pixels.
     """
     ends = np.array([[landmark_index(a), landmark_index(b)] for a, b in BONES])
     t = np.linspace(0, 1, PIECES + 1)[:, None]
     lines = points[ends[:, 0], None] * (1 - t) + points[ends[:, 1], None] * t
-    colours = [{"l_": LEFT, "r_": RIGHT}.get(b[:2], person_colour(person)) for _, b in BONES]
-    # Dark edges first, so that no edge covers a neighbour's colour.
+    colors = [{"l_": LEFT, "r_": RIGHT}.get(b[:2], person_color(person)) for _, b in BONES]
+    # Dark edges first, so that no edge covers a neighbour's color.
     draw_paths(image, camera, lines, DARK, width + 2)
-    draw_paths(image, camera, lines, colours, width)
+    draw_paths(image, camera, lines, colors, width)
     uv, valid = project(camera, points)
     for u, v in uv[valid & _near_image(uv, camera)]:
         centre = round(u * 2**SHIFT), round(v * 2**SHIFT)
@@ -88,7 +88,7 @@ def draw_outline(image: np.ndarray, camera: Camera, body: BodyModel, state: np.n
             cv2.fillConvexPoly(mask, hull, 255, cv2.LINE_8, SHIFT)
     outlines, _ = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     smooth = [cv2.approxPolyDP(outline, 0.8, True) for outline in outlines]  # the staircase of pixels
-    cv2.polylines(image, smooth, True, person_colour(person), max(1, round(width)), cv2.LINE_AA)
+    cv2.polylines(image, smooth, True, person_color(person), max(1, round(width)), cv2.LINE_AA)
 
 
 def cone_rings(body: BodyModel, state: np.ndarray) -> np.ndarray:
@@ -123,8 +123,8 @@ def draw_track(image: np.ndarray, camera: Camera, position: np.ndarray, person: 
     if len(seen) < 3:
         return
     outline = cv2.convexHull(np.round(seen * 2**SHIFT).astype(np.int32))
-    for colour, extra in ((DARK, 2.0), (person_colour(person), 0.0)):
-        cv2.polylines(image, [outline], True, colour, max(1, round(width + extra)), cv2.LINE_AA, SHIFT)
+    for color, extra in ((DARK, 2.0), (person_color(person), 0.0)):
+        cv2.polylines(image, [outline], True, color, max(1, round(width + extra)), cv2.LINE_AA, SHIFT)
 
 
 def track_ellipsoid(position: np.ndarray) -> np.ndarray:
@@ -134,7 +134,7 @@ def track_ellipsoid(position: np.ndarray) -> np.ndarray:
     return position + sphere * np.array([TRACK_RADIUS_M, TRACK_RADIUS_M, position[2]])
 
 
-def draw_paths(image: np.ndarray, camera: Camera, paths: np.ndarray, colours: Colour | list[Colour], width: float) -> None:
+def draw_paths(image: np.ndarray, camera: Camera, paths: np.ndarray, colors: Color | list[Color], width: float) -> None:
     """Draw chains of world points; the parts that the camera cannot have in view are left out.
 
     Parameters
@@ -143,16 +143,16 @@ def draw_paths(image: np.ndarray, camera: Camera, paths: np.ndarray, colours: Co
         As for `draw_sticks`.
     paths : ndarray, shape (k, 3) or (n, k, 3)
         One chain or many, metres; a point with NaN interrupts its chain.
-    colours : colour, or list of n of them
+    colors : color, or list of n of them
     """
     paths = paths.reshape(-1, *paths.shape[-2:])
     uv, valid = project(camera, paths)
     seen = valid & _near_image(uv, camera)
     pixels = np.round(np.where(seen[..., None], uv, 0) * 2**SHIFT).astype(np.int32)
     for k, chain in enumerate(pixels):
-        colour = colours[k] if isinstance(colours, list) else colours
+        color = colors[k] if isinstance(colors, list) else colors
         parts = [chain] if seen[k].all() else [part[seen_part] for part, seen_part in _split(chain, seen[k])]
-        cv2.polylines(image, [part for part in parts if len(part) > 1], False, colour, max(1, round(width)), cv2.LINE_AA, SHIFT)
+        cv2.polylines(image, [part for part in parts if len(part) > 1], False, color, max(1, round(width)), cv2.LINE_AA, SHIFT)
 
 
 def _split(chain: np.ndarray, seen: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -162,11 +162,11 @@ def _split(chain: np.ndarray, seen: np.ndarray) -> list[tuple[np.ndarray, np.nda
 
 
 def draw_label(
-    image: np.ndarray, text: str, place: np.ndarray | Sequence[float], colour: Colour = (255, 255, 255), scale: float = 0.45
+    image: np.ndarray, text: str, place: np.ndarray | Sequence[float], color: Color = (255, 255, 255), scale: float = 0.45
 ) -> None:
     """Write a line with a shadow; `place` is its lower left corner in pixels."""
     x, y = round(float(place[0])), round(float(place[1]))
-    for corner, ink in (((x + 1, y + 1), DARK), ((x, y), colour)):
+    for corner, ink in (((x + 1, y + 1), DARK), ((x, y), color)):
         cv2.putText(image, text, corner, cv2.FONT_HERSHEY_SIMPLEX, scale, ink, 1, cv2.LINE_AA)
 
 

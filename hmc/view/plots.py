@@ -23,7 +23,7 @@ from hmc.io.results import TrackTable
 from hmc.landmarks import BONES, LANDMARKS, landmark_index
 from hmc.view.mosaic import Person
 from hmc.view.mosaic import draw_people as _draw_people_into
-from hmc.view.overlay import LEFT, RIGHT, cone_rings, person_colour
+from hmc.view.overlay import LEFT, RIGHT, cone_rings, person_color
 from hmc.voxels.grid import VoxelGrid
 from hmc.voxels.surface import surface
 
@@ -94,7 +94,7 @@ def draw_overlay(camera: Camera, image: np.ndarray, people: Sequence[Person], ax
 
 
 def draw_voxels(
-    grid: VoxelGrid, occupied: np.ndarray, colours: np.ndarray | None = None, ax: Axes3D | None = None, alpha: float = 1.0
+    grid: VoxelGrid, occupied: np.ndarray, colors: np.ndarray | None = None, ax: Axes3D | None = None, alpha: float = 1.0
 ) -> Axes3D:
     """Draw a volume in 3-D as shaded cubes.
 
@@ -102,7 +102,7 @@ def draw_voxels(
     ----------
     grid : VoxelGrid
     occupied : ndarray of bool, shape (nx, ny, nz)
-    colours : ndarray, shape (n_surface, 3), uint8 BGR, optional
+    colors : ndarray, shape (n_surface, 3), uint8 BGR, optional
         Of the surface voxels, in the order of `hmc.voxels.surface.surface`; plain grey without.
     ax : Axes (3-D), optional
     alpha : float
@@ -110,7 +110,7 @@ def draw_voxels(
     """
     ax, had_data = _room_axes(ax)
     indices = surface(occupied)
-    base = np.full((len(indices), 3), [0.72, 0.77, 0.84]) if colours is None else colours[:, ::-1] / 255.0
+    base = np.full((len(indices), 3), [0.72, 0.77, 0.84]) if colors is None else colors[:, ::-1] / 255.0
     padded = np.pad(occupied, 1)
     polygons, shades = [], []
     for direction, corners in FACES:
@@ -122,8 +122,8 @@ def draw_voxels(
     return _fit(ax, faces.reshape(-1, 3), had_data)
 
 
-def draw_sticks(points: np.ndarray, ax: Axes3D | None = None, person: int = 0, label: str = "", colour=None, width: float = 2.5) -> Axes3D:
-    """Draw stick figures in 3-D: left limbs orange, right limbs blue, the trunk in the person's colour.
+def draw_sticks(points: np.ndarray, ax: Axes3D | None = None, person: int = 0, label: str = "", color=None, width: float = 2.5) -> Axes3D:
+    """Draw stick figures in 3-D: left limbs orange, right limbs blue, the trunk in the person's color.
 
     Parameters
     ----------
@@ -131,10 +131,10 @@ def draw_sticks(points: np.ndarray, ax: Axes3D | None = None, person: int = 0, l
         Landmarks, world, metres; bones with a missing (NaN) end are left out.
     ax : Axes (3-D), optional
     person : int
-        Number that decides the trunk's colour.
+        Number that decides the trunk's color.
     label : str
         For a legend.
-    colour : matplotlib colour, optional
+    color : matplotlib color, optional
         One for everything, as for the truth beside an estimate.
     width : float
         Of a bone, points.
@@ -143,10 +143,10 @@ def draw_sticks(points: np.ndarray, ax: Axes3D | None = None, person: int = 0, l
     figures = np.asarray(points, float).reshape(-1, len(LANDMARKS), 3)
     ends = np.array([[landmark_index(a), landmark_index(b)] for a, b in BONES])
     lines = figures[:, ends].reshape(-1, 2, 3)
-    limb = [{"l_": LEFT, "r_": RIGHT}.get(b[:2], person_colour(person)) for _, b in BONES]
-    colours = [_rgb(bgr) if colour is None else colour for bgr in limb] * len(figures)
+    limb = [{"l_": LEFT, "r_": RIGHT}.get(b[:2], person_color(person)) for _, b in BONES]
+    colors = [_rgb(bgr) if color is None else color for bgr in limb] * len(figures)
     known = ~np.isnan(lines).any(axis=(1, 2))
-    shown = [line_colour for line_colour, is_known in zip(colours, known, strict=True) if is_known]
+    shown = [line_color for line_color, is_known in zip(colors, known, strict=True) if is_known]
     ax.add_collection3d(Line3DCollection(lines[known], colors=shown, linewidths=width, capstyle="round"))
     if label:
         ax.plot([], [], [], color=shown[0] if shown else "grey", linewidth=width, label=label)
@@ -163,7 +163,7 @@ def draw_body(body: BodyModel, state: np.ndarray, ax: Axes3D | None = None, pers
         Metres and radians.
     ax : Axes (3-D), optional
     person : int
-        Number that decides the colour of trunk and head.
+        Number that decides the color of trunk and head.
     alpha : float
         Opacity.
     """
@@ -177,14 +177,14 @@ def draw_body(body: BodyModel, state: np.ndarray, ax: Axes3D | None = None, pers
     normals = np.cross(sides[..., 1, :] - sides[..., 0, :], sides[..., 3, :] - sides[..., 0, :])
     outward = np.sign(np.einsum("...i,...i->...", normals, sides.mean(axis=3) - levels[:-1].mean(axis=2, keepdims=True)))
     names = [PARTS[part] for part in body.cones.part]
-    base = np.array([_rgb({"l_": LEFT, "r_": RIGHT}.get(name[:2], person_colour(person))) for name in names])
-    colours = base[:, None] * _brightness(normals * outward[..., None])[..., None]
+    base = np.array([_rgb({"l_": LEFT, "r_": RIGHT}.get(name[:2], person_color(person))) for name in names])
+    colors = base[:, None] * _brightness(normals * outward[..., None])[..., None]
     caps = np.stack([starts, ends])
     middles, following = np.broadcast_to(caps.mean(axis=2, keepdims=True), caps.shape), np.roll(caps, -1, axis=2)
     fans = np.stack([middles, caps, following, following], axis=3)
     polygons = np.concatenate([sides.reshape(-1, 4, 3), fans.reshape(-1, 4, 3)])
     flat = np.tile(np.repeat(0.6 * base, caps.shape[2], axis=0), (2, 1))
-    faces = np.concatenate([np.clip(colours, 0, 1).reshape(-1, 3), flat])
+    faces = np.concatenate([np.clip(colors, 0, 1).reshape(-1, 3), flat])
     ax.add_collection3d(Poly3DCollection(polygons, facecolors=faces, edgecolors="none", alpha=alpha))
     return _fit(ax, rings.reshape(-1, 3), had_data)
 
@@ -206,9 +206,9 @@ def draw_tracks(tracks: TrackTable, room: np.ndarray | None = None, truth: Track
         ax.plot([x0, x1, x1, x0, x0], [y0, y0, y1, y1, y0], color="0.6", linewidth=1)
     for person in np.unique(tracks.persons):
         x, y = _unbroken(tracks.of(int(person)))
-        colour = 0.85 * np.array(_rgb(person_colour(int(person))))
-        ax.plot(x, y, color=colour, linewidth=2, label=f"person {person}")
-        ax.plot(x[-1], y[-1], "o", color=colour, markersize=7)
+        color = 0.85 * np.array(_rgb(person_color(int(person))))
+        ax.plot(x, y, color=color, linewidth=2, label=f"person {person}")
+        ax.plot(x[-1], y[-1], "o", color=color, markersize=7)
     if truth is not None:
         for k, person in enumerate(np.unique(truth.persons)):
             ax.plot(*_unbroken(truth.of(int(person))), color="0.15", linewidth=0.8, label="" if k else "truth")
@@ -263,9 +263,9 @@ def draw_scores(rows: Sequence[dict], ax: Axes | None = None, person: str = "all
     chosen = sorted((row for row in rows if row["person"] == person and row["landmark"] in LANDMARKS), key=lambda row: -row["mean_mm"])
     overall = next(row["mean_mm"] for row in rows if row["person"] == person and row["landmark"] == "overall")
     names = [row["landmark"] for row in chosen]
-    colours = [_rgb({"l_": LEFT, "r_": RIGHT}.get(name[:2], (150, 150, 150))) for name in names]
+    colors = [_rgb({"l_": LEFT, "r_": RIGHT}.get(name[:2], (150, 150, 150))) for name in names]
     spread = [row["deviation_mm"] for row in chosen]
-    ax.barh(names, [row["mean_mm"] for row in chosen], xerr=spread, color=colours, error_kw={"elinewidth": 0.8, "ecolor": "0.3"})
+    ax.barh(names, [row["mean_mm"] for row in chosen], xerr=spread, color=colors, error_kw={"elinewidth": 0.8, "ecolor": "0.3"})
     ax.axvline(overall, color="black", linewidth=1, linestyle="--", label=f"overall {overall:.1f} mm")
     ax.set(xlabel="mean error and deviation (mm)")
     ax.set_xlim(left=0)

@@ -116,9 +116,9 @@ def draw_voxels(image: np.ndarray, camera: Camera, grid: VoxelGrid, occupied: np
     columns, rows = first[:, :1] + dx, first[:, 1:] + dy
     height, width = image.shape[:2]
     inside = (dx < side[:, None]) & (dy < side[:, None]) & (columns >= 0) & (rows >= 0) & (columns < width) & (rows < height)
-    colours = np.clip(shade[:, None] * VOXELS, 0, 255).astype(np.uint8)
+    colors = np.clip(shade[:, None] * VOXELS, 0, 255).astype(np.uint8)
     # Entries stand from far to near, and of several for one pixel the last one stays.
-    image.reshape(-1, 3)[(rows * width + columns)[inside]] = np.repeat(colours, inside.sum(axis=1), axis=0)
+    image.reshape(-1, 3)[(rows * width + columns)[inside]] = np.repeat(colors, inside.sum(axis=1), axis=0)
 
 
 def _shading(occupied: np.ndarray, indices: np.ndarray) -> np.ndarray:

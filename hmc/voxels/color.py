@@ -1,7 +1,7 @@
-"""Colours of voxels: plain average over the cameras, or over the cameras that have direct sight of the voxel.
+"""Colors of voxels: plain average over the cameras, or over the cameras that have direct sight of the voxel.
 
 Source: Canton (2009), section 2.2.4 (line from the voxel to the optical centre, drawn in the discrete space by Bresenham's algorithm; the
-voxel is seen when all of the line is empty) and Kehl (2006), section 4.1. The plain average mixes the colours of front and back.
+voxel is seen when all of the line is empty) and Kehl (2006), section 4.1. The plain average mixes the colors of front and back.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def color_voxels(
     seen: np.ndarray | None = None,
     masks: Sequence[np.ndarray | None] | None = None,
 ) -> np.ndarray:
-    """Average colour of each voxel in the images.
+    """Average color of each voxel in the images.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """Silhouettes completed by what other cameras see: a camera's doubts are decided by the rest of the rig.
 
-A pale sleeve before a pale wall looks to one camera exactly as a shadow on that wall would: the wall's colour, a little darker. To the
+A pale sleeve before a pale wall looks to one camera exactly as a shadow on that wall would: the wall's color, a little darker. To the
 camera alone the two are the same, to a rig they are not:
 
 - A shadow lies on a surface. Where the ray of a doubtful pixel meets the floor, other cameras look at the same spot: if it is a shadow,

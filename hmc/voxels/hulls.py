@@ -5,7 +5,7 @@
 
 Where the silhouettes come from, camera by camera (``FrontendSettings.source = "auto"``): ready-made ones where the recording has them;
 else the images against a background learnt from frames of the empty scene; else against a temporal median of the recording from which
-people were cut out with the help of all cameras, and where they hardly ever leave a place, by their colours (`hmc.voxels.never_empty`).
+people were cut out with the help of all cameras, and where they hardly ever leave a place, by their colors (`hmc.voxels.never_empty`).
 
 Nothing grows with the length of the recording.
 """

@@ -163,7 +163,7 @@ def hull_step(
 
 
 def colored_surface(tables: PixelTables, state: HullState, images: Sequence[np.ndarray | None]) -> tuple[np.ndarray, np.ndarray]:
-    """The hull's surface voxels with the colours that the cameras in sight of them see.
+    """The hull's surface voxels with the colors that the cameras in sight of them see.
 
     Parameters
     ----------

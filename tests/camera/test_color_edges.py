@@ -1,4 +1,4 @@
-"""Colour edges against plain loops and against OpenCV's Canny under a shadow."""
+"""Color edges against plain loops and against OpenCV's Canny under a shadow."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SHARP = ColorEdgeSettings(sigma_px=0.0)
 
 
 def distance_by_hand(a, b, settings):
-    """Wesolkowski and Jernigan's mixture, one pair of colours."""
+    """Wesolkowski and Jernigan's mixture, one pair of colors."""
     a, b = np.asarray(a, float), np.asarray(b, float)
     alpha = [1 / (1 + np.exp(-settings.slope * (color.mean() - settings.bright))) for color in (a, b)]
     rho = np.sqrt(alpha[0] * alpha[1])
@@ -63,7 +63,7 @@ def test_an_edge_is_thin_and_points_across(angle):
 
 def test_a_shadow_makes_no_edge_where_canny_sees_one():
     light = np.ones((60, 90))
-    light[:, 30:] = 0.62  # a shadow's edge; the colour's direction stays
+    light[:, 30:] = 0.62  # a shadow's edge; the color's direction stays
     image = np.empty((60, 90, 3))
     image[:] = (200, 170, 150)
     image[:, 60:] = (90, 120, 220)

@@ -8,7 +8,7 @@ SKIN, CLOTH, WALL, MAT = (120, 150, 190), (200, 180, 40), (130, 155, 185), (40, 
 
 
 def room_with_somebody(rng):
-    """A wall of the colour of skin above a dark mat; a trunk in cloth, an arm before the wall, a leg on the mat."""
+    """A wall of the color of skin above a dark mat; a trunk in cloth, an arm before the wall, a leg on the mat."""
     image = np.empty((320, 240, 3), float)
     image[:130], image[130:] = WALL, MAT
     parts = {"trunk": np.s_[90:170, 100:130], "arm": np.s_[95:125, 130:180], "leg": np.s_[170:206, 111:119]}
@@ -24,7 +24,7 @@ def mask_of(shape, *parts):
     return mask
 
 
-def test_a_limb_is_told_from_the_mat_below_it_though_the_wall_has_its_colour():
+def test_a_limb_is_told_from_the_mat_below_it_though_the_wall_has_its_color():
     image, parts = room_with_somebody(np.random.default_rng(0))
     shape = image.shape[:2]
     known = mask_of(shape, parts["trunk"], parts["arm"])

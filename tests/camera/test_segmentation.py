@@ -41,14 +41,14 @@ class Scene:
             dark = np.zeros(SIZE[::-1], np.uint8)
             cv2.ellipse(dark, (x + 25, 205), (35, 9), 0, 0, 360, 1, -1)
             image *= (1 - (1 - shadow) * cv2.GaussianBlur(dark.astype(float), (0, 0), 2))[..., None]
-        for (left, top, right, bottom), colour in (
+        for (left, top, right, bottom), color in (
             ((x - 8, 60, x + 8, 82), (120, 150, 200)),
             ((x - 18, 82, x + 18, 140), shirt),
             ((x - 30, 86, x - 19, 138), (120, 150, 200)),
             ((x - 16, 140, x - 2, 205), trousers),
             ((x + 3, 140, x + 16, 205), trousers),
         ):
-            image[top:bottom, left:right] = colour
+            image[top:bottom, left:right] = color
             mask[top:bottom, left:right] = 1
         return self.expose(image), mask.view(bool)
 
@@ -73,7 +73,7 @@ def test_a_person_is_found_and_the_shadow_is_not():
 
 
 def test_a_pale_band_is_filled_in_that_the_mixture_takes_for_shadow():
-    """Stripes of two thirds of the wall's colour pass for a shadow of it; between dark stripes they are clothes."""
+    """Stripes of two thirds of the wall's color pass for a shadow of it; between dark stripes they are clothes."""
     scene = Scene(1, noise=1.0)
     model = trained(scene)
     image, truth = scene.person()
@@ -143,7 +143,7 @@ def test_automatic_exposure_and_flicker_cost_nothing(light):
 
 @pytest.mark.parametrize("frames", [1, 2])
 def test_a_flash_costs_no_more_than_its_frames(frames):
-    """A flash is of another colour than the light, so that it is no matter of exposure."""
+    """A flash is of another color than the light, so that it is no matter of exposure."""
     scene = Scene(9)
     model = trained(scene)
     for i in range(14):
@@ -214,8 +214,8 @@ def test_evidence_of_a_shadow_has_no_chroma():
     np.testing.assert_allclose(seen.lost, 0.3, atol=0.01)
     np.testing.assert_allclose(seen.luma, -0.3 * mean[0, 0, 0] / 2, rtol=0.03)
     assert seen.chroma2.max() < 2
-    coloured = evidence(np.full((9, 9, 3), (150, 120, 90), np.uint8), mean, deviation)
-    assert coloured.chroma2.min() > 100
+    colored = evidence(np.full((9, 9, 3), (150, 120, 90), np.uint8), mean, deviation)
+    assert colored.chroma2.min() > 100
     np.testing.assert_array_equal(mean, cv2.cvtColor(background, cv2.COLOR_BGR2YCrCb))  # inputs are left as they were
 
 

@@ -51,7 +51,7 @@ def test_the_floor_is_that_of_the_camera():
     assert noise_floor(np.zeros((8, 8, 2), np.float32)).variance > even.variance
 
 
-def test_grey_is_told_from_colour():
+def test_grey_is_told_from_color():
     scene = Scene(1)
     image, _ = scene.person()
     assert is_grey(grey(image)) and is_grey(jpeg(grey(image), 50))

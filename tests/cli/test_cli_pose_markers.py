@@ -1,4 +1,4 @@
-"""`hmc pose --method marker-apf`: from a table of detections, from coloured markers in images, and what it says of wrong input."""
+"""`hmc pose --method marker-apf`: from a table of detections, from colored markers in images, and what it says of wrong input."""
 
 import shutil
 from dataclasses import replace
@@ -93,7 +93,7 @@ def worn(tmp_path_factory):
     return folder, landmarks(body, states)
 
 
-def test_from_coloured_markers_in_images(worn, tmp_path):
+def test_from_colored_markers_in_images(worn, tmp_path):
     folder, truth = worn
     assert pose(folder, tmp_path / "out") == 0
     joints = read_joints(tmp_path / "out" / "joints.csv")

@@ -409,7 +409,7 @@ def test_what_the_paper_shows_holds_on_the_papers_own_figures():
     cells, plan = papers_cells(), Plan()
     with house_style():
         report = table_4_3.EXPERIMENT.report(cells, plan)
-        assert all(claim.holds for claim in report.claims if "colour" not in claim.text), [c for c in report.claims if not c.holds]
+        assert all(claim.holds for claim in report.claims if "color" not in claim.text), [c for c in report.claims if not c.holds]
         for row in report.tables[0].rows:
             assert row["MOTP_mm"] == pytest.approx(row["MOTP_paper_mm"]) and row["MOTA_percent"] == pytest.approx(
                 row["MOTA_paper_percent"], abs=0.06

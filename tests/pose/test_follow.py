@@ -153,7 +153,7 @@ def stopped_and_taken_up(case, tmp_path, stop, **how):
 
 @each(CASES)
 def test_a_stopped_run_goes_on_and_ends_as_if_it_had_not_been(whole, case, tmp_path):
-    """What each remembers besides the pose is in a file beside the journal: particles, colours, evidence for a heading, markers' places."""
+    """What each remembers besides the pose is in a file beside the journal: particles, colors, evidence for a heading, markers' places."""
     people, seen, beside = stopped_and_taken_up(case, tmp_path, 5)
     equal(people, whole(case))
     # What was decided is not computed again; legs are decided two frames later.

@@ -14,7 +14,7 @@ from hmc.body.marker_places import fit_tips, place_tips, with_skin_markers
 from hmc.body.model import neutral_state
 from hmc.body.proportions import default_body
 from hmc.camera.epipolar import generalised_epipolar_distance
-from hmc.camera.marker_color import ColourSettings, detect_markers, learn_marker_colour
+from hmc.camera.marker_color import MarkerColorSettings, detect_markers, learn_marker_color
 from hmc.camera.model import Rig, look_at, project
 from hmc.errors import InputError
 from hmc.io.detections import DetectionTable, read_detections, write_detections
@@ -253,7 +253,7 @@ def test_the_ideal_detector_sees_true_places():
         assert np.linalg.norm(found[:, None] - uv, axis=-1).min(axis=1).max() < 1e-9
 
 
-def test_coloured_blobs_are_found_and_others_not():
+def test_colored_blobs_are_found_and_others_not():
     rng = np.random.default_rng(3)
     scene = np.full((240, 320, 3), (110, 120, 115), np.uint8)
     cv2.rectangle(scene, (10, 10), (40, 40), (20, 220, 230), -1)  # as yellow as a marker, but part of the room
@@ -263,15 +263,15 @@ def test_coloured_blobs_are_found_and_others_not():
         cv2.circle(image, (u, v), 3, (20, 220, 230), -1)
     cv2.circle(image, (150, 200), 6, (40, 40, 200), -1)  # red
     image = np.clip(image + rng.normal(0, 3, image.shape), 0, 255).astype(np.uint8)
-    colour = learn_marker_colour([(image, places[:2] + 0.4)])
-    found = detect_markers(image, colour, background=scene)
+    color = learn_marker_color([(image, places[:2] + 0.4)])
+    found = detect_markers(image, color, background=scene)
     assert len(found) == 3
     assert np.linalg.norm(places[:, None] - found, axis=-1).min(axis=1).max() < 0.5
-    assert len(detect_markers(image, colour)) > 3
-    assert detect_markers(scene, colour, background=scene).shape == (0, 2)
-    assert len(detect_markers(image, colour, ColourSettings(most=1))) == 1
+    assert len(detect_markers(image, color)) > 3
+    assert detect_markers(scene, color, background=scene).shape == (0, 2)
+    assert len(detect_markers(image, color, MarkerColorSettings(most=1))) == 1
     with pytest.raises(InputError, match="no labelled marker"):
-        learn_marker_colour([(image, np.array([[900.0, 20.0]]))])
+        learn_marker_color([(image, np.array([[900.0, 20.0]]))])
 
 
 def test_detections_come_back_from_their_table(tmp_path):

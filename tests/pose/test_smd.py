@@ -63,7 +63,7 @@ def placed(tracker, state):
 
 
 def images_of(tracker, state):
-    """Every solid as the hull of its points in its own colour, over grey."""
+    """Every solid as the hull of its points in its own color, over grey."""
     points = placed(tracker, state)
     images = []
     for camera in CAMERAS:
@@ -177,7 +177,7 @@ def test_matched_edges_of_the_true_pose_are_near_and_lead_back(tracker):
     assert np.sqrt(2 * values[0]) < 0.25  # of the limb's diameter
 
 
-def test_nearest_voxels_are_those_of_a_tree_and_of_the_right_colour():
+def test_nearest_voxels_are_those_of_a_tree_and_of_the_right_color():
     rng = np.random.default_rng(0)
     voxels, points = rng.uniform(-1, 1, (500, 3)), rng.uniform(-1, 1, (60, 3))
     index, found = nearest_voxels(voxel_cloud(voxels), points)
@@ -371,7 +371,7 @@ def test_chains_together_are_the_chains_one_by_one():
     assert len(set(info.iterations)) > 1
 
 
-def test_colours_are_learnt_and_confine(tracker):
+def test_colors_are_learnt_and_confine(tracker):
     state = state_of(np.random.default_rng(1), 0.1)
     posed = pose_body(tracker.body, state)
     points = placed(tracker, state)

@@ -124,7 +124,7 @@ def test_shrinking_draws_the_core_to_the_origin():
     assert ratio[1] < 0.85 * ratio[0]
 
 
-def test_colour_votes_weaken_edges_between_colours():
+def test_color_votes_weaken_edges_between_colors():
     # a column of voxels, the upper half red and the lower half blue in every image
     grid = VoxelGrid(np.array([-0.05, -0.05, 0.0]), 0.1, (1, 1, 10))
     rig = Rig(tuple(look_at(f"c{k}", (160, 120), [3 * np.cos(a), 3 * np.sin(a), 0.5], [0, 0, 0.5], 40) for k, a in enumerate((0, 2, 4))))

@@ -197,7 +197,7 @@ def test_the_shipped_recipes_cover_the_motions():
         ({"room": {"floor": "lava"}}, "texture 'lava' is unknown; use one of"),
         ({"fps": "fast"}, "'fps' has a value of the wrong kind"),
         ({"actor": [{"start_m": [1, 2, 3]}]}, "'start_m' has a value of the wrong kind"),
-        ({"room": {"wall_colours": [[0.1, 0.2]]}}, "'wall_colours' has a value of the wrong kind"),
+        ({"room": {"wall_colors": [[0.1, 0.2]]}}, "'wall_colors' has a value of the wrong kind"),
         ({"furniture": [{"kind": "table"}]}, "'at_m' is missing"),
         ({"actor": [{"height_m": 17}]}, "height_m must lie between"),
         ({"actor": [{"motion": "bvh"}]}, "go together"),

@@ -1,4 +1,4 @@
-"""Ghost legs where silhouettes of two legs cross: told, and removed where colours betray them."""
+"""Ghost legs where silhouettes of two legs cross: told, and removed where colors betray them."""
 
 import numpy as np
 import pytest
@@ -32,19 +32,19 @@ def hull(places):
     return np.argwhere(np.any([trunk, *(leg(*place) for place in places)], axis=0))
 
 
-def views(colours):
-    """Images in which the real legs have these colours, before black."""
+def views(colors):
+    """Images in which the real legs have these colors, before black."""
     images = [np.zeros((240, 240, 3), np.uint8) for _ in RIG]
-    for place, colour in zip(LEGS, colours, strict=True):
+    for place, color in zip(LEGS, colors, strict=True):
         for camera, image in zip(RIG, images, strict=True):
             column, row, _ = pixel_of_voxel(camera, GRID.centres()[leg(*place)])
             for dy in range(-4, 5):
                 for dx in range(-4, 5):
-                    image[np.clip(row + dy, 0, 239), np.clip(column + dx, 0, 239)] = colour
+                    image[np.clip(row + dy, 0, 239), np.clip(column + dx, 0, 239)] = color
     return FrameViews(RIG, [image.any(-1) for image in images], images)
 
 
-def test_ghosts_have_the_colours_of_others():
+def test_ghosts_have_the_colors_of_others():
     voxels = hull(LEGS + GHOSTS)
     report = check_ghosts(voxels, GRID, views([(40, 40, 200), (200, 40, 40)]))
     assert len(report.pieces) == 4 and "4 legs in the hull; 2 removed" in report.text

@@ -279,7 +279,7 @@ def test_what_the_shipped_tree_was_trained_on(tmp_path):
     assert len({recipe.name for recipe, _ in recipes}) == len(recipes) >= 11
     tested = {name for name in shipped_recipes() if not name.startswith("train_")}
     assert not {recipe.name for recipe, _ in recipes} & tested
-    box = FurnitureRecipe("box", (0.5, 0.5), size_m=(0.6, 0.6, 0.9), colour=(0.1, 0.1, 0.1))
+    box = FurnitureRecipe("box", (0.5, 0.5), size_m=(0.6, 0.6, 0.9), color=(0.1, 0.1, 0.1))
     small = replace(load_recipe("tiny"), furniture=(box,), seconds=0.1, cell_m=0.03, background_frames=3)
     folder = render_brought_in(replace(small, rig=replace(small.rig, size_px=(80, 60))), tmp_path / "brought")
     assert not list(tmp_path.glob(".*"))

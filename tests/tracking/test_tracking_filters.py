@@ -96,7 +96,7 @@ def test_overlap_is_that_of_a_loop_over_voxels():
     assert np.array_equal(overlap(np.zeros((0, 3), int), centres, radii, origin, size), np.zeros(12))
 
 
-def test_colour_likelihood_is_that_of_a_loop_over_particles():
+def test_color_likelihood_is_that_of_a_loop_over_particles():
     rng = np.random.default_rng(5)
     points, colors = rng.uniform(-0.6, 0.6, (300, 3)) + (3, -2, 0.9), rng.integers(0, 40, 300)
     centres = rng.uniform(-0.5, 0.5, (15, 3)) + (3, -2, 0.9)
@@ -113,7 +113,7 @@ def test_colour_likelihood_is_that_of_a_loop_over_particles():
     assert np.array_equal(color_likelihood(points[:0], colors[:0], centres, radii, reference), np.zeros(15))
 
 
-def test_bins_are_those_of_opencvs_colour_space():
+def test_bins_are_those_of_opencvs_color_space():
     bgr = np.random.default_rng(1).integers(0, 256, (2000, 3)).astype(np.uint8)
     y, cr, cb = np.moveaxis(cv2.cvtColor(bgr[None], cv2.COLOR_BGR2YCrCb)[0].astype(int), 1, 0)
     bins = color_bins(bgr)
@@ -136,7 +136,7 @@ def test_histograms():
 
 @settings(deadline=None)
 @given(st.lists(st.integers(0, 50), min_size=1, max_size=40).filter(any), st.floats(0.05, 1.0))
-def test_similar_colours_are_the_fewest_that_hold_the_share(values, share):
+def test_similar_colors_are_the_fewest_that_hold_the_share(values, share):
     reference = np.array(values) / sum(values)
     similar = similar_colors(reference, share)
     assert reference[similar].sum() >= share - 1e-6

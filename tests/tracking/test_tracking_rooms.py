@@ -69,7 +69,7 @@ def walk(start, end, n):
 
 
 def follow(volumes, name, color):
-    """The table of the tracks; images are grey, so that colours tell nothing, as where people are dressed alike."""
+    """The table of the tracks; images are grey, so that colors tell nothing, as where people are dressed alike."""
     tracker = make_tracker(name, color=color)
     views = FrameViews(RIG, [np.ones(image.shape[:2], bool) for image in VIEWS.images], VIEWS.images) if tracker.color else None
     seen = ((k, None if volume is None else observe(GRID, volume, None, views)) for k, volume in enumerate(volumes))

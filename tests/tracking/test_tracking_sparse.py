@@ -1,4 +1,4 @@
-"""The particle filter and Sparse Sampling on drawn rooms: coloured people whose true places are known."""
+"""The particle filter and Sparse Sampling on drawn rooms: colored people whose true places are known."""
 
 import json
 from dataclasses import replace
@@ -37,13 +37,13 @@ def person(x, y, height=1.74, radius=0.24):
 
 
 def seen(people):
-    """The observation of coloured people [(x, y, colour)], with images in which each voxel is a dot, the nearest in front."""
+    """The observation of colored people [(x, y, color)], with images in which each voxel is a dot, the nearest in front."""
     volumes = [person(x, y) for x, y, _ in people]
     occupied = np.any([np.zeros(GRID.shape, bool), *volumes], axis=0)
     images, masks = [], []
     for camera in RIG:
         image, depth = np.full((SIZE[1], SIZE[0], 3), 120, np.uint8), np.full((SIZE[1], SIZE[0]), np.inf)
-        for volume, (_, _, colour) in zip(volumes, people, strict=True):
+        for volume, (_, _, color) in zip(volumes, people, strict=True):
             points = CENTRES[volume]
             uv, valid = project(camera, points)
             far = (points @ camera.rotation.T + camera.translation)[:, 2]
@@ -53,7 +53,7 @@ def seen(people):
                     good = valid & (column >= 0) & (column < SIZE[0]) & (row >= 0) & (row < SIZE[1])
                     order = np.flatnonzero(good)[np.argsort(-far[good])]
                     order = order[far[order] < depth[row[order], column[order]]]
-                    image[row[order], column[order]], depth[row[order], column[order]] = colour, far[order]
+                    image[row[order], column[order]], depth[row[order], column[order]] = color, far[order]
         images.append(image)
         masks.append(np.isfinite(depth))
     return observe(GRID, occupied, None, FrameViews(RIG, masks, images))
@@ -70,14 +70,14 @@ def places(table, number, truth):
 
 @pytest.fixture(scope="module")
 def crossing():
-    """Red and green walk towards each other, meet in the middle so that they are one, and turn back: nothing but colour tells it."""
+    """Red and green walk towards each other, meet in the middle so that they are one, and turn back: nothing but color tells it."""
     out, back = line((-1.3, -0.3), (-0.16, 0), 14), line((-0.16, 0), (-1.3, 0.3), 14)
     a = [*out, *[np.array([-0.16, 0.0])] * 6, *back]
     b = [-place for place in a]
     return a, b, [seen([(*p, RED), (*q, GREEN)]) for p, q in zip(a, b, strict=True)]
 
 
-def test_only_the_surface_that_is_asked_for_is_coloured(crossing):
+def test_only_the_surface_that_is_asked_for_is_colored(crossing):
     observation = crossing[2][0]
     left = np.flatnonzero(observation.points[:, 0] < 0)
     rows, bins = color_surface(observation, left)
@@ -126,7 +126,7 @@ def test_people_who_were_exchanged_get_their_numbers_back(crossing):
 
 def test_people_who_come_back_are_recognised_by_their_colors():
     nobody = [seen([])] * 26
-    visit = {colour: [seen([(*p, colour)]) for p in line((-0.8, 0), (0.8, 0.2), 26)] for colour in (RED, BLUE)}
+    visit = {color: [seen([(*p, color)]) for p in line((-0.8, 0), (0.8, 0.2), 26)] for color in (RED, BLUE)}
     observations = [*visit[RED], *nobody, *visit[BLUE], *nobody, *visit[RED]]
     table = run(enumerate(observations), FPS, make_tracker("sparse", color=True))
     assert [set(table.persons[(table.frames // 52) == part]) for part in range(3)] == [{0}, {1}, {0}]

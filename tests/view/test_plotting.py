@@ -77,8 +77,8 @@ def test_voxels_show_their_bare_faces(n):
     grid = VoxelGrid(np.array([1.0, 2.0, 0.5]), 0.2, (5, 5, 5))
     occupied = np.zeros(grid.shape, bool)
     occupied[1 : 1 + n, 1 : 1 + n, 1 : 1 + n] = True
-    colours = np.tile(np.array([[10, 20, 250]], np.uint8), (len(surface(occupied)), 1))
-    ax = plotting.draw_voxels(grid, occupied, colours)
+    colors = np.tile(np.array([[10, 20, 250]], np.uint8), (len(surface(occupied)), 1))
+    ax = plotting.draw_voxels(grid, occupied, colors)
     (faces,) = [part for part in ax.collections if isinstance(part, Poly3DCollection)]
     corners = np.array(faces._faces)
     assert len(corners) == 6 * n * n
@@ -99,7 +99,7 @@ def test_sticks_leave_out_missing_bones_and_widen_the_limits():
     ax = plotting.draw_sticks(np.stack([points, missing]), label="estimate")
     (lines,) = [part for part in ax.collections if isinstance(part, Line3DCollection)]
     assert len(lines._segments3d) == 2 * len(BONES) - 1
-    plotting.draw_sticks(points + np.array([3, 0, 0]), ax, colour="black", label="truth")
+    plotting.draw_sticks(points + np.array([3, 0, 0]), ax, color="black", label="truth")
     low, high = ax.get_xlim3d()
     assert low <= points[:, 0].min() and high >= points[:, 0].max() + 3
     limits = np.array([ax.get_xlim3d(), ax.get_ylim3d(), ax.get_zlim3d()])

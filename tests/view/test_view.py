@@ -20,7 +20,7 @@ from hmc.io.recording import open_recording
 from hmc.io.results import PoseStates, PoseTable, TrackTable, write_joints, write_pose, write_run, write_tracks
 from hmc.landmarks import landmark_index
 from hmc.view.mosaic import make_layout, people_in, read_result, stream_mosaics
-from hmc.view.overlay import LEFT, RIGHT, draw_outline, draw_paths, draw_sticks, draw_track, person_colour
+from hmc.view.overlay import LEFT, RIGHT, draw_outline, draw_paths, draw_sticks, draw_track, person_color
 from hmc.view.scene import BACKGROUND, draw_floor, draw_rig, draw_voxels, from_above, viewpoint
 from hmc.voxels.grid import VoxelGrid
 
@@ -74,12 +74,12 @@ def result(tmp_path_factory):
 
 
 @pytest.mark.parametrize("number", range(5))
-def test_sticks_have_their_colours_where_opencv_projects_the_limbs(ring, number):
+def test_sticks_have_their_colors_where_opencv_projects_the_limbs(ring, number):
     camera = ring[number].scaled(4)
     image = np.zeros((*camera.size[::-1], 3), np.uint8)
     _, _, points = standing()
     draw_sticks(image, camera, points, 0)
-    for a, b, colour in [
+    for a, b, color in [
         ("l_elbow", "l_wrist", LEFT),
         ("r_elbow", "r_wrist", RIGHT),
         ("l_knee", "l_ankle", LEFT),
@@ -88,7 +88,7 @@ def test_sticks_have_their_colours_where_opencv_projects_the_limbs(ring, number)
         # From somewhere along the bone: limbs may cross in an image, but not all along.
         middles = points[landmark_index(a)] + np.linspace(0.2, 0.8, 7)[:, None] * (points[landmark_index(b)] - points[landmark_index(a)])
         found = [tuple(image[round(v), round(u)].tolist()) for u, v in cv2_pixels(camera, middles)]
-        assert colour in found
+        assert color in found
 
 
 def test_missing_landmarks_and_points_behind_the_camera_draw_nothing(ring):
@@ -205,7 +205,7 @@ def test_mosaics_show_people_voxels_and_a_missing_image(recording, result):
     assert changed.sum() > 300  # the voxels
     outlined = (mosaics[0] != bare[0]).any(axis=2)
     outlined[top:, left:] = False
-    far = np.abs(mosaics[0][outlined].astype(int) - person_colour(0)).max(axis=1)
+    far = np.abs(mosaics[0][outlined].astype(int) - person_color(0)).max(axis=1)
     assert outlined.sum() > 100 and far.min() < 60  # thin lines are blended with what is below
     gap = mosaics[1][: layout.cell[1], layout.cell[0] : 2 * layout.cell[0]]
     assert np.ptp(gap.astype(int), axis=2).max() < 10  # grey, with grey words
@@ -227,7 +227,7 @@ def test_a_track_is_the_outline_of_its_ellipsoid(place):
     position = np.array([0.2, 0.1, 0.85])
     image = np.zeros((480, 640, 3), np.uint8)
     draw_track(image, camera, position, 2, 3.0)
-    rows, columns = np.nonzero((image == person_colour(2)).all(axis=2))
+    rows, columns = np.nonzero((image == person_color(2)).all(axis=2))
     # The image of a quadric is a conic: its dual is P Q* P^T (Hartley and Zisserman, section 8.3).
     to_world = np.eye(4)
     to_world[:3, 3] = position
@@ -261,7 +261,7 @@ def test_tracks_alone_are_shown_from_above(recording, tmp_path):
     for turn in np.radians([0, 90, 180, 270]):
         ((u, v),) = cv2_pixels(camera, np.array([0.4 + 0.3 * np.cos(turn), -0.3 + 0.3 * np.sin(turn), 0.9]))
         around = picture[top + round(v) - 3 : top + round(v) + 4, left + round(u) - 3 : left + round(u) + 4]
-        assert (around == person_colour(4)).all(axis=2).any()
+        assert (around == person_color(4)).all(axis=2).any()
 
 
 def test_a_person_who_could_not_be_fitted_is_an_ellipsoid(result, tmp_path):

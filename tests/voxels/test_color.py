@@ -1,4 +1,4 @@
-"""Line of sight against Bresenham's line in plain Python; colours of a cube whose sides differ."""
+"""Line of sight against Bresenham's line in plain Python; colors of a cube whose sides differ."""
 
 from __future__ import annotations
 
@@ -75,11 +75,11 @@ def test_quick_mode_agrees_on_nearly_all():
         assert np.mean(exact == quick) > 0.95
 
 
-def test_colours_of_the_side_that_a_camera_sees():
-    """Each camera sees its own colour alone: by sight a voxel takes that of the camera on its side; the plain average mixes."""
+def test_colors_of_the_side_that_a_camera_sees():
+    """Each camera sees its own color alone: by sight a voxel takes that of the camera on its side; the plain average mixes."""
     grid, occupied = body()
     rig = Rig((look_at("front", (320, 240), [3, 0, 0.9], [0, 0, 0.9], 60), look_at("back", (320, 240), [-3, 0, 0.9], [0, 0, 0.9], 60)))
-    images = [np.full((240, 320, 3), colour, np.uint8) for colour in ((200, 0, 0), (0, 0, 100))]
+    images = [np.full((240, 320, 3), color, np.uint8) for color in ((200, 0, 0), (0, 0, 100))]
     voxels = surface(occupied)
     plain = color_voxels(grid, rig, images, voxels)
     np.testing.assert_allclose(plain, np.broadcast_to([100, 0, 50], plain.shape))
@@ -89,7 +89,7 @@ def test_colours_of_the_side_that_a_camera_sees():
     np.testing.assert_allclose(by_sight[x < -0.12], np.broadcast_to([0, 0, 100], by_sight[x < -0.12].shape))
 
 
-def test_a_voxel_has_the_colour_of_its_pixel():
+def test_a_voxel_has_the_color_of_its_pixel():
     rig = Rig((look_at("c", (64, 48), [2, 0, 0.5], [0, 0, 0.5], 60),))
     image = np.random.default_rng(0).integers(0, 256, (48, 64, 3)).astype(np.uint8)
     voxels = np.array([[3, 4, 5], [9, 9, 9], [0, 0, 0]])

@@ -63,7 +63,7 @@ def test_a_step_leaves_the_state_before_alone(scene):
     np.testing.assert_array_equal(state.occupied, occupied)
 
 
-def test_surface_and_colours_in_one(scene):
+def test_surface_and_colors_in_one(scene):
     rig, _, pixels = scene
     masks = [np.ones(camera.size[::-1], bool) for camera in rig]
     images = [np.full((*camera.size[::-1], 3), (10, 20, 30), np.uint8) for camera in rig]

@@ -81,7 +81,7 @@ CATALOGUE = (
     Entry("fig-4.9", CANTON, "samples spreading over surface and interior", "faster over the surface"),
     Entry(
         "table-4.3", CANTON, "MOTP and MOTA of all trackers, with figure 4.11",
-        "naive 190 mm, 40 % to 179, 54; SS with colour 172, 60 (15 cm) to 144, 81.5 (2 cm); PF with colour 161, 62 to 145, 74.6", _CLEAR,
+        "naive 190 mm, 40 % to 179, 54; SS with color 172, 60 (15 cm) to 144, 81.5 (2 cm); PF with color 161, 62 to 145, 74.6", _CLEAR,
         _SMALL_MEETING,
     ),
     Entry(
@@ -89,8 +89,8 @@ CATALOGUE = (
         _SMALL_MEETING,
     ),
     Entry(
-        "fig-4.12", CANTON, "a crossing with and without colour", "no change of identity with colour", _CLEAR,
-        "Samples of the preset `default` move on with their person: identities are kept without colour too.",
+        "fig-4.12", CANTON, "a crossing with and without color", "no change of identity with color", _CLEAR,
+        "Samples of the preset `default` move on with their person: identities are kept without color too.",
     ),
     Entry(
         "fig-4.13", CANTON, "measured and theoretical complexity (table 4.5)", "naive and PF grow with the voxels, SS with the samples",
@@ -191,14 +191,14 @@ CATALOGUE = (
         "The incremental update is quicker than its own tables from scratch; carving by blocks gains the more the finer the voxels are.",
     ),
     Entry(
-        "kehl-4", KEHL, "colour edges against grey ones under shadows", "fewer false edges at equal recall of contours", _OWN_VIDEOS,
-        "Edges that the empty room has do not count here. With them, on small images, colour edges had more clutter: a coloured poster.",
+        "kehl-4", KEHL, "color edges against grey ones under shadows", "fewer false edges at equal recall of contours", _OWN_VIDEOS,
+        "Edges that the empty room has do not count here. With them, on small images, color edges had more clutter: a colored poster.",
     ),
     Entry(
         "kehl-9", KEHL, "stochastic against deterministic sampling", "stochastic escapes from a displaced arm", _OWN_VIDEOS,
         "How often it escapes depends on the step sizes.",
     ),
-    Entry("kehl-11", KEHL, "surface alone, with edges, with colour", "edges help most where arms are close to the body", _OWN_VIDEOS),
+    Entry("kehl-11", KEHL, "surface alone, with edges, with color", "edges help most where arms are close to the body", _OWN_VIDEOS),
     Entry(
         "kehl-13", KEHL, "SMD against Levenberg-Marquardt",
         "2.89 cm at 1.3 frames a second against 4.27 cm at .73 with five times the points; LM loses the track with as many", _OWN_VIDEOS,
@@ -210,7 +210,7 @@ CATALOGUE = (
         why="A descent follows and does not search: limbs that move farther than their own thickness between two frames are lost for "
         "some frames, until the search finds them.",
     ),
-    Entry("kehl-17", KEHL, "holding an object", "colour keeps it out of the arm", _OWN_VIDEOS),
+    Entry("kehl-17", KEHL, "holding an object", "color keeps it out of the arm", _OWN_VIDEOS),
 )  # fmt: skip
 
 #: Where nothing is known of why ours differs.

@@ -8,10 +8,10 @@ from typing import Any
 
 import matplotlib
 
-__all__ = ["COLOURS", "house_style"]
+__all__ = ["COLORS", "house_style"]
 
-#: Colours by what is drawn, the same in every figure; the orange and the blue are those of left and right limbs.
-COLOURS = {"naive": "0.45", "particle": "#3ca0ff", "sparse": "#ff8c28", "paper": "0.15", "person": "tab:green", "other": "tab:red"}
+#: Colors by what is drawn, the same in every figure; the orange and the blue are those of left and right limbs.
+COLORS = {"naive": "0.45", "particle": "#3ca0ff", "sparse": "#ff8c28", "paper": "0.15", "person": "tab:green", "other": "tab:red"}
 
 _STYLE: dict[Any, Any] = {
     "figure.constrained_layout.use": True,

@@ -1,4 +1,4 @@
-"""Colours of the body's patches, which say with which voxels a point may be matched. Kehl (2006), section 6.1.3."""
+"""Colors of the body's patches, which say with which voxels a point may be matched. Kehl (2006), section 6.1.3."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ __all__ = ["ColorModel", "ColorSettings", "color_fits", "learn_colors", "update_
 
 @dataclass(frozen=True)
 class ColorSettings:
-    """Parameters of the patches' colours.
+    """Parameters of the patches' colors.
 
     Parameters
     ----------
     rate : float
         alpha of Eq. 16.
     deviations : float
-        A colour fits within so many standard deviations in every channel.
+        A color fits within so many standard deviations in every channel.
     least_deviation : float
         A patch's deviations are this at least, grey levels.
     least_voxels : int
@@ -42,7 +42,7 @@ class ColorModel:
     Parameters
     ----------
     mean, deviation : ndarray, shape (n_patches, 3)
-        YUV; NaN where a patch's colour is not known.
+        YUV; NaN where a patch's color is not known.
     """
 
     mean: np.ndarray
@@ -50,14 +50,14 @@ class ColorModel:
 
 
 def learn_colors(grid: SurfaceGrid, posed: PosedBody, cloud: VoxelCloud, colors: np.ndarray, settings: ColorSettings) -> ColorModel:
-    """Colours of the patches of a body that is in place: of all its points, the nearest voxel's.
+    """Colors of the patches of a body that is in place: of all its points, the nearest voxel's.
 
     Parameters
     ----------
     grid : SurfaceGrid
     posed : PosedBody
     cloud : VoxelCloud
-        Its own table of colours is not used.
+        Its own table of colors is not used.
     colors : ndarray, shape (n, 3)
         Of the cloud's voxels, YUV; NaN where unknown.
     settings : ColorSettings
@@ -87,7 +87,7 @@ def color_fits(model: ColorModel, colors: np.ndarray, settings: ColorSettings) -
     ----------
     model : ColorModel
     colors : ndarray, shape (n, 3)
-        YUV; a voxel without a colour fits all.
+        YUV; a voxel without a color fits all.
     settings : ColorSettings
 
     Returns
@@ -107,7 +107,7 @@ def color_fits(model: ColorModel, colors: np.ndarray, settings: ColorSettings) -
 
 
 def _seen(grid: SurfaceGrid, posed: PosedBody, cloud: VoxelCloud, colors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The colour at every candidate of the surface, and whether it is known."""
+    """The color at every candidate of the surface, and whether it is known."""
     index, _ = nearest_voxels(replace(cloud, barred=None), place(posed, grid.points, grid.segment))
     found = colors[index]
     known = np.isfinite(found).all(axis=1)

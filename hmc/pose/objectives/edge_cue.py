@@ -1,4 +1,4 @@
-"""The edge cue: contours of the limbs matched with colour edges in the three views that see them best. Kehl (2006), section 6.1.2."""
+"""The edge cue: contours of the limbs matched with color edges in the three views that see them best. Kehl (2006), section 6.1.2."""
 
 from __future__ import annotations
 

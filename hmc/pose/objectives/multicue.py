@@ -44,7 +44,7 @@ class CueSettings:
         nu of the Leclerc potential, for squared distances in units of the limb's diameter.
     edges : ColorEdgeSettings
     colors : ColorSettings or None
-        None: a point may be matched with a voxel of any colour.
+        None: a point may be matched with a voxel of any color.
     """
 
     surface_points: tuple[int, ...] = (60, 20, 20, 20, 20, 20)

@@ -1,4 +1,4 @@
-"""The surface cue: points of the body matched with the nearest surface voxels, of their own colour where colours are known. Kehl (2006),
+"""The surface cue: points of the body matched with the nearest surface voxels, of their own color where colors are known. Kehl (2006),
 sections 6.1.1 and 6.1.3."""
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from hmc.pose.objectives.cue_rows import Matches, PosedBody, point_wrenches
 
 __all__ = ["VoxelCloud", "match_surface", "match_voxels", "nearest_voxels", "place", "voxel_cloud"]
 
-#: Added to the squared distance of a voxel whose colour does not fit, square metres: more than any room.
+#: Added to the squared distance of a voxel whose color does not fit, square metres: more than any room.
 BARRED = np.float32(1e6)
 
 
@@ -31,7 +31,7 @@ class VoxelCloud:
         Rows x, y, z from `middle`, times -2, and their squared length: the product with (x, y, z, 1) is the squared distance to a
         point, less the point's own squared length.
     barred : ndarray of float32, shape (n_patches, n), or None
-        0 where a voxel's colour fits a patch, else `BARRED`; None: colours do not count.
+        0 where a voxel's color fits a patch, else `BARRED`; None: colors do not count.
     """
 
     points: np.ndarray
@@ -41,7 +41,7 @@ class VoxelCloud:
 
 
 def voxel_cloud(points: np.ndarray, fits: np.ndarray | None = None) -> VoxelCloud:
-    """Prepare surface voxels (n, 3), metres, with the table of which fit which patch's colour (n_patches, n)."""
+    """Prepare surface voxels (n, 3), metres, with the table of which fit which patch's color (n_patches, n)."""
     middle = points.mean(axis=0)
     near = (points - middle).T.astype(np.float32)
     system = np.concatenate([-2 * near, np.einsum("ij,ij->j", near, near)[None]])
@@ -58,7 +58,7 @@ def nearest_voxels(cloud: VoxelCloud, points: np.ndarray, patches: np.ndarray | 
     points : ndarray, shape (n, 3)
         World, metres.
     patches : ndarray of int, shape (n,), optional
-        Needed where the cloud has colours.
+        Needed where the cloud has colors.
 
     Returns
     -------
@@ -98,7 +98,7 @@ def match_surface(body: SolidBody, grid: SurfaceGrid, chosen: np.ndarray, posed:
     Returns
     -------
     Matches
-        A point without a voxel of its colour is missing.
+        A point without a voxel of its color is missing.
     """
     segment, group = grid.segment[chosen], grid.group[chosen]
     points = place(posed, grid.points[chosen], segment)
@@ -131,7 +131,7 @@ def match_voxels(
     Returns
     -------
     Matches
-        A voxel whose colour fits no candidate is left out.
+        A voxel whose color fits no candidate is left out.
     """
     points = place(posed, grid.points[candidates], grid.segment[candidates])
     near = (points - cloud.middle).astype(np.float32)

@@ -1,7 +1,7 @@
-"""Ghost legs: with few cameras a hull has more legs than a person. Told by silhouettes, removed by colours where these differ.
+"""Ghost legs: with few cameras a hull has more legs than a person. Told by silhouettes, removed by colors where these differ.
 
 A piece of the hull that no silhouette needs may be a ghost; which of several it is, silhouettes cannot say (Hsiao 2008, section 3.1.3,
-Figure 3-9). A real surface has one colour in all cameras that see it; a ghost's has those of whatever is behind it in each. Where both
+Figure 3-9). A real surface has one color in all cameras that see it; a ghost's has those of whatever is behind it in each. Where both
 legs and what is behind are alike, that does not help either, and nothing is removed.
 """
 
@@ -36,7 +36,7 @@ class GhostSettings:
     needed_share : float
         A piece is needed where so much of what it covers in some silhouette is covered by nothing else.
     color_ratio : float
-        A piece that is not needed is removed where its colours differ between cameras by so many times those of the best piece.
+        A piece that is not needed is removed where its colors differ between cameras by so many times those of the best piece.
     """
 
     lowest_share: float = 0.04
@@ -57,7 +57,7 @@ class GhostReport:
     needed : ndarray of bool, shape (n_pieces,)
         Whether some silhouette needs the piece.
     color_spread : ndarray, shape (n_pieces,)
-        How much the colours of a piece differ between the cameras that see it, grey levels; NaN where fewer than two see it.
+        How much the colors of a piece differ between the cameras that see it, grey levels; NaN where fewer than two see it.
     ghosts : ndarray of bool, shape (n_pieces,)
         Pieces that can be removed.
     text : str
@@ -80,7 +80,7 @@ def check_ghosts(voxels: np.ndarray, grid: VoxelGrid, views: Views, settings: Gh
         Of one person.
     grid : VoxelGrid
     views : Views
-        Silhouettes and, for colours, images.
+        Silhouettes and, for colors, images.
     settings : GhostSettings, optional
     """
     settings = settings or GhostSettings()
@@ -109,8 +109,8 @@ def check_ghosts(voxels: np.ndarray, grid: VoxelGrid, views: Views, settings: Gh
         ghosts = np.isin(np.arange(len(pieces)), worst)
     left = len(pieces) - int(ghosts.sum())
     text = f"{len(pieces)} legs in the hull"
-    text += f"; {int(ghosts.sum())} removed by their colours" if ghosts.any() else ""
-    text += "; which of them are real, colours do not tell: use more cameras" if left > 2 else ""
+    text += f"; {int(ghosts.sum())} removed by their colors" if ghosts.any() else ""
+    text += "; which of them are real, colors do not tell: use more cameras" if left > 2 else ""
     return GhostReport(pieces, needed, spread, ghosts, text)
 
 
@@ -159,21 +159,21 @@ def _pixels(camera: Camera, points: np.ndarray) -> np.ndarray:
 
 
 def _color_spread(piece: np.ndarray, occupied: np.ndarray, grid: VoxelGrid, views: Views) -> float:
-    """Median over a piece's surface of the standard deviation of its colours between the cameras that see it."""
+    """Median over a piece's surface of the standard deviation of its colors between the cameras that see it."""
     shell = surface(occupied)
     number = np.ravel_multi_index(tuple(shell.T), grid.shape)
     shell = shell[np.isin(number, np.ravel_multi_index(tuple(piece.T), grid.shape))]
     if len(shell) == 0 or not views.images:
         return np.nan
     seen = visibility(occupied, grid, views.rig, shell, "quick")
-    colours = np.full((len(views.rig), len(shell), 3), np.nan)
+    colors = np.full((len(views.rig), len(shell), 3), np.nan)
     for c, (camera, image) in enumerate(zip(views.rig, views.images, strict=True)):
         if image is None:
             continue
         column, row, inside = pixel_of_voxel(camera, grid.centres(shell))
         here = inside & seen[c]
-        colours[c, here] = image[row[here], column[here]]
-    several = np.isfinite(colours[..., 0]).sum(0) >= 2
+        colors[c, here] = image[row[here], column[here]]
+    several = np.isfinite(colors[..., 0]).sum(0) >= 2
     if not several.any():
         return np.nan
-    return float(np.median(np.linalg.norm(np.nanstd(colours[:, several], axis=0), axis=1)))
+    return float(np.median(np.linalg.norm(np.nanstd(colors[:, several], axis=0), axis=1)))

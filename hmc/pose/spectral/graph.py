@@ -1,4 +1,4 @@
-"""The graph of a person's voxels: face neighbours joined by edges with heat-kernel, colour-vote and shrinking weights.
+"""The graph of a person's voxels: face neighbours joined by edges with heat-kernel, color-vote and shrinking weights.
 
 Source: Hsiao (2008), Eqs. 3-9 to 3-15 and steps A-1 and A-2 of section 3.1.4.2.
 """
@@ -28,9 +28,9 @@ class GraphSettings:
     kernel_m : float
         Width of the heat kernel (Eq. 3-10) on positions, metres; its square is the thesis's k.
     kernel_color : float
-        Width of the heat kernel on colours, grey levels; 0 leaves colours out of the kernel.
+        Width of the heat kernel on colors, grey levels; 0 leaves colors out of the kernel.
     color_distance : float
-        A camera votes for an edge when the colours at its two ends are nearer than this (Eq. 3-13), grey levels.
+        A camera votes for an edge when the colors at its two ends are nearer than this (Eq. 3-13), grey levels.
     color_bonus : float
         What is added to an edge for which all cameras vote (Eq. 3-15); half of it where at least half do. At most 1.
     color_penalty : float
@@ -97,7 +97,7 @@ def face_neighbours(voxels: np.ndarray) -> np.ndarray:
 def color_votes(
     edges: np.ndarray, voxels: np.ndarray, grid: VoxelGrid, rig: Rig, images: Sequence[np.ndarray | None], distance: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """How many cameras see like colours at both ends of each edge (Eqs. 3-13 and 3-15).
+    """How many cameras see like colors at both ends of each edge (Eqs. 3-13 and 3-15).
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def color_votes(
     images : sequence of ndarray of uint8, shape (height, width, 3), or None
         One a camera; a camera without an image has no vote.
     distance : float
-        Largest distance of like colours, grey levels.
+        Largest distance of like colors, grey levels.
 
     Returns
     -------
@@ -121,9 +121,9 @@ def color_votes(
         if image is None:
             continue
         column, row, inside = pixel_of_voxel(camera, points)
-        colour = image[row, column].astype(np.float32)
+        color = image[row, column].astype(np.float32)
         asked = inside[edges].all(1)
-        differ = colour[edges[:, 0]] - colour[edges[:, 1]]
+        differ = color[edges[:, 0]] - color[edges[:, 1]]
         voters += asked
         votes += asked & ((differ**2).sum(1) < distance**2)
     return votes, voters
@@ -167,9 +167,9 @@ def build_graph(
     voxel_size_m : float
     settings : GraphSettings, optional
     votes : (votes, voters), each ndarray of int, shape (m,), optional
-        As from `color_votes` over `face_neighbours`; without them colours add nothing.
+        As from `color_votes` over `face_neighbours`; without them colors add nothing.
     colors : ndarray, shape (n, 3), optional
-        Of the voxels, for a kernel on colours.
+        Of the voxels, for a kernel on colors.
 
     Returns
     -------

@@ -114,7 +114,7 @@ def segment_body(
     voxel_size_m : float
     settings : LimbSegmentationSettings, optional
     votes : (votes, voters), optional
-        Colour votes over `face_neighbours` of the voxels (`hmc.pose.spectral.graph.color_votes`).
+        Color votes over `face_neighbours` of the voxels (`hmc.pose.spectral.graph.color_votes`).
 
     Returns
     -------

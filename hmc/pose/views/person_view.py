@@ -27,15 +27,15 @@ from hmc.voxels.hulls import HullStep
 
 __all__ = ["EVIDENCE", "IMAGES_FOR", "PersonView", "VoxelView", "check_needs", "views_of"]
 
-#: What a method may need of a frame: the hulls and the rays of the silhouettes; the coloured surface and the images around it; the voxels
-#: with the votes of their colours; the detections of markers.
+#: What a method may need of a frame: the hulls and the rays of the silhouettes; the colored surface and the images around it; the voxels
+#: with the votes of their colors; the detections of markers.
 EVIDENCE = ("hulls", "skin", "voxels", "detections")
 #: For these the images are read too.
 IMAGES_FOR = frozenset({"skin", "voxels"})
 #: Of so few cameras, hulls in which one or two may miss are mostly nobody: they count only where silhouettes ask for them. Of more, they
 #: are little fatter than the strict one, and hold what furniture hides without silhouettes that would ask for it.
 FEW_CAMERAS = 4
-#: Colours vote for edges between voxels of one colour up to so many grey levels apart.
+#: Colors vote for edges between voxels of one color up to so many grey levels apart.
 VOTE_LEVELS = 40.0
 
 
@@ -50,7 +50,7 @@ class VoxelView:
         Their centres, world, metres.
     voxel_size_m : float
     votes : tuple of ndarray, optional
-        Of their colours (`hmc.pose.spectral.graph.color_votes`).
+        Of their colors (`hmc.pose.spectral.graph.color_votes`).
     """
 
     voxels: np.ndarray
@@ -70,7 +70,7 @@ class PersonView:
     target : HullTarget or None
         Hulls and rays.
     skin : Skin or None
-        Surface voxels with their colours, and the images around them.
+        Surface voxels with their colors, and the images around them.
     voxels : VoxelView or None
         Of the strict hull, or of the tolerant one where a camera lost the person.
     markers : SeenMarkers or None
@@ -154,7 +154,7 @@ def _targets(recording, grid, hull, strict, tolerant) -> list[HullTarget | None]
 
 
 def _voxels_and_skin(recording, grid, hull, strict, tolerant, needs) -> tuple[Skin | None, VoxelView | None]:
-    """One person's coloured surface and voxels, where they are needed and there are any."""
+    """One person's colored surface and voxels, where they are needed and there are any."""
     own = sound_hull(strict, tolerant)
     skin = voxels = None
     if len(own) and "skin" in needs:

@@ -1,1 +1,1 @@
-"""Multi-cue descent: a superellipsoid body fitted to surface voxels, edges and colours by Stochastic Meta Descent. Kehl (2006)."""
+"""Multi-cue descent: a superellipsoid body fitted to surface voxels, edges and colors by Stochastic Meta Descent. Kehl (2006)."""

@@ -33,7 +33,7 @@ def solid_subject(body: BodyModel, capture: Capture, preset: SmdPreset) -> Subje
 
 
 def descended() -> Propose:
-    """Stochastic Meta Descent on all cues from where the last frame's motion leads; it remembers the patches' colours.
+    """Stochastic Meta Descent on all cues from where the last frame's motion leads; it remembers the patches' colors.
 
     Returns
     -------
@@ -51,10 +51,10 @@ def descended() -> Propose:
 
 
 def colors_of(memory: Mapping[str, np.ndarray]) -> ColorModel | None:
-    """The patches' colours in a memory, if any."""
+    """The patches' colors in a memory, if any."""
     return ColorModel(memory["color_mean"], memory["color_deviation"]) if "color_mean" in memory else None
 
 
 def with_colors(colors: ColorModel | None) -> dict[str, np.ndarray]:
-    """The patches' colours as entries of a memory."""
+    """The patches' colors as entries of a memory."""
     return {} if colors is None else {"color_mean": colors.mean, "color_deviation": colors.deviation}

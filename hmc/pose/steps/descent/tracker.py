@@ -85,7 +85,7 @@ class TrackState:
     state, velocity : ndarray, shape (27,)
         Pose and its last change.
     colors : ColorModel or None
-        None before the first frame, and where colours do not count.
+        None before the first frame, and where colors do not count.
     """
 
     state: np.ndarray
@@ -218,7 +218,7 @@ class CueFrame:
 def make_cue_frame(
     tracker: SmdTracker, observed: Skin, parameters: np.ndarray, colors: ColorModel | None = None, base: np.ndarray | None = None
 ) -> CueFrame:
-    """Sort out the voxels' colours, choose the views and find their edges.
+    """Sort out the voxels' colors, choose the views and find their edges.
 
     Parameters
     ----------
@@ -309,7 +309,7 @@ def evaluation(matches: Matches, rows: np.ndarray, width: float) -> Evaluation:
 
 
 def _new_colors(frame: CueFrame, observed: Skin, parameters: np.ndarray, colors: ColorModel | None) -> ColorModel | None:
-    """Colours of the patches after a frame."""
+    """Colors of the patches after a frame."""
     settings, tracker = frame.tracker.preset.cues.colors, frame.tracker
     if settings is None or observed.colors is None:
         return colors
