@@ -27,7 +27,7 @@ class HeightAt:
     residuals: np.ndarray
     jacobian: np.ndarray
     near: None = None
-    unexplained: None = None
+    misfit: None = None
 
     def pulls(self):
         return np.array([0]), self.jacobian

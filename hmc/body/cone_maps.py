@@ -79,7 +79,7 @@ def spread(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def cones_near(
-    cones: Cones, maps: ConeMaps, points: np.ndarray, reach: np.ndarray | float, directions: np.ndarray | None = None, sway: float = 0.0
+    cones: Cones, maps: ConeMaps, points: np.ndarray, reach: np.ndarray | float, directions: np.ndarray | None = None, slack: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
     """Which cones may come within `reach` of which points, or of the rays through them, in some particle, and what some cone holds in all.
 
@@ -94,7 +94,7 @@ def cones_near(
         Metres.
     directions : ndarray, shape (m, 3), optional
         Of the rays, of unit length; zero for points that are none.
-    sway : float
+    slack : float
         The ends of the axes may go this much farther, metres.
 
     Returns
@@ -105,7 +105,7 @@ def cones_near(
     """
     start, far_start = spread(maps.start)
     end, far_end = spread(maps.start + maps.axis * cones.lengths.astype(maps.axis.dtype)[:, None, None])
-    far = np.maximum(far_start, far_end)[:, None] + sway + 1e-4
+    far = np.maximum(far_start, far_end)[:, None] + slack + 1e-4
     # In single precision, counted from the points' middle.
     origin = points.mean(axis=0)
     points, start, axis = ((points - origin).astype(np.float32), (start - origin).astype(np.float32), (end - start).astype(np.float32))

@@ -18,7 +18,7 @@ __all__ = [
 
 
 def places_and_directions(points: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
-    """What is to be explained, shape (m, 3) or (m, 6), as places and, where there are rays, directions; each of shape (m, 3)."""
+    """What is to be covered, shape (m, 3) or (m, 6), as places and, where there are rays, directions; each of shape (m, 3)."""
     return points[:, :3], points[:, 3:] if points.shape[1] > 3 else None
 
 

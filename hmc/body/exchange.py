@@ -40,7 +40,7 @@ def swapped_pose(body: BodyModel, state: np.ndarray, what: Literal["all", "legs"
     Returns
     -------
     ndarray, shape (27,)
-        Within the joint limits, so it explains the hull as well as the body can that way round.
+        Within the joint limits, so it fits the hull as well as the body can that way round.
     """
     points = landmarks(body, state)
     moved, start = points.copy(), state.copy()

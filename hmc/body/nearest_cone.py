@@ -18,7 +18,7 @@ from hmc.body.model import PARTS, BodyModel, Cones
 __all__ = ["Candidates", "Nearest", "candidates", "nearest_cones", "part_distances", "towards"]
 
 #: How far the ends of the cones may go before the candidates are looked for again, metres.
-SWAY_M = 0.06
+SLACK_M = 0.06
 
 
 @dataclass(frozen=True)
@@ -71,10 +71,10 @@ def candidates(cones: Cones, maps: ConeMaps, points: np.ndarray, reach_m: float,
         Of another pose and the same points: they are returned where they are still good.
     """
     ends = np.stack([maps.start[:, :, 0], maps.start[:, :, 0] + maps.axis[:, :, 0] * cones.lengths[:, None]])
-    if before is not None and ((ends - before.ends) ** 2).sum(axis=2).max() < SWAY_M**2:
+    if before is not None and ((ends - before.ends) ** 2).sum(axis=2).max() < SLACK_M**2:
         return before
     places, directions = places_and_directions(points)
-    near, held = cones_near(cones, maps, places, reach_m, directions, SWAY_M)
+    near, held = cones_near(cones, maps, places, reach_m, directions, SLACK_M)
     point, cone = np.nonzero((near & ~held).T)
     at = cone * (3 * len(places)) + point + (np.arange(3) * len(places))[:, None]
     length, radii, slope = (values[cone] for values in cone_shapes(cones))

@@ -1,6 +1,6 @@
 """How far the body's parts reach into one another: the symmetric cost's form of Canton's double occupancy (Eq. 6.14).
 
-Two limbs in one place explain the hull as well as one there, so without a price for it both arms of a boxer end on the one
+Two limbs in one place cover the hull as well as one there, so without a price for it both arms of a boxer end on the one
 that is stretched out. Points on the axes of the limbs are tested against the cones of parts that are no neighbours.
 """
 

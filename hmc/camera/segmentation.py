@@ -320,7 +320,7 @@ def _apply(model: BackgroundModel, image: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def _level(model: BackgroundModel, image: np.ndarray, answer: np.ndarray, found: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The image as bright as the background, with the mixture's answer to it, where that explains most of the foreground."""
+    """The image as bright as the background, with the mixture's answer to it, where that accounts for most of the foreground."""
     few = slice(None, None, GAIN_STEP), slice(None, None, GAIN_STEP)
     luma = _luma_chroma(image[few])[..., 0]
     told: np.ndarray = (luma < OVEREXPOSED) & ~model.people[few]

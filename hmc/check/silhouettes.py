@@ -31,7 +31,7 @@ LEAST_VIEWS = 4
 LEAST_DEPTH_M = 0.065
 #: Frames of the empty scene that are learnt from.
 LEARNT_FRAMES = 20
-#: Share of a silhouette that the others' hull explains: .97 or so in a good rig, .83 where furniture hides half of the person from two
+#: Share of a silhouette that the others' hull covers: .97 or so in a good rig, .83 where furniture hides half of the person from two
 #: cameras, .5 to .9 when one camera is turned by 5 degrees, below .4 when two videos are swapped.
 GOOD_AGREEMENT = 0.9
 LEAST_AGREEMENT = 0.6
@@ -164,10 +164,10 @@ def _odd_camera(rig: Rig, hulls: Sequence[Hull]) -> list[str]:
 
 
 def silhouette_agreement(views: Sequence[_View], masks: Sequence[Sequence[np.ndarray | None]], members: Sequence[int]) -> np.ndarray:
-    """The share of each camera's silhouettes that the hull of the other cameras explains.
+    """The share of each camera's silhouettes that the hull of the other cameras covers.
 
     The hull for a camera is made of the points that at least two of the others see and all of those have in their silhouettes. A cell
-    of the camera's silhouette counts if it shows a point of the room that two others see, and is explained if it, or a neighbour,
+    of the camera's silhouette counts if it shows a point of the room that two others see, and is covered if it, or a neighbour,
     shows one of the hull.
 
     Parameters
@@ -183,7 +183,7 @@ def silhouette_agreement(views: Sequence[_View], masks: Sequence[Sequence[np.nda
     ndarray, shape (len(members),)
         Summed over the frames; nan where there is too little to say.
     """
-    explained, there = np.zeros(len(members)), np.zeros(len(members))
+    matched, there = np.zeros(len(members)), np.zeros(len(members))
     for frame in masks:
         coarse = {index: _coarse(mask, views[index].shape) for index in members if (mask := frame[index]) is not None}
         hits = {index: (coarse[index][views[index].cell] > TOUCHED) & views[index].seen for index in coarse}
@@ -198,8 +198,8 @@ def silhouette_agreement(views: Sequence[_View], masks: Sequence[Sequence[np.nda
             covered = cv2.dilate(_lit(view, hull).reshape(view.shape).astype(np.uint8), np.ones((3, 3), np.uint8)).ravel() > 0
             place = members.index(index)
             there[place] += silhouette.sum()
-            explained[place] += (silhouette & covered).sum()
-    return np.where(there >= LEAST_CELLS, explained / np.maximum(there, 1), np.nan)
+            matched[place] += (silhouette & covered).sum()
+    return np.where(there >= LEAST_CELLS, matched / np.maximum(there, 1), np.nan)
 
 
 def _views(recording: Recording) -> list[_View]:

@@ -23,7 +23,7 @@ from hmc.io.recording import Recording, iterate_frames
 from hmc.io.results import PoseStates, PoseTable, TrackTable, write_joints, write_pose
 from hmc.landmarks import LANDMARKS
 from hmc.pose.method import Capture, PoseMethod
-from hmc.pose.person import DecidedFrames, PersonState, PersonTrack, PoseTask, person_step, taken_up
+from hmc.pose.person import DecidedFrames, PersonState, PersonTrack, PoseTask, person_step, resumed
 from hmc.pose.records import keep_decided, kept_decided
 from hmc.pose.views.markers import marker_views, seen_in_frame
 from hmc.pose.views.person_view import IMAGES_FOR, PersonView, check_needs, views_of
@@ -188,7 +188,7 @@ def follow(
     done: list[DecidedFrames] = []
     for decided in kept_decided(run.journal, run.key, task):
         done.append(replace(decided, tracked=None))
-        states[decided.person] = taken_up(task, states[decided.person], decided)
+        states[decided.person] = resumed(task, states[decided.person], decided)
     left = {number: person.frames[person.frames > states[number].done_to] for number, person in persons.items()}
     first = min((int(frames[0]) for frames in left.values() if len(frames)), default=None)
     for views in () if first is None else _views_from(recording, tracks, method, (options, run), first):

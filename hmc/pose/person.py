@@ -2,7 +2,7 @@
 
 A step takes what is known of a person and one frame's view and returns what is known then, with the rows of the frames that are decided, if
 any. Whatever a step needs from earlier frames is in its state, and the random numbers of a frame depend on the seed, the person and the
-frame alone, so a run can go on from the rows that it left (`taken_up`). It is the same for all methods.
+frame alone, so a run can go on from the rows that it left (`resumed`). It is the same for all methods.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from hmc.pose.method import Alternatives, Capture, PoseMethod, StepInfo, Subject
 from hmc.pose.starts.window import walk
 from hmc.pose.views.person_view import PersonView
 
-__all__ = ["DecidedFrames", "PersonState", "PersonTrack", "PoseTask", "person_step", "taken_up"]
+__all__ = ["DecidedFrames", "PersonState", "PersonTrack", "PoseTask", "person_step", "resumed"]
 
 NO_START = "nothing to start from"
 
@@ -253,7 +253,7 @@ def _context(task: PoseTask, context: tuple[tuple[int, np.ndarray], ...], decide
     return (*context, *zip(decided.frames, decided.states, strict=True))[-1 - legs.reach(task.capture.fps) :]
 
 
-def taken_up(task: PoseTask, state: PersonState, decided: DecidedFrames) -> PersonState:
+def resumed(task: PoseTask, state: PersonState, decided: DecidedFrames) -> PersonState:
     """The state of a person after these rows, all that a stopped run leaves.
 
     Parameters

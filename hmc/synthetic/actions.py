@@ -15,11 +15,11 @@ def stand(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator) -> Mo
     """Stand and look about; arguments and result as for `hmc.synthetic.gait.walk`."""
     n = len(times)
     feet = _planted(skeleton, n, [(0.0, 0.10, 8), (0.0, -0.10, -8)])
-    look = _sway(times, rng, 0.25, 2.5)
+    look = _wander(times, rng, 0.25, 2.5)
     upper = _upper(
-        n, chest=_columns(n, pitch=0.03 + _sway(times, rng, 0.01, 3), yaw=0.3 * look), head=_columns(n, pitch=-0.02, yaw=0.7 * look)
+        n, chest=_columns(n, pitch=0.03 + _wander(times, rng, 0.01, 3), yaw=0.3 * look), head=_columns(n, pitch=-0.02, yaw=0.7 * look)
     )
-    swing = 0.05 + np.stack([_sway(times, rng, 0.02, 2), _sway(times, rng, 0.02, 2)], axis=-1)
+    swing = 0.05 + np.stack([_wander(times, rng, 0.02, 2), _wander(times, rng, 0.02, 2)], axis=-1)
     arms = arms_by_angles(swing, np.full((n, 2), 0.25), np.full((n, 2), 0.14))
     return _on_feet(skeleton, times, feet, upper, arms, 0.012 * _shift(times, rng), np.zeros(n))
 
@@ -49,8 +49,8 @@ def box(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator) -> Moti
             turns.append(turn)
         now += rng.uniform(0.08, 0.55)
     hands, yaw = keyframes(times, np.array(at), np.array(poses)), keyframes(times, np.array(at), np.array(turns))
-    hands = hands + 0.02 * np.stack([[_sway(times, rng, 1, 0.8) for _ in range(3)] for _ in range(2)]).transpose(2, 0, 1)
-    weave = _sway(times, rng, 1.0, 1.1)
+    hands = hands + 0.02 * np.stack([[_wander(times, rng, 1, 0.8) for _ in range(3)] for _ in range(2)]).transpose(2, 0, 1)
+    weave = _wander(times, rng, 1.0, 1.1)
     upper = _upper(
         n,
         pelvis=_columns(n, roll=0.03 * weave, pitch=0.08, yaw=0.4 * yaw - stance),
@@ -62,7 +62,7 @@ def box(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator) -> Moti
     feet = _raise_heel(skeleton, feet, 1, heel)
     xy = np.stack([0.03 * yaw, 0.03 * weave], axis=-1)
     return _on_feet(
-        skeleton, times, feet, upper, arms_by_hands(skeleton, hands, elbow_out=0.35), xy, 0.05 + 0.015 * (1 + _sway(times, rng, 1, 0.9))
+        skeleton, times, feet, upper, arms_by_hands(skeleton, hands, elbow_out=0.35), xy, 0.05 + 0.015 * (1 + _wander(times, rng, 1, 0.9))
     )
 
 
@@ -95,14 +95,14 @@ def gesture(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator) -> 
         poses.append(rest)
         now += rng.uniform(0.05, 0.3)
     hands = _clear(keyframes(times, np.array(at), np.array(poses)))
-    look = _sway(times, rng, 0.3, 2.0)
+    look = _wander(times, rng, 0.3, 2.0)
     lean = hands[:, 1, 2] - hands[:, 0, 2]
     upper = _upper(
         n,
         pelvis=_columns(n, yaw=0.15 * look),
         abdomen=_columns(n, roll=-0.02 * lean, yaw=0.15 * look),
         chest=_columns(n, roll=-0.03 * lean, pitch=0.02),
-        head=_columns(n, pitch=-0.03 + _sway(times, rng, 0.05, 1.2), yaw=0.6 * look),
+        head=_columns(n, pitch=-0.03 + _wander(times, rng, 0.05, 1.2), yaw=0.6 * look),
     )
     return _on_feet(
         skeleton, times, feet, upper, arms_by_hands(skeleton, hands, elbow_out=0.7), 0.02 * _shift(times, rng), np.full(n, 0.004)
@@ -169,7 +169,7 @@ def sit(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator, seat_m:
         abdomen=_columns(n, pitch=0.5 * spine),
         chest=_columns(n, pitch=0.5 * spine),
         neck=_columns(n, pitch=0.4 * nod),
-        head=_columns(n, pitch=0.6 * nod, yaw=_sway(times, rng, 0.2, 1.7)),
+        head=_columns(n, pitch=0.6 * nod, yaw=_wander(times, rng, 0.2, 1.7)),
     )
     y = np.interp(x, [0.1, 0.5], [0.10, -0.06])
     hands = np.stack([np.stack([x, y, z], axis=-1), np.stack([x, -y, z], axis=-1)], axis=1)
@@ -196,7 +196,7 @@ def pick_up(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator) -> 
         n,
         pelvis=_columns(n, pitch=tilt),
         abdomen=_columns(n, pitch=0.45 * spine),
-        chest=_columns(n, pitch=0.55 * spine, yaw=_sway(times, rng, 0.04, 1.5)),
+        chest=_columns(n, pitch=0.55 * spine, yaw=_wander(times, rng, 0.04, 1.5)),
         neck=_columns(n, pitch=0.4 * nod),
         head=_columns(n, pitch=0.6 * nod),
     )
@@ -209,18 +209,18 @@ def hug(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator) -> Moti
     """Hold somebody who stands .4 m ahead: arms round them, chest leant forwards."""
     n = len(times)
     feet = _planted(skeleton, n, [(0.05, 0.11, 6), (-0.05, -0.11, -6)])
-    sway = 0.02 * np.stack([_sway(times, rng, 1.0, 1.5) for _ in range(2)], axis=-1)
+    shift = 0.02 * np.stack([_wander(times, rng, 1.0, 1.5) for _ in range(2)], axis=-1)
     high = rng.choice([-1.0, 1.0])  # one arm over the other's shoulder, one below
     hands = np.array([[0.72, -0.32, 0.05 + 0.12 * high], [0.72, 0.32, 0.05 - 0.12 * high]])
     upper = _upper(
         n,
         pelvis=_columns(n, pitch=0.06),
         abdomen=_columns(n, pitch=0.06),
-        chest=_columns(n, pitch=0.05 + sway[:, 0]),
+        chest=_columns(n, pitch=0.05 + shift[:, 0]),
         head=_columns(n, pitch=-0.1, yaw=0.5 * high),
     )
     arms = arms_by_hands(skeleton, np.tile(hands, (n, 1, 1)), elbow_out=1.2)
-    return _on_feet(skeleton, times, feet, upper, arms, sway, np.full(n, 0.004))
+    return _on_feet(skeleton, times, feet, upper, arms, shift, np.full(n, 0.004))
 
 
 def _planted(skeleton: Skeleton, n: int, prints) -> Feet:
@@ -258,7 +258,7 @@ def _columns(n: int, roll=0.0, pitch=0.0, yaw=0.0) -> np.ndarray:
     return np.stack([np.broadcast_to(np.asarray(value, float), n) for value in (roll, pitch, yaw)], axis=-1)
 
 
-def _sway(times: np.ndarray, rng: np.random.Generator, size: float, period_s: float) -> np.ndarray:
+def _wander(times: np.ndarray, rng: np.random.Generator, size: float, period_s: float) -> np.ndarray:
     """A smooth wandering curve (n,), most of it within ``size`` of zero."""
     total = np.zeros_like(times)
     for k in range(3):
@@ -268,7 +268,7 @@ def _sway(times: np.ndarray, rng: np.random.Generator, size: float, period_s: fl
 
 def _shift(times: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """A wandering of the weight over the floor, (n, 2)."""
-    return np.stack([_sway(times, rng, 1.0, 3.0), _sway(times, rng, 1.0, 3.5)], axis=-1)
+    return np.stack([_wander(times, rng, 1.0, 3.0), _wander(times, rng, 1.0, 3.5)], axis=-1)
 
 
 def _clear(hands: np.ndarray) -> np.ndarray:

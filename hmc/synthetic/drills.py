@@ -115,8 +115,8 @@ def _drill(skeleton: Skeleton, times: np.ndarray, keys: list[Key]) -> Motion:
     ankles = np.einsum("nij,nsj->nsi", turned, steps) + [0, 0, skeleton.ankle_height]
     pitch = np.clip(steps[..., 2], 0, 0.6)
     feet = Feet(ankles, np.stack([turn + 0.12, turn - 0.12], axis=-1), pitch, pitch)
-    sway = np.column_stack([-0.10 * np.minimum(lean, 0), size * shift])
-    xy = np.einsum("nij,nj->ni", turned[:, :2, :2], sway)
+    offset = np.column_stack([-0.10 * np.minimum(lean, 0), size * shift])
+    xy = np.einsum("nij,nj->ni", turned[:, :2, :2], offset)
     height = pelvis_height(skeleton, xy, turn, _standing(feet, steps, skeleton)) - 0.01
     none = np.zeros(n)
     upper = Upper(

@@ -119,11 +119,11 @@ def _motion(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator, dis
     cycles = distance / stride + phase  # of the left foot; the right is half a cycle later
     origin = phase * stride
     feet = _feet(skeleton, cycles, way, origin, gait)
-    sway = np.sin(2 * np.pi * cycles)
+    rocking = np.sin(2 * np.pi * cycles)
     twist = np.cos(2 * np.pi * cycles)
     middle, heading = way(cycles * stride - origin)
     left = np.stack([-np.sin(heading), np.cos(heading)], axis=-1)
-    middle = middle + 0.016 * sway[:, None] * left
+    middle = middle + 0.016 * rocking[:, None] * left
     zero = np.zeros_like(times)
     lean = (0.12 if running else 0.03) + rng.normal(0, 0.015)
     yaw_size = np.radians(rng.uniform(4, 6))
@@ -138,9 +138,9 @@ def _motion(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator, dis
         # Knees give way a little in the middle of stance, so that the pelvis rises less than straight legs would lift it.
         height = height.min() + 0.8 * (height - height.min())
     upper = Upper(
-        pelvis=np.stack([0.045 * sway, lean * 0.5 + zero, pelvis_yaw], axis=-1),
-        abdomen=np.stack([-0.03 * sway, lean * 0.5 + zero, yaw_size * twist], axis=-1),
-        chest=np.stack([-0.02 * sway, zero + 0.02, 1.1 * yaw_size * twist], axis=-1),
+        pelvis=np.stack([0.045 * rocking, lean * 0.5 + zero, pelvis_yaw], axis=-1),
+        abdomen=np.stack([-0.03 * rocking, lean * 0.5 + zero, yaw_size * twist], axis=-1),
+        chest=np.stack([-0.02 * rocking, zero + 0.02, 1.1 * yaw_size * twist], axis=-1),
         neck=np.stack([zero, zero + 0.05, -0.5 * yaw_size * twist], axis=-1),
         head=np.stack([zero, zero - 0.05 - lean * 0.7, -0.5 * yaw_size * twist], axis=-1),
     )

@@ -1,7 +1,7 @@
 """All tracks of a whole recording, so that a run that was stopped goes on where it was.
 
 Every `CHECKPOINT_FRAMES` frames the tracker's rows and its whole state go into a journal. A run that is started again with the same
-journal and the same key takes them up and computes what is left. What is guaranteed: finished frames are kept as they were, and the
+journal and the same key reads them and computes what is left. What is guaranteed: finished frames are kept as they were, and the
 tracker goes on from exactly the state it had. The background models are not stored; they are learnt again and then segment the
 `WARM_UP_FRAMES` frames before. Where that reaches back to the start of the selection, the result is identical to that of a run
 without a stop; later on the background has adapted to the last frames only, which may change single pixels of the silhouettes.

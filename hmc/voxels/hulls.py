@@ -5,7 +5,8 @@
 
 Where the silhouettes come from, camera by camera (``FrontendSettings.source = "auto"``): ready-made ones where the recording has them;
 else the images against a background learnt from frames of the empty scene; else against a temporal median of the recording from which
-people were cut out with the help of all cameras, and where they hardly ever leave a place, by their colors (`hmc.voxels.never_empty`).
+people were cut out with the help of all cameras, and where they hardly ever leave a place, by their colors
+(`hmc.voxels.background_initialisation`).
 
 Nothing grows with the length of the recording.
 """
@@ -25,10 +26,10 @@ from hmc.camera.segmentation import BackgroundModel, SegmentationSettings, segme
 from hmc.errors import InputError
 from hmc.io.masks import MaskStep, Report
 from hmc.io.recording import Frame, Recording, background_frames, iterate_frames
+from hmc.voxels.background_initialisation import UnseenPlaces, learn_from_people, with_unseen_places
 from hmc.voxels.carving import CarvingTables, carve_levels, make_tables
 from hmc.voxels.completion import complete_masks, doubtful_hull, make_completion_tables
 from hmc.voxels.grid import VoxelGrid
-from hmc.voxels.never_empty import UnseenPlaces, learn_from_people, with_unseen_places
 
 __all__ = ["FrontendSettings", "HullStep", "learn_backgrounds", "stream_hulls", "stream_masks"]
 

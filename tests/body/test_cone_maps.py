@@ -78,15 +78,15 @@ def test_what_is_held_is_in_the_body_in_every_particle(deviation):
     _, held = cones_near(cones, maps, points, 0.06, directions)
     assert deviation > 0.005 or min(held[::2].mean(), held[1::2].mean()) > 0.01
     assert held.mean() < 0.9
-    unexplained = body_distance(BODY, states, np.concatenate([points, directions], axis=1))
-    assert not unexplained[:, held].any()
+    uncovered = body_distance(BODY, states, np.concatenate([points, directions], axis=1))
+    assert not uncovered[:, held].any()
 
 
-def test_of_one_pose_that_may_sway_nothing_is_lost():
+def test_of_one_pose_with_slack_nothing_is_lost():
     cones, state = BODY.cones, neutral_state("down")
     rng = np.random.default_rng(4)
     points = rng.normal(0, 0.4, (300, 3))
-    near = cones_near(cones, cone_maps(cones, place_segments(BODY, state[None], np.zeros(3))), points, 0.06, sway=0.05)[0]
+    near = cones_near(cones, cone_maps(cones, place_segments(BODY, state[None], np.zeros(3))), points, 0.06, slack=0.05)[0]
     for _ in range(20):
         maps = cone_maps(cones, place_segments(BODY, state[None] + rng.normal(0, 0.03, 27), np.zeros(3)))
         ends = maps.start + maps.axis * cones.lengths[:, None, None]

@@ -135,7 +135,7 @@ def test_another_seed_gives_another_result(whole, case):
 # --- runs that are stopped
 
 
-def stopped_and_taken_up(case, tmp_path, stop, **how):
+def stopped_and_resumed(case, tmp_path, stop, **how):
     """Stop a run after so many frames, with a torn line in its journal; finish it. What it came to, the frames that were visited, files."""
     kept = {"journal": tmp_path / "journal", "key": "run"}
     with pytest.raises(Stopped):
@@ -154,7 +154,7 @@ def stopped_and_taken_up(case, tmp_path, stop, **how):
 @each(CASES)
 def test_a_stopped_run_goes_on_and_ends_as_if_it_had_not_been(whole, case, tmp_path):
     """What each remembers besides the pose is in a file beside the journal: particles, colors, evidence for a heading, markers' places."""
-    people, seen, beside = stopped_and_taken_up(case, tmp_path, 5)
+    people, seen, beside = stopped_and_resumed(case, tmp_path, 5)
     equal(people, whole(case))
     # What was decided is not computed again; legs are decided two frames later.
     decided = 3 if lean_method(*case).legs is not None else 5
@@ -170,7 +170,7 @@ def test_a_stopped_run_goes_on_and_ends_as_if_it_had_not_been(whole, case, tmp_p
 @pytest.mark.parametrize("stop", [1, 2, 3, 4, 6])
 def test_wherever_it_was_stopped(whole, stop, tmp_path):
     """While the person is watched, in the frame in which that ends, and while followed."""
-    people, seen, _ = stopped_and_taken_up(CANTON, tmp_path, stop)
+    people, seen, _ = stopped_and_resumed(CANTON, tmp_path, stop)
     equal(people, whole(CANTON))
     assert seen[0] <= stop
 
@@ -383,7 +383,7 @@ def test_a_track_with_a_gap(tmp_path):
     kept = tracks.where(~np.isin(tracks.frames, [4]))
     whole = followed(CANTON, FRAMES, tracks=kept)
     assert whole.poses.frames.tolist() == [0, 1, 2, 3, 5, 6]
-    people, _, _ = stopped_and_taken_up(CANTON, tmp_path, 5, tracks=kept)
+    people, _, _ = stopped_and_resumed(CANTON, tmp_path, 5, tracks=kept)
     equal(people, whole)
 
 

@@ -48,20 +48,20 @@ def lose(state: np.ndarray, limb: str) -> np.ndarray:
 
 def named(rng, scene, state, settings) -> list[str]:
     """The limbs that are looked for at a state."""
-    return lost_limbs(rng, scene[0].linearise(state).unexplained, settings)
+    return lost_limbs(rng, scene[0].linearise(state).misfit, settings)
 
 
 @pytest.mark.parametrize("limb", LIMBS)
 def test_a_limb_in_the_air_is_named(scene, limb):
     lost = lose(scene[1], limb)
-    assert named(np.random.default_rng(0), scene, lost, SearchSettings(unexplained_share=1.0)) == [limb]
-    # The hull where the limb should be is then unexplained, and others are looked for by turns: their own may have gone there.
-    picks = [named(np.random.default_rng(k), scene, lost, SearchSettings(unexplained_share=0.005, at_once=2)) for k in range(20)]
+    assert named(np.random.default_rng(0), scene, lost, SearchSettings(uncovered_share=1.0)) == [limb]
+    # The hull where the limb should be is then uncovered, and others are looked for by turns: their own may have gone there.
+    picks = [named(np.random.default_rng(k), scene, lost, SearchSettings(uncovered_share=0.005, at_once=2)) for k in range(20)]
     assert all(len(pick) == 2 and limb in pick for pick in picks) and set().union(*picks) == set(LIMBS)
 
 
 def test_a_good_pose_has_one_limb_looked_at_by_turns(scene):
-    settings = SearchSettings(unexplained_share=0.5, far_m=0.08, random_share=1.0)
+    settings = SearchSettings(uncovered_share=0.5, far_m=0.08, random_share=1.0)
     picks = [named(np.random.default_rng(k), scene, scene[1], settings) for k in range(30)]
     assert {len(p) for p in picks} == {1} and {p[0] for p in picks} == set(LIMBS)
     settings = replace(settings, random_share=0.5)
@@ -73,7 +73,7 @@ def test_what_a_refinement_tells_is_what_the_search_asks(scene):
     """The distances of a refinement are those of its pose, as far as the search looks at them."""
     objective, state, _ = scene
     found, info = refine(objective, lose(state, "l_arm"), RefineSettings(iterations=2))
-    body, target, told, far = objective.body, objective.target, info.unexplained, SearchSettings().far_m
+    body, target, told, far = objective.body, objective.target, info.misfit, SearchSettings().far_m
     # One reads the hull's distances between voxels, the other voxel by voxel.
     outside = outside_distance(body, objective.points.surface, found[None], target)[0]
     assert_allclose(told.outside, outside, atol=target.voxel_size_m)
@@ -111,9 +111,9 @@ def test_what_is_right_stays(scene):
         assert farthest(objective, found, state) < 0.08
 
 
-def test_poses_without_promise_are_not_refined(scene):
+def test_draws_above_the_ratio_are_not_refined(scene):
     objective, state, cost = scene
-    settings = SearchSettings(promise=0.0)
+    settings = SearchSettings(draw_ratio=0.0)
     found, after, evaluations = search_limbs(np.random.default_rng(0), objective, (state, cost), ["l_arm"], RefineSettings(), settings)
     np.testing.assert_array_equal(found, state)
     assert after == cost and evaluations == settings.draws + 1
@@ -136,7 +136,7 @@ def test_the_same_seed_gives_the_same(scene):
 
 @pytest.mark.parametrize("limb", LOST)
 def test_few_draws_suffice_where_the_hull_shows_the_limb(scene, limb):
-    """Half of them reach for what nothing explains; without that a few would often miss."""
+    """Half of them reach for what nothing covers; without that a few would often miss."""
     objective, state, _ = scene
     lost = lose(state, limb)
     settings = SearchSettings(draws=30)

@@ -27,7 +27,7 @@ from hmc.pose.objectives.epipolar import MarkerLikelihood, marker_cost, project_
 from hmc.pose.objectives.marker_points import find_points, triangulate
 from hmc.pose.objectives.nearest_detections import nearest_detections
 from hmc.pose.steps.marker_filter import MARKER_PRESETS, TIPS, MarkerPreset, marker_frame, on_markers, with_tips
-from hmc.pose.steps.marker_limbs import explain_all, refine_to_points
+from hmc.pose.steps.marker_limbs import fit_all_points, refine_to_points
 from hmc.pose.steps.marker_search import left_over, search_near, start_poses
 from hmc.pose.steps.presets import drift
 from hmc.pose.views.markers import marker_views, observe_markers
@@ -318,7 +318,7 @@ def test_exchanged_limbs_are_put_right_and_one_gone_astray_is_found():
     for wrong in (swapped_pose(BODY, true, "legs"), astray):
         assert np.linalg.norm(landmarks(BODY, wrong) - landmarks(BODY, true), axis=1).max() > 0.15
         state, points = refine_to_points(BODY, seen, wrong, GATE)
-        better, points, choice = explain_all(np.random.default_rng(0), BODY, seen, state, points, GATE)
+        better, points, choice = fit_all_points(np.random.default_rng(0), BODY, seen, state, points, GATE)
         assert np.linalg.norm(landmarks(BODY, better) - landmarks(BODY, true), axis=1).max() < 0.05
         assert np.nanmax(np.linalg.norm(points - landmarks(BODY, true), axis=1)) < 0.05
         np.testing.assert_array_equal(choice.states[choice.costs.argmin()], better)

@@ -26,7 +26,7 @@ class _PulledAt:
     residuals: np.ndarray
     jacobian: np.ndarray
     near: Any = None
-    unexplained: Any = None
+    misfit: Any = None
 
     def pulls(self):
         return np.arange(len(self.residuals)), self.jacobian
@@ -93,12 +93,12 @@ def test_residuals_and_derivatives_stand_one_after_the_other(scene):
     assert_allclose(total.linearise(states[0], found.near).residuals, residuals)
 
 
-def test_what_is_unexplained_is_that_of_the_parts_that_can_tell(scene):
+def test_the_misfit_is_that_of_the_parts_that_can_tell(scene):
     total, states, _ = scene
-    told, single = total.linearise(states[0]).unexplained, [one.linearise(states[0]).unexplained for one in total.parts[:2]]
+    told, single = total.linearise(states[0]).misfit, [one.linearise(states[0]).misfit for one in total.parts[:2]]
     for name in ("outside", "part", "places", "distance"):
         assert_array_equal(getattr(told, name), np.concatenate([getattr(one, name) for one in single]))
-    assert Sum(total.parts[2:]).linearise(states[0]).unexplained is None
+    assert Sum(total.parts[2:]).linearise(states[0]).misfit is None
 
 
 def test_shares_of_the_parts_of_the_body_add_up_where_all_can_tell(scene):
@@ -141,7 +141,7 @@ def test_a_refinement_goes_to_the_minimum_of_the_sum(scene):
 def test_lost_limbs_are_looked_for_in_a_sum(scene):
     total, _, true = scene
     settings = SearchSettings(draws=40)
-    named = lost_limbs(np.random.default_rng(0), total.linearise(true).unexplained, settings)
+    named = lost_limbs(np.random.default_rng(0), total.linearise(true).misfit, settings)
     state, cost, evaluations = search_limbs(
         np.random.default_rng(1), total, (true, cost_at(total, true)), ["l_arm"], RefineSettings(), settings
     )

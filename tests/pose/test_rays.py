@@ -16,7 +16,7 @@ from hmc.body.joints import dof_index
 from hmc.body.model import neutral_state
 from hmc.camera.model import project
 from hmc.pose.objectives.symmetric import body_distance
-from hmc.pose.views.rays import points_to_explain, silhouette_rays, with_rays
+from hmc.pose.views.rays import points_to_cover, silhouette_rays, with_rays
 
 
 @settings(max_examples=50)
@@ -120,12 +120,12 @@ def test_shares_of_what_is_drawn():
     target = act("walk", frames=1).targets[0]
     rng = np.random.default_rng(0)
     for share in (0.0, 0.6, 1.0):
-        drawn = points_to_explain(rng, target, 200, share)
+        drawn = points_to_cover(rng, target, 200, share)
         assert drawn.shape == (200, 6)
         assert np.count_nonzero(drawn[:, 3:].any(axis=1)) == round(200 * share)
 
 
-def test_the_true_pose_explains_the_rays_of_few_cameras_and_not_their_hull():
+def test_the_true_pose_covers_the_rays_of_few_cameras_and_not_their_hull():
     """Three cameras' hull has much that is nobody; every ray still hits the person."""
     acted = act("gesture", frames=1, cameras=3)
     body, _ = body_of(acted.height_m)

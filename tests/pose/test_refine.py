@@ -12,17 +12,17 @@ from hmc.body.penetration import axis_points
 from hmc.pose.objectives.residuals import residual_rows
 from hmc.pose.objectives.symmetric import BodyPoints, Symmetric, SymmetricSettings, thinned
 from hmc.pose.steps.refine import RefineSettings, refine, refine_all, refine_best
-from hmc.pose.views.rays import points_to_explain
+from hmc.pose.views.rays import points_to_cover
 
-GROUPS = ("outside", "unexplained", "depth", "posture")
+GROUPS = ("outside", "uncovered", "depth", "posture")
 
 
 @pytest.fixture(scope="module", params=[0.0, 0.7], ids=["hull", "rays"])
 def scene(request):
-    """A person who gestures: body, its points, frame, what is to be explained, the true state."""
+    """A person who gestures: body, its points, frame, what is to be covered, the true state."""
     acted = act("gesture")
     body, points = body_of(acted.height_m)
-    hull = points_to_explain(np.random.default_rng(0), acted.targets[0], 600, request.param)
+    hull = points_to_cover(np.random.default_rng(0), acted.targets[0], 600, request.param)
     return body, points, acted.targets[0], hull, true_state(body, acted)
 
 
@@ -68,7 +68,7 @@ def test_derivatives_are_exact_for_cylinders(scene, pose):
         fine = fine[(fine >= rows.start) & (fine < rows.stop)]
         exact = np.isclose(jacobian[fine], measured[fine], rtol=0, atol=1e-6 * max(1.0, np.abs(measured[fine]).max())).all(axis=1)
         # Past a flat end, the place of a ray that is nearest to the axis is not quite the nearest to the cylinder.
-        assert exact.mean() > 0.7 if name == "unexplained" and hull[:, 3:].any() else exact.all(), name
+        assert exact.mean() > 0.7 if name == "uncovered" and hull[:, 3:].any() else exact.all(), name
         if name != "depth" or pose == 1:
             assert np.abs(measured[fine]).max() > 1e-4  # there was something to test
 
@@ -90,7 +90,7 @@ def test_derivatives_for_flesh_point_the_right_way(scene, pose):
         assert not np.any(jacobian[rows][smooth[rows] & ~fine])  # what does not change has no derivative
 
 
-@pytest.mark.parametrize("settings", [COST, SymmetricSettings(cap_m=0.08, explain_weight=0.4, overlap_weight=3.0, posture_weight=1e-4)])
+@pytest.mark.parametrize("settings", [COST, SymmetricSettings(cap_m=0.08, uncovered_weight=0.4, overlap_weight=3.0, posture_weight=1e-4)])
 def test_residuals_square_to_the_cost(scene, settings):
     """The refinement interpolates the distance field, the particles take the nearest voxel: the same up to the voxel's size."""
     body, points, target, hull, true = scene
@@ -108,7 +108,7 @@ def test_nothing_pulls_beyond_the_cap(scene):
     residuals, jacobian = residual_rows(Symmetric(body, points, target, hull, COST), far)
     both = slice(0, len(points.surface.points) + len(hull))
     assert not jacobian[both].any()
-    assert residuals[both] @ residuals[both] == pytest.approx((1 + COST.explain_weight) * COST.cap_m**2, rel=1e-6)
+    assert residuals[both] @ residuals[both] == pytest.approx((1 + COST.uncovered_weight) * COST.cap_m**2, rel=1e-6)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -180,11 +180,11 @@ def test_of_several_starts_the_best_goes_to_the_end(scene):
     assert both.cost == pytest.approx(info.cost, rel=0.02) and both.evaluations > info.evaluations
     seen = []
 
-    def is_hopeless(state, cost):
+    def stop_early(state, cost):
         seen.append((state, cost))
         return True
 
-    left, given_up = refine_best(Symmetric(body, points, target, hull, COST), [far, near], settings, trial_steps=2, is_hopeless=is_hopeless)
+    left, given_up = refine_best(Symmetric(body, points, target, hull, COST), [far, near], settings, trial_steps=2, stop_early=stop_early)
     assert given_up.cost > info.cost and given_up.evaluations < both.evaluations
     np.testing.assert_array_equal(seen[0][0], left)
     assert seen[0][1] == pytest.approx(given_up.cost_after)

@@ -220,7 +220,7 @@ def test_the_cost_is_the_sum_of_its_parts(balls, settings):
         rotations, positions = segment_transforms(body, state)
         world = place_points(rotations, positions, points.surface.points, points.surface.segment)
         cost = np.mean([min(d, settings.cap_m) ** 2 for d in distance_at(balls, world)])
-        cost += settings.explain_weight * np.mean(np.minimum(loop_body_distance(body, [state], hull), settings.cap_m) ** 2)
+        cost += settings.uncovered_weight * np.mean(np.minimum(loop_body_distance(body, [state], hull), settings.cap_m) ** 2)
         cost += settings.overlap_weight * np.mean(penetration_depth(body, points.axes, rotations[None], positions[None]) ** 2)
         rest, spread = POSTURE[0], posture_spread(state)
         cost += settings.posture_weight * sum(((state[d] - rest[d]) / spread[d]) ** 2 for d in range(6, N_DOF))

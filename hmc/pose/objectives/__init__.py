@@ -1,1 +1,1 @@
-"""How well a pose explains what a frame shows of a person: one file a likelihood."""
+"""How well a pose fits what a frame shows of a person: one file a likelihood."""

@@ -1,4 +1,4 @@
-"""What every likelihood of a pose is: an objective, "how well does this pose explain this view".
+"""What every likelihood of a pose is: an objective, "how well does this pose fit this view".
 
 An objective is a value made of a body and a view. What filters ask of it is a cost for many states at once; what refines or descends asks
 for residuals and how they change; structural annealing asks which part of the body costs what. Objectives add up (`Sum`).
@@ -14,11 +14,11 @@ import numpy as np
 
 from hmc.body.model import BodyModel
 
-__all__ = ["Linearised", "Objective", "Sum", "Unexplained", "cost_at"]
+__all__ = ["Linearised", "Misfit", "Objective", "Sum", "cost_at"]
 
 
 @dataclass(frozen=True)
-class Unexplained:
+class Misfit:
     """Where body and data contradict each other in one pose.
 
     Parameters
@@ -48,7 +48,7 @@ class Linearised(Protocol):
         Metres; their squares sum to the cost.
     near : object
         What speeds up the next call of `Objective.linearise` for a state near this one.
-    unexplained : Unexplained or None
+    misfit : Misfit or None
         Where body and data contradict each other, if the objective can tell.
     """
 
@@ -57,13 +57,13 @@ class Linearised(Protocol):
     @property
     def near(self) -> Any: ...
     @property
-    def unexplained(self) -> Unexplained | None: ...
+    def misfit(self) -> Misfit | None: ...
     def pulls(self) -> tuple[np.ndarray, np.ndarray]:
         """Which residuals change with the state, (m,), and how, (m, 27)."""
 
 
 class Objective(Protocol):
-    """How well poses explain a view; costs are square metres."""
+    """How well poses fit a view; costs are square metres."""
 
     @property
     def body(self) -> BodyModel: ...
@@ -95,11 +95,11 @@ class _SummedAt:
         return tuple(one.near for one in self.parts)
 
     @property
-    def unexplained(self) -> Unexplained | None:
-        known = [one.unexplained for one in self.parts if one.unexplained is not None]
+    def misfit(self) -> Misfit | None:
+        known = [one.misfit for one in self.parts if one.misfit is not None]
         if not known:
             return None
-        return Unexplained(*(np.concatenate([getattr(one, name) for one in known]) for name in ("outside", "part", "places", "distance")))
+        return Misfit(*(np.concatenate([getattr(one, name) for one in known]) for name in ("outside", "part", "places", "distance")))
 
     def pulls(self) -> tuple[np.ndarray, np.ndarray]:
         rows, jacobians, first = [], [], 0
@@ -118,7 +118,7 @@ class Sum:
     Parameters
     ----------
     parts : sequence of Objective
-        One at least; that each weighs what it should is for whoever makes it.
+        One at least; the caller sees to it that each weighs what it should.
     """
 
     parts: Sequence[Objective]

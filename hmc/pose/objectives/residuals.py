@@ -21,7 +21,7 @@ from hmc.body.kinematics import dof_masks, joint_twists
 from hmc.body.nearest_cone import Candidates, Nearest, candidates, nearest_cones, towards
 from hmc.body.penetration import penetration_rows
 from hmc.body.prior import POSTURE, posture_spread
-from hmc.pose.objectives.objective import Objective, Unexplained
+from hmc.pose.objectives.objective import Misfit, Objective
 from hmc.pose.views.hull_target import distance_gradient
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ class Distances:
     Parameters
     ----------
     residuals : ndarray, shape (n + 27,)
-        Weighted: of the body's surface, of what is to be explained, of the axes' depth, of the floor, and of the posture.
+        Weighted: of the body's surface, of what is to be covered, of the axes' depth, of the floor, and of the posture.
     weights : ndarray, shape (4,)
         Of the first four.
     axes, centres : ndarray, shape (27, 3)
@@ -92,10 +92,10 @@ class Distances:
         return self.pairs
 
     @property
-    def unexplained(self) -> Unexplained:
-        """Body outside of the hulls, and hull points and rays that no part of the body explains."""
+    def misfit(self) -> Misfit:
+        """Body outside of the hulls, and hull points and rays that no part of the body covers."""
         places, _ = places_and_directions(self.objective.asked)
-        return Unexplained(self.outside, self.objective.points.surface.part, places, self.nearest.distance)
+        return Misfit(self.outside, self.objective.points.surface.part, places, self.nearest.distance)
 
     def pulls(self) -> tuple[np.ndarray, np.ndarray]:
         """Which residuals change with the state, ndarray of int, shape (m,), and how, shape (m, 27)."""
@@ -127,7 +127,7 @@ def distances(objective: Symmetric, state: np.ndarray, before: Candidates | None
         floor = lowest_support(body, rotations[None], positions[None])
         gap = above_floor(floor[0], target.floor_z)
     sizes = np.array([len(outside), len(nearest.distance), len(depth), 1])
-    weights = np.sqrt(np.array([1, settings.explain_weight, settings.overlap_weight, settings.floor_weight]) / sizes)
+    weights = np.sqrt(np.array([1, settings.uncovered_weight, settings.overlap_weight, settings.floor_weight]) / sizes)
     spread = posture_spread(state)
     residuals = [
         weights[0] * np.minimum(outside, settings.cap_m),
@@ -144,23 +144,23 @@ def distances(objective: Symmetric, state: np.ndarray, before: Candidates | None
 
 def _pulls(found: Distances) -> tuple[np.ndarray, np.ndarray]:
     body, samples, settings = found.objective.body, found.objective.points, found.objective.settings
-    n_outside, n_explain = len(found.outside), len(found.nearest.distance)
+    n_outside, n_asked = len(found.outside), len(found.nearest.distance)
     out = np.flatnonzero((found.outside > 0) & (found.outside < settings.cap_m))
     pulled = found.nearest.distance[found.nearest.pulls]
-    explain = np.flatnonzero((pulled > 0) & (pulled < settings.cap_m))
+    uncovered = np.flatnonzero((pulled > 0) & (pulled < settings.cap_m))
     deep = np.flatnonzero(found.depth)
-    gap = np.flatnonzero(found.residuals[n_outside + n_explain + len(found.depth) : -N_DOF])
+    gap = np.flatnonzero(found.residuals[n_outside + n_asked + len(found.depth) : -N_DOF])
     # The way in which a point has to move to add to the distance, where the point is, and what moves it: a row of `_RELATIVE`.
     directions = [
         found.weights[0] * found.slope[out],
-        found.weights[1] * towards(found.maps, found.nearest, explain),
+        found.weights[1] * towards(found.maps, found.nearest, uncovered),
         -found.weights[2] * found.outward[deep],
     ]
-    places = [found.points[out], found.nearest.places[explain], found.axis_points[deep]]
+    places = [found.points[out], found.nearest.places[uncovered], found.axis_points[deep]]
     # What carries both parts leaves them where they are to one another.
     movers = [
         _TO_WORLD + samples.surface.segment[out],
-        _TO_WORLD + body.cones.segment[found.nearest.cone[explain]],
+        _TO_WORLD + body.cones.segment[found.nearest.cone[uncovered]],
         len(_MASKS) * found.other[deep] + found.segment[deep],
     ]
     if len(gap):
@@ -168,7 +168,7 @@ def _pulls(found: Distances) -> tuple[np.ndarray, np.ndarray]:
         directions.append(np.array([[0.0, 0.0, found.weights[3]]]))
         places.append(lowest)
         movers.append(_TO_WORLD + shank)
-    rows = [out, n_outside + found.nearest.pulls[explain], n_outside + n_explain + deep, n_outside + n_explain + len(found.depth) + gap]
+    rows = [out, n_outside + found.nearest.pulls[uncovered], n_outside + n_asked + deep, n_outside + n_asked + len(found.depth) + gap]
     n = sum(map(len, rows))
     wrenches = np.empty((n, 6))
     direction = np.concatenate(directions, out=wrenches[:, 3:])

@@ -113,7 +113,7 @@ def match_surface(body: SolidBody, grid: SurfaceGrid, chosen: np.ndarray, posed:
 def match_voxels(
     body: SolidBody, grid: SurfaceGrid, candidates: np.ndarray, posed: PosedBody, cloud: VoxelCloud, voxels: np.ndarray, weight: float
 ) -> Matches:
-    """Match voxels with the body, the other way round: what no part of the body explains pulls the nearest part towards itself.
+    """Match voxels with the body, the other way round: what no part of the body covers pulls the nearest part towards itself.
 
     The paper has no such term; without it a limb that lies within another's voxels is content there.
 

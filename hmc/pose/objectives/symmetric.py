@@ -1,7 +1,7 @@
-"""The symmetric cost: body outside the tolerant hull, and silhouettes that no part of the body explains.
+"""The symmetric cost: body outside the tolerant hull, and silhouettes that no part of the body covers.
 
 Canton's four scores (section 6.5) ask only that what the body fills be occupied, so a limb folded into the trunk costs
-nothing. Here the silhouettes have to be explained too, ray by ray (`hmc.pose.views.rays`), and to a small part the surface of the
+nothing. Here the silhouettes have to be covered too, ray by ray (`hmc.pose.views.rays`), and to a small part the surface of the
 strict hull (every camera agrees). The tolerant hull (one camera may miss) is what the body must not leave.
 """
 
@@ -48,10 +48,10 @@ class SymmetricSettings:
     ----------
     cap_m : float
         Distances beyond this count as this (metres), so that furniture in the hull or a cut-off limb cannot pull without end.
-    explain_weight : float
-        Weight of what the body does not explain against body outside the hull.
+    uncovered_weight : float
+        Weight of what the body does not cover against body outside the hull.
     ray_share : float
-        Share of rays in what has to be explained; the rest is points of the strict hull's surface. A hull is fatter than its person, the
+        Share of rays in what has to be covered; the rest is points of the strict hull's surface. A hull is fatter than its person, the
         more so the fewer cameras there are, and its surface makes the body swell and lean into ghosts; rays alone sometimes leave an arm
         before the trunk, which hides it. docs/accuracy.md has what both are worth.
     overlap_weight : float
@@ -64,7 +64,7 @@ class SymmetricSettings:
     """
 
     cap_m: float = 0.06
-    explain_weight: float = 0.4
+    uncovered_weight: float = 0.4
     ray_share: float = 0.9
     overlap_weight: float = 2.0
     posture_weight: float = 3e-6
@@ -216,10 +216,10 @@ class Symmetric:
         Of the body.
     target : HullTarget
     asked : ndarray, shape (k, 3) or (k, 6)
-        What has to be explained (`hmc.pose.views.rays.points_to_explain`).
+        What has to be covered (`hmc.pose.views.rays.points_to_cover`).
     settings : SymmetricSettings
     asked_part : ndarray of int, shape (k,), optional
-        The part that is asked to explain each of `asked`; without it costs cannot be told by part.
+        The part that is asked to cover each of `asked`; without it costs cannot be told by part.
     """
 
     body: BodyModel
@@ -242,11 +242,11 @@ class Symmetric:
             Square metres.
         """
         settings = self.settings
-        outside, unexplained, _, depth, gap, posture = self._terms(states)
+        outside, uncovered, _, depth, gap, posture = self._terms(states)
         return (
             gap
             + np.einsum("ij,ij->j", outside, outside) / len(outside)
-            + settings.explain_weight / len(self.asked) * np.einsum("ij,ij->j", unexplained, unexplained)
+            + settings.uncovered_weight / len(self.asked) * np.einsum("ij,ij->j", uncovered, uncovered)
             + settings.overlap_weight / len(depth) * np.einsum("ij,ij->j", depth, depth)
             + posture.sum(axis=1)
         )
@@ -266,12 +266,12 @@ class Symmetric:
         if self.asked_part is None:
             return None
         settings = self.settings
-        outside, unexplained, asking, depth, gap, posture = self._terms(states)
+        outside, uncovered, asking, depth, gap, posture = self._terms(states)
         columns = np.eye(len(PARTS), dtype=outside.dtype)
         cost = posture @ columns[PART_OF_DOF]
         for values, part, weight in (
             (outside, self.points.surface.part, 1 / len(outside)),
-            (unexplained, self.asked_part[asking], settings.explain_weight / len(self.asked)),
+            (uncovered, self.asked_part[asking], settings.uncovered_weight / len(self.asked)),
             (depth, PART_OF_SEGMENT[self.points.axes.segment], settings.overlap_weight / len(depth)),
         ):
             cost += weight * (values**2).T @ columns[part]
@@ -283,7 +283,7 @@ class Symmetric:
         return distances(self, state, near)
 
     def coarser(self, rng: np.random.Generator, n: int) -> Symmetric:
-        """The same with about `n` of what has to be explained."""
+        """The same with about `n` of what has to be covered."""
         return replace(self, asked=sample_points(rng, self.asked, n), asked_part=None)
 
     def _terms(self, states: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -302,11 +302,11 @@ class Symmetric:
         near, held = cones_near(body.cones, maps, places - origin, settings.cap_m, directions)
         asking = np.flatnonzero(~held)
         along = None if directions is None else directions[asking]
-        unexplained = np.minimum(_to_body(body.cones, maps, (places - origin)[asking], along, near[:, asking]), cap)
+        uncovered = np.minimum(_to_body(body.cones, maps, (places - origin)[asking], along, near[:, asking]), cap)
         depth = depths_placed(body, self.points.axes, placed, maps)
         gap = np.zeros(len(states))
         if self.target.floor_z is not None:
             rotations, positions = np.moveaxis(placed[:, :, :3], -1, 0), np.moveaxis(placed[:, :, 3], -1, 0)
             gap = floor_gap(body, rotations, positions, self.target.floor_z - origin[2])
         posture = settings.posture_weight * ((states - POSTURE[0]) / posture_spread(states)) ** 2
-        return outside, unexplained, asking, depth, settings.floor_weight * gap**2, posture
+        return outside, uncovered, asking, depth, settings.floor_weight * gap**2, posture

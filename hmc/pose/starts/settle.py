@@ -95,7 +95,7 @@ def begin(
 def fitted_body(
     rng: np.random.Generator, body: BodyModel, states: Sequence[np.ndarray], targets: Sequence[HullTarget], height_known: bool
 ) -> BodyModel | None:
-    """A body with the person's own lengths and girths (`hmc.pose.starts.fit_body`), or None where that explains the hulls no better.
+    """A body with the person's own lengths and girths (`hmc.pose.starts.fit_body`), or None where that fits the hulls no better.
 
     Parameters
     ----------

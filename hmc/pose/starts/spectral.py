@@ -22,7 +22,7 @@ from hmc.pose.steps.refine import RefineSettings, refine
 from hmc.pose.steps.swarm.heading import heading_of
 from hmc.pose.steps.swarm.temporal import SwarmSettings, start_fits
 from hmc.pose.views.hull_target import HullTarget
-from hmc.pose.views.rays import points_to_explain
+from hmc.pose.views.rays import points_to_cover
 
 __all__ = ["body_state", "spectral_poses", "strict_voxels"]
 
@@ -79,7 +79,7 @@ def spectral_poses(
     trials = []
     for found in start_fits(rng, model, reading, heading, SwarmSettings()):
         trials.append(body_state(body, skeleton_landmarks(model, found.state)))
-    objective = Symmetric(body, subject.points, target, points_to_explain(rng, target, 300, cost_settings.ray_share), cost_settings)
+    objective = Symmetric(body, subject.points, target, points_to_cover(rng, target, 300, cost_settings.ray_share), cost_settings)
     refined = [_refined(objective, trial) for trial in trials]
     best = min(refined, key=lambda pair: pair[0])[1]
     refined += [_refined(objective, turned) for turned in swapped_poses(body, best)]

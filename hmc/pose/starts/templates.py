@@ -2,7 +2,7 @@
 
 Canton (2009, section 6.3.3) sets the root by the tracker, the heading by the walk, and every other angle to neutral. That
 loses people who do not stand with their arms down, or stand still. Here every heading is tried with a few typical poses,
-the best of each heading is refined, and the caller follows the most promising ones for some frames before choosing
+the best of each heading is refined, and the caller follows the best ones for some frames before choosing
 (`hmc.pose.starts.window`).
 """
 
@@ -19,7 +19,7 @@ from hmc.pose.method import Subject
 from hmc.pose.objectives.symmetric import Symmetric, SymmetricSettings
 from hmc.pose.steps.refine import RefineSettings, refine
 from hmc.pose.views.hull_target import HullTarget
-from hmc.pose.views.rays import points_to_explain
+from hmc.pose.views.rays import points_to_cover
 
 __all__ = ["TEMPLATES", "first_poses", "template_states"]
 
@@ -114,10 +114,10 @@ def first_poses(
     noise = rng.standard_normal(states.shape) * spread
     noise[:, :, 0] = 0.0  # the template itself takes part
     states = np.clip(states + noise, body.limits.low, body.limits.high).reshape(n_headings, n_templates * variants, -1)
-    coarse = points_to_explain(rng, target, 150, cost_settings.ray_share)
+    coarse = points_to_cover(rng, target, 150, cost_settings.ray_share)
     rough = Symmetric(body, subject.points, target, coarse, cost_settings)
     costs = rough.cost(states.reshape(-1, states.shape[-1])).reshape(n_headings, -1)
-    objective = replace(rough, asked=points_to_explain(rng, target, 400, cost_settings.ray_share))
+    objective = replace(rough, asked=points_to_cover(rng, target, 400, cost_settings.ray_share))
     candidates = []
     settings = RefineSettings(iterations=10)
     for states_there, costs_there in zip(states, costs, strict=True):

@@ -1,7 +1,7 @@
 """How a person's tracking starts: the first seconds decide the heading, left and right, and the body's dimensions.
 
 1. Candidate poses from several frames of the window (`hmc.pose.starts.templates`), with the versions that a hull confuses.
-2. The most promising are followed for some frames; the mean cost decides, and walking backwards counts against a candidate.
+2. The best are followed for some frames; the mean cost decides, and walking backwards counts against a candidate.
 3. The winner is followed through the window, the body's dimensions are fitted to some of its frames, and kept if the other
    frames agree; then the window is followed once more with that body.
 """
@@ -129,7 +129,7 @@ def possible_heights(targets: Sequence[HullTarget | None], floor_z: float = 0.0)
 
 @dataclass(frozen=True)
 class WindowStart:
-    """The house's start: candidates from several frames of a window, the most promising followed for a while, and the body fitted.
+    """The house's start: candidates from several frames of a window, the best followed for a while, and the body fitted.
 
     Parameters
     ----------
@@ -297,7 +297,7 @@ def _best_hypothesis(subject: Subject, window: _Window, preset: PosePreset, sett
         costs = costs * walk_factor(states[:, 3], velocities[anchor], settings)
         pool += [(cost, anchor, state) for cost, state in zip(costs, states, strict=True)]
     pool.sort(key=lambda entry: entry[0])
-    # All candidates are compared in the frame that was easiest to explain.
+    # All candidates are compared in the frame that was easiest to fit.
     anchor = pool[0][1]
     objective = fine_objective(window.frame_rng(anchor), subject, window.target(anchor), preset.polish)
     here = [state for _, where, state in pool if where == anchor]
@@ -331,7 +331,7 @@ def _followed_costs(subject, window, preset, settings, anchor, chosen) -> list[f
 
 
 def search_all(rng: np.random.Generator, objective: Objective, state: np.ndarray, settings: PolishSettings) -> tuple[np.ndarray, float]:
-    """A pose with each limb where it explains the hulls best, and its cost; as it is where nothing is to be searched.
+    """A pose with each limb where it fits the hulls best, and its cost; as it is where nothing is to be searched.
 
     Parameters
     ----------

@@ -15,7 +15,7 @@ from hmc.pose.steps.presets import PosePreset, drift
 from hmc.pose.steps.proposal import Proposal, Propose
 from hmc.pose.steps.restrict import ScoreData, SymmetricData, nearest_part, score_maps
 from hmc.pose.views.person_view import PersonView
-from hmc.pose.views.rays import points_to_explain
+from hmc.pose.views.rays import points_to_cover
 from hmc.search.filters import ParticleState, annealed_step, particle_init
 
 __all__ = ["annealed", "annealed_subject", "first_spread", "frame_data", "starting_particles"]
@@ -96,7 +96,7 @@ def frame_data(
         raise ValueError("the frame has no hulls of this person")
     if preset.likelihood != "symmetric":
         return ScoreData(score_maps(target, subject.capture.room), preset.likelihood == "global")
-    points = points_to_explain(rng, target, preset.hull_points, preset.symmetric.ray_share)
+    points = points_to_cover(rng, target, preset.hull_points, preset.symmetric.ray_share)
     part = nearest_part(subject.body, tracked.state, points) if by_part else None
     return SymmetricData(target, points, preset.symmetric, part)
 

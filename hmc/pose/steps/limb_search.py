@@ -12,11 +12,11 @@ from hmc.body.limbs import LIMBS
 from hmc.body.model import BodyModel
 from hmc.body.prior import POSTURE
 from hmc.body.reach import limb_joint, limb_lengths, reach
-from hmc.pose.objectives.objective import Objective, Unexplained
+from hmc.pose.objectives.objective import Misfit, Objective
 from hmc.pose.steps.refine import RefineSettings, refine_best
 from hmc.search.truncated import truncated_normal
 
-#: What has to be explained is thinned out to so many points for poses drawn at random.
+#: What has to be covered is thinned out to so many points for poses drawn at random.
 COARSE_POINTS = 200
 
 __all__ = ["SearchSettings", "lost_limbs", "search_limbs"]
@@ -29,11 +29,11 @@ class SearchSettings:
     Parameters
     ----------
     far_m : float
-        A body or hull point farther than this from its counterpart is unexplained, metres.
+        A body or hull point farther than this from its counterpart is a misfit, metres.
     outside_share : float
         A limb is lost when more than this share of its surface is that far outside the tolerant hull ...
-    unexplained_share : float
-        ... and may be when more than this share of what has to be explained is that far from the body ...
+    uncovered_share : float
+        ... and may be when more than this share of what has to be covered is that far from the body ...
     at_once : int
         ... then others are looked for too, picked at random, to make up this number.
     random_share : float
@@ -41,12 +41,12 @@ class SearchSettings:
     draws : int
         Random poses a limb.
     reach_share : float
-        Share of them that reach for hull points which the body does not explain, where there are any.
+        Share of them that reach for hull points which the body does not cover, where there are any.
     gain : float
         The new pose is taken when the cost falls by at least this share.
-    promise : float
+    draw_ratio : float
         Poses drawn that all cost more than the present one times this, at few points, are not refined at all.
-    hope : float
+    refine_ratio : float
         A new pose that costs more than the present one times this after the first steps of its refinement is not refined further ...
     back_m : float
         ... nor is one whose limb has come so near to where it is now: it would end there again.
@@ -54,19 +54,19 @@ class SearchSettings:
 
     far_m: float = 0.05
     outside_share: float = 0.25
-    unexplained_share: float = 0.02
+    uncovered_share: float = 0.02
     at_once: int = 2
     random_share: float = 0.5
     draws: int = 200
     reach_share: float = 0.5
     gain: float = 0.03
-    promise: float = 1.5
-    hope: float = 1.3
+    draw_ratio: float = 1.5
+    refine_ratio: float = 1.3
     back_m: float = 0.05
 
 
-def lost_limbs(rng: np.random.Generator, unexplained: Unexplained, settings: SearchSettings) -> list[str]:
-    """Limbs that the hulls contradict, and some where much of the hull is unexplained; else now and then one picked at random.
+def lost_limbs(rng: np.random.Generator, misfit: Misfit, settings: SearchSettings) -> list[str]:
+    """Limbs that the hulls contradict, and some where much of the hull is not covered; else now and then one picked at random.
 
     Of those that the body's points are of: a body may lack some (`hmc.pose.steps.hidden`).
 
@@ -75,7 +75,7 @@ def lost_limbs(rng: np.random.Generator, unexplained: Unexplained, settings: Sea
     Parameters
     ----------
     rng : numpy.random.Generator
-    unexplained : Unexplained
+    misfit : Misfit
         Of the pose.
     settings : SearchSettings
 
@@ -84,10 +84,10 @@ def lost_limbs(rng: np.random.Generator, unexplained: Unexplained, settings: Sea
     list of str
         Keys of `hmc.body.limbs.LIMBS`.
     """
-    there = [limb for limb, one in LIMBS.items() if np.isin(unexplained.part, one.parts).any()]
-    far = unexplained.outside > settings.far_m
-    lost = [limb for limb in there if far[np.isin(unexplained.part, LIMBS[limb].parts)].mean() > settings.outside_share]
-    if (unexplained.distance > settings.far_m).mean() > settings.unexplained_share:
+    there = [limb for limb, one in LIMBS.items() if np.isin(misfit.part, one.parts).any()]
+    far = misfit.outside > settings.far_m
+    lost = [limb for limb in there if far[np.isin(misfit.part, LIMBS[limb].parts)].mean() > settings.outside_share]
+    if (misfit.distance > settings.far_m).mean() > settings.uncovered_share:
         others = [limb for limb in there if limb not in lost]
         picked = rng.permutation(len(others))[: max(0, settings.at_once - len(lost))]
         return lost + [others[k] for k in sorted(picked)]
@@ -130,11 +130,11 @@ def search_limbs(
         trials[1:, LIMBS[limb].dofs] = _draw(rng, settings, objective, state, limb)
         costs = coarse.cost(trials)  # the first is the present pose
         evaluations += len(trials)
-        if costs[1:].min() > settings.promise * costs[0]:
+        if costs[1:].min() > settings.draw_ratio * costs[0]:
             continue
         starts = [trials[1 + pick] for pick in np.argsort(costs[1:])[:2]]
         has_failed = _has_failed(objective.body, (state, cost), limb, settings)
-        trial, info = refine_best(objective, starts, refine_settings, is_hopeless=has_failed)
+        trial, info = refine_best(objective, starts, refine_settings, stop_early=has_failed)
         evaluations += info.evaluations
         if info.cost_after < (1 - settings.gain) * cost:
             state, cost = trial, info.cost_after
@@ -149,22 +149,22 @@ def _has_failed(
 
     def has_failed(trial: np.ndarray, trial_cost: float) -> bool:
         before, now = landmarks(body, np.stack([state, trial]))[:, LIMBS[limb].landmarks]
-        return trial_cost > settings.hope * cost or bool(np.linalg.norm(now - before, axis=1).max() < settings.back_m)
+        return trial_cost > settings.refine_ratio * cost or bool(np.linalg.norm(now - before, axis=1).max() < settings.back_m)
 
     return has_failed
 
 
 def _draw(rng: np.random.Generator, settings: SearchSettings, objective: Objective, state: np.ndarray, limb: str) -> np.ndarray:
-    """Random poses of a limb: some reach for hull points that no part explains, some are common ones, and some may be any."""
+    """Random poses of a limb: some reach for hull points that no part covers, some are common ones, and some may be any."""
     body = objective.body
     dofs = LIMBS[limb].dofs
     low, high = body.limits.low[dofs], body.limits.high[dofs]
     centre, _ = limb_joint(body, state, limb)
-    unexplained = objective.linearise(state).unexplained
+    misfit = objective.linearise(state).misfit
     goals = np.zeros((0, 3))
-    if unexplained is not None:
-        near = np.linalg.norm(unexplained.places - centre, axis=1) < sum(limb_lengths(body, limb)) + settings.far_m
-        goals = unexplained.places[near & (unexplained.distance > settings.far_m)]
+    if misfit is not None:
+        near = np.linalg.norm(misfit.places - centre, axis=1) < sum(limb_lengths(body, limb)) + settings.far_m
+        goals = misfit.places[near & (misfit.distance > settings.far_m)]
     n_reach = round(settings.reach_share * settings.draws) if len(goals) else 0
     n_common = (settings.draws - n_reach) // 2
     n_any = settings.draws - n_reach - n_common

@@ -11,7 +11,7 @@ from hmc.body.marker_places import place_tips
 from hmc.body.model import BodyModel
 from hmc.pose.method import Alternatives, PoseStep, StepInfo, Tracked, particles_of, unseen, with_particles
 from hmc.pose.objectives.epipolar import MarkerLikelihood, marker_cost
-from hmc.pose.steps.marker_limbs import explain_all, refine_to_points
+from hmc.pose.steps.marker_limbs import fit_all_points, refine_to_points
 from hmc.pose.steps.presets import drift
 from hmc.pose.views.markers import SeenMarkers
 from hmc.pose.views.person_view import PersonView
@@ -143,7 +143,7 @@ def marker_frame(rng: np.random.Generator, tracked: Tracked, seen: SeenMarkers, 
     if preset.refine:
         estimate, points = refine_to_points(body, seen, annealed.best, preset.likelihood.gate_px)
     if preset.search:
-        estimate, points, choice = explain_all(rng, body, seen, estimate, points, preset.likelihood.gate_px)
+        estimate, points, choice = fit_all_points(rng, body, seen, estimate, points, preset.likelihood.gate_px)
     cost, matched = _cost(body, seen, estimate, preset.likelihood)
     status = "fitted" if (matched >= 2).sum() >= LEAST_MARKERS else "too few markers where the body should have them"
     kept = {name: values for name, values in tracked.memory.items() if name == TIPS}

@@ -24,7 +24,7 @@ from hmc.pose.objectives.marker_points import find_points, matched_points
 from hmc.pose.steps.marker_search import LEAST_POINTS, lay_body, left_over, point_cost, search_near
 from hmc.pose.views.markers import SeenMarkers
 
-__all__ = ["explain_all", "refine_to_points", "strain"]
+__all__ = ["fit_all_points", "refine_to_points", "strain"]
 
 #: From fewer markers than this no pose is refined.
 LEAST_REFINED = 5
@@ -43,15 +43,15 @@ REFINE_STEPS = 12
 #: What of left and right may be exchanged (`hmc.pose.starts.templates.swapped_pose`).
 _EXCHANGES: tuple[Literal["legs", "arms"], ...] = ("legs", "arms")
 #: A pose with exchanged legs or arms that strains more than the present one times this is not refined.
-PROMISE = 1.3
+EXCHANGE_RATIO = 1.3
 #: What an angle one spread (`hmc.pose.objectives.symmetric.posture_spread`) away from rest costs, square metres.
 POSTURE_WEIGHT = 1e-5
 
 
-def explain_all(
+def fit_all_points(
     rng: np.random.Generator, body: BodyModel, seen: SeenMarkers, state: np.ndarray, points: np.ndarray, gate_px: float
 ) -> tuple[np.ndarray, np.ndarray, Alternatives]:
-    """The pose that explains all points best, of one, what is found near it, and that with legs or arms exchanged.
+    """The pose that fits all points best, of one, what is found near it, and that with legs or arms exchanged.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def explain_all(
     points : ndarray, shape (15, 3)
         As from `refine_to_points`.
     choice : Alternatives
-        The pose before such exchanges and after each of them, and how badly they explain the points, square metres.
+        The pose before such exchanges and after each of them, and how badly they fit the points, square metres.
     """
     found, views = find_points(seen)
     if len(found) < LEAST_POINTS:
@@ -85,7 +85,7 @@ def explain_all(
     # The last is the same pose, to be refined once more: around a better pose other points are nearest.
     states = np.array([state, *(swapped_pose(body, state, what) for what in _EXCHANGES), state])
     costs, all_points = cost(states), [points] + [np.full_like(points, np.nan)] * (len(states) - 1)
-    for k in np.flatnonzero(costs[1:] < PROMISE * costs[0]) + 1:
+    for k in np.flatnonzero(costs[1:] < EXCHANGE_RATIO * costs[0]) + 1:
         states[k], all_points[k] = refine_to_points(body, seen, states[k], gate_px)
         costs[k] = cost(states[k][None])[0]
     best = int(costs.argmin())
@@ -93,7 +93,7 @@ def explain_all(
 
 
 def strain(body: BodyModel, points: np.ndarray, views: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
-    """How badly states, shape (n, 27), explain points, shape (n,), square metres: `point_cost`, and how far they are from rest.
+    """How badly states, shape (n, 27), fit points, shape (n,), square metres: `point_cost`, and how far they are from rest.
 
     Parameters
     ----------

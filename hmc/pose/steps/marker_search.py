@@ -45,7 +45,7 @@ ALIKE_M = 0.08
 
 
 def start_poses(rng: np.random.Generator, body: BodyModel, points: np.ndarray, views: np.ndarray) -> list[tuple[np.ndarray, float]]:
-    """Poses that explain points, the best first.
+    """Poses that fit points, the best first.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def start_poses(rng: np.random.Generator, body: BodyModel, points: np.ndarray, v
 def search_near(
     rng: np.random.Generator, body: BodyModel, points: np.ndarray, views: np.ndarray, state: np.ndarray
 ) -> tuple[np.ndarray, bool]:
-    """Look near a pose for one that explains points better, and lay the body into them.
+    """Look near a pose for one that fits points better, and lay the body into them.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def search_near(
     -------
     state : ndarray, shape (27,)
     better : bool
-        Whether it explains them better, at the cost of `start_poses`.
+        Whether it fits them better, at the cost of `start_poses`.
     """
     if len(points) < LEAST_POINTS:
         return state, False
@@ -145,7 +145,7 @@ def _trust(views: np.ndarray) -> np.ndarray:
 
 
 def point_cost(body: BodyModel, points: np.ndarray, views: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
-    """How badly states, shape (n, 27), explain points: the cost of `start_poses`, shape (n,), square metres.
+    """How badly states, shape (n, 27), fit points: the cost of `start_poses`, shape (n,), square metres.
 
     Parameters
     ----------

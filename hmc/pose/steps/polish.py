@@ -18,7 +18,7 @@ from hmc.pose.steps.proposal import Propose, shows_enough
 from hmc.pose.steps.refine import RefineSettings, refine_all
 from hmc.pose.views.hull_target import HullTarget
 from hmc.pose.views.person_view import PersonView
-from hmc.pose.views.rays import points_to_explain
+from hmc.pose.views.rays import points_to_cover
 
 __all__ = ["MakeObjective", "PolishSettings", "fine_objective", "polish", "polished"]
 
@@ -31,7 +31,7 @@ class PolishSettings:
     ----------
     symmetric : SymmetricSettings
     hull_points : int
-        Rays and points of the hull that have to be explained.
+        Rays and points of the hull that have to be covered.
     refine : RefineSettings
     search : SearchSettings or None
         Search for a limb that got lost; None: there is none.
@@ -45,7 +45,7 @@ class PolishSettings:
 
 def fine_objective(rng: np.random.Generator, subject: Subject, target: HullTarget, settings: PolishSettings) -> Symmetric:
     """The symmetric cost of a person in a frame, at as many points as a refinement takes."""
-    asked = points_to_explain(rng, target, settings.hull_points, settings.symmetric.ray_share)
+    asked = points_to_cover(rng, target, settings.hull_points, settings.symmetric.ray_share)
     return Symmetric(subject.body, subject.points, target, asked, settings.symmetric)
 
 
@@ -81,8 +81,8 @@ def polish(
     estimate, info = min(trials, key=lambda trial: trial[1].cost_after)
     cost = info.cost
     searched: list[str] = []
-    if settings.search is not None and info.unexplained is not None:
-        searched = lost_limbs(rng, info.unexplained, settings.search)
+    if settings.search is not None and info.misfit is not None:
+        searched = lost_limbs(rng, info.misfit, settings.search)
         estimate, cost, more = search_limbs(rng, objective, (estimate, cost), searched, settings.refine, settings.search)
         evaluations += more
     return estimate, cost, searched, evaluations

@@ -10,7 +10,7 @@ import numpy as np
 
 from hmc.body.joints import N_DOF
 from hmc.body.kinematics import landmarks
-from hmc.pose.objectives.objective import Linearised, Objective, Unexplained
+from hmc.pose.objectives.objective import Linearised, Misfit, Objective
 from hmc.search.gauss_newton import GaussNewtonSettings, GaussNewtonState, LeastSquares, gauss_newton_init, gauss_newton_run
 
 __all__ = ["RefineInfo", "RefineSettings", "refine", "refine_all", "refine_best"]
@@ -27,7 +27,7 @@ class RefineSettings:
     iterations : int
         Most accepted steps.
     tolerance : float
-        Stop when the cost falls by less than this share in a step, or none is left that promises more.
+        Stop when the cost falls by less than this share in a step, or no step is left that would lower it by more.
     stay_weight : float
         Weight (square metres for a step of one prior deviation) that holds angles no data speaks of, such as the twist of a
         straight arm, where the start has them.
@@ -50,7 +50,7 @@ class RefineInfo:
         The objective alone, afterwards, square metres.
     evaluations : int
         Of the objective.
-    unexplained : Unexplained or None
+    misfit : Misfit or None
         Where body and data contradict each other afterwards, if the objective can tell.
     """
 
@@ -58,7 +58,7 @@ class RefineInfo:
     cost_after: float
     cost: float
     evaluations: int
-    unexplained: Unexplained | None
+    misfit: Misfit | None
 
 
 def refine(
@@ -100,7 +100,7 @@ def refine_best(
     settings: RefineSettings,
     anchor: np.ndarray | None = None,
     trial_steps: int = 3,
-    is_hopeless: Callable[[np.ndarray, float], bool] | None = None,
+    stop_early: Callable[[np.ndarray, float], bool] | None = None,
 ) -> tuple[np.ndarray, RefineInfo]:
     """Of several starts the one that is best after some steps, refined to the end.
 
@@ -113,7 +113,7 @@ def refine_best(
         As for `refine`; each start's own by default.
     trial_steps : int
         Accepted steps after which the best goes on alone.
-    is_hopeless : callable, optional
+    stop_early : callable, optional
         Told the best state after its first steps and its cost (square metres, the hold included): whether to leave it there.
 
     Returns
@@ -129,7 +129,7 @@ def refine_best(
         trials.append(gauss_newton_run(problem, begun, steps, trial_steps))
     best = min(trials, key=lambda trial: trial.cost)
     before = sum(trial.evaluations for trial in trials) - best.evaluations
-    if is_hopeless is None or not is_hopeless(best.x, best.cost):
+    if stop_early is None or not stop_early(best.x, best.cost):
         best = gauss_newton_run(problem, best, steps)
     state, info = _outcome(best)
     return state, replace(info, evaluations=info.evaluations + before)
@@ -191,4 +191,4 @@ def _steps(settings: RefineSettings) -> GaussNewtonSettings:
 def _outcome(trial: _Trial) -> tuple[np.ndarray, RefineInfo]:
     found = trial.found
     cost = float(found.residuals @ found.residuals)
-    return trial.x, RefineInfo(trial.first_cost, trial.cost, cost, trial.evaluations, found.unexplained)
+    return trial.x, RefineInfo(trial.first_cost, trial.cost, cost, trial.evaluations, found.misfit)

@@ -1,6 +1,6 @@
 """The likelihood on some parts of the body only: the same functions, given a body that has no others.
 
-A model that lacks a limb neither fills voxels with it nor is asked to explain what the limb explains.
+A model that lacks a limb neither fills voxels with it nor is asked to cover what the limb covers.
 """
 
 from __future__ import annotations
@@ -136,7 +136,7 @@ def nearest_part(body: BodyModel, state: np.ndarray, points: np.ndarray) -> np.n
     body : BodyModel
     state : ndarray, shape (27,)
     points : ndarray, shape (k, 3) or (k, 6)
-        As from `hmc.pose.views.rays.points_to_explain`.
+        As from `hmc.pose.views.rays.points_to_cover`.
 
     Returns
     -------
@@ -165,10 +165,10 @@ class SymmetricData:
     ----------
     target : HullTarget
     points : ndarray, shape (k, 3) or (k, 6)
-        What has to be explained.
+        What has to be covered.
     settings : SymmetricSettings
     part : ndarray of int, shape (k,), optional
-        Which part is expected to explain each: the nearest one in the pose that is expected. Needed for some parts only.
+        Which part is expected to cover each: the nearest one in the pose that is expected. Needed for some parts only.
     """
 
     target: HullTarget

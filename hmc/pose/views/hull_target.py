@@ -100,7 +100,7 @@ def make_target(
         Height of the floor, metres.
     new : callable, optional
         Which of some places, shape (n, 3), world, metres, show on silhouettes where the strict hull does not
-        (`hmc.pose.views.unexplained`). What else is in the tolerant and in the loose hull is no place for a body then.
+        (`hmc.pose.views.uncovered`). What else is in the tolerant and in the loose hull is no place for a body then.
 
     Returns
     -------

@@ -19,7 +19,7 @@ from hmc.pose.views.hull_target import HullTarget, make_target, sound_hull
 from hmc.pose.views.markers import SeenMarkers
 from hmc.pose.views.rays import with_rays
 from hmc.pose.views.skin import Skin, observe_voxels
-from hmc.pose.views.unexplained import explaining
+from hmc.pose.views.uncovered import on_uncovered_pixels
 from hmc.tracking.resumable import observe_step
 from hmc.tracking.tracks import person_voxels
 from hmc.voxels.grid import VoxelGrid
@@ -142,7 +142,7 @@ def _targets(recording, grid, hull, strict, tolerant) -> list[HullTarget | None]
     new = None
     if sum(mask is not None for mask in hull.masks) <= FEW_CAMERAS:
         everybody = grid.centres(np.concatenate([nothing, *strict]))
-        new = partial(explaining, recording.rig, hull.masks, everybody, spacing_m=grid.voxel_size_m)
+        new = partial(on_uncovered_pixels, recording.rig, hull.masks, everybody, spacing_m=grid.voxel_size_m)
     targets = []
     for k in range(len(strict)):
         target = make_target(grid, strict[k], tolerant[k], spare, floor_z, new)

@@ -1,10 +1,10 @@
 """Rays of silhouettes: every pixel that shows the person asks for some part of the body somewhere along its line of sight.
 
-A hull of few cameras is much fatter than its person, and some of it is nobody at all: its surface asks for a body that is not there. The
+A hull of few cameras is much fatter than its person, and some of it is no person at all: its surface asks for a body that is not there. The
 silhouettes from which it was carved do not: what they show is the person's, only the distance is not known.
 
-What a body has to explain is an array of places (m, 3), or of places and directions (m, 6): a ray goes through its place in a unit
-direction and is explained where any point of it is; a point of the hull's surface has direction zero, and is explained there only.
+What a body has to cover is an array of places (m, 3), or of places and directions (m, 6): a ray goes through its place in a unit
+direction and is covered where any point of it is; a point of the hull's surface has direction zero, and is covered there only.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from hmc.camera.model import Camera, Rig, project
 from hmc.pose.views.hull_target import HullTarget, sample_points
 from hmc.voxels.surface import surface
 
-__all__ = ["points_to_explain", "silhouette_rays", "with_rays"]
+__all__ = ["points_to_cover", "silhouette_rays", "with_rays"]
 
 
 def with_rays(target: HullTarget, rig: Rig, masks: Sequence[np.ndarray | None], others: np.ndarray | None = None) -> HullTarget:
@@ -99,8 +99,8 @@ def _patches(camera: Camera, points: np.ndarray, per_unit: float) -> np.ndarray:
     return column * 1_000_003 + row
 
 
-def points_to_explain(rng: np.random.Generator, target: HullTarget, n: int, ray_share: float) -> np.ndarray:
-    """About ``n`` places of a person that a body has to explain, evenly spread: rays of the silhouettes, and points of the strict hull.
+def points_to_cover(rng: np.random.Generator, target: HullTarget, n: int, ray_share: float) -> np.ndarray:
+    """About ``n`` places of a person that a body has to cover, evenly spread: rays of the silhouettes, and points of the strict hull.
 
     Parameters
     ----------

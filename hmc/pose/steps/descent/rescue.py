@@ -1,4 +1,4 @@
-"""A limb that got lost: where voxels lie far from the whole body, random poses of each limb are asked whether they explain them.
+"""A limb that got lost: where voxels lie far from the whole body, random poses of each limb are asked whether they cover them.
 
 The paper has nothing of the kind; a descent does not find back to a limb whose voxels are nearer to something else.
 """
@@ -14,7 +14,7 @@ from hmc.body.solid_samples import SurfaceGrid
 from hmc.body.solids import CHAINS, FREE, GROUPS, SolidBody
 from hmc.pose.objectives.surface_cue import VoxelCloud
 
-__all__ = ["RescueSettings", "propose_limb", "unexplained"]
+__all__ = ["RescueSettings", "propose_limb", "uncovered"]
 
 #: Distances beyond this count as this, metres.
 _CAP_M = 0.15
@@ -27,7 +27,7 @@ class RescueSettings:
     Parameters
     ----------
     far_m : float
-        A voxel farther from the body than this is not explained.
+        A voxel farther from the body than this is not covered.
     share : float
         A limb is looked for when so large a share of the voxels is not.
     poses : int
@@ -35,10 +35,10 @@ class RescueSettings:
     deviation_deg : float
         Of their angles from the present ones.
     points : int
-        Points of a limb, and voxels that are not explained, at most.
+        Points of a limb, and voxels that are not covered, at most.
     gain : float
-        A pose is taken up when its score is below this share of the present one's, and kept when so large a share of the voxels at most
-        stays unexplained.
+        A pose is tried when its score is below this share of the present one's, and kept when so large a share of the voxels at most
+        stays uncovered.
     """
 
     far_m: float = 0.07
@@ -49,7 +49,7 @@ class RescueSettings:
     gain: float = 0.8
 
 
-def unexplained(points: np.ndarray, cloud: VoxelCloud, far_m: float) -> np.ndarray:
+def uncovered(points: np.ndarray, cloud: VoxelCloud, far_m: float) -> np.ndarray:
     """Voxels of a cloud, by number, that lie farther than `far_m` from all of these points of the body (n, 3)."""
     return np.flatnonzero(_nearest_squared(cloud.points, points, cloud.middle) > far_m**2)
 
@@ -63,7 +63,7 @@ def propose_limb(
     lost: np.ndarray,
     settings: RescueSettings,
 ) -> tuple[int, np.ndarray] | None:
-    """The limb that explains the lost voxels best in some random pose, if any does.
+    """The limb that covers the lost voxels best in some random pose, if any does.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def propose_limb(
     cloud : VoxelCloud
     parameters : ndarray, shape (24,)
     lost : ndarray of int
-        Voxels of the cloud that are not explained.
+        Voxels of the cloud that are not covered.
     settings : RescueSettings
 
     Returns

@@ -19,7 +19,7 @@ from hmc.pose.objectives.edge_cue import EdgeMaps, best_views, edge_maps, shown_
 from hmc.pose.objectives.multicue import CueSettings, Draw, draw_cues, draw_of_groups, match_cues
 from hmc.pose.objectives.surface_cue import VoxelCloud, place, voxel_cloud
 from hmc.pose.steps.descent.levenberg import LmSettings, lm_run
-from hmc.pose.steps.descent.rescue import RescueSettings, propose_limb, unexplained
+from hmc.pose.steps.descent.rescue import RescueSettings, propose_limb, uncovered
 from hmc.pose.views.skin import Skin
 from hmc.search.meta_descent import Evaluation, SmdSettings, smd_run
 
@@ -158,7 +158,7 @@ def track_step(rng: np.random.Generator, tracker: SmdTracker, before: TrackState
 
 
 def _rescued(rng: np.random.Generator, frame: CueFrame, parameters: np.ndarray) -> np.ndarray:
-    """The parameters with a lost limb where it explains more."""
+    """The parameters with a lost limb where it covers more."""
     tracker, settings = frame.tracker, frame.tracker.preset.rescue
     if settings is None:
         return parameters
@@ -166,7 +166,7 @@ def _rescued(rng: np.random.Generator, frame: CueFrame, parameters: np.ndarray) 
     def lost_at(at: np.ndarray) -> np.ndarray:
         grid = tracker.grid
         points = place(_posed(tracker, at, frame.base), grid.points[::3], grid.segment[::3])
-        return unexplained(points, frame.cloud, settings.far_m)
+        return uncovered(points, frame.cloud, settings.far_m)
 
     lost = lost_at(parameters)
     if len(lost) < settings.share * len(frame.cloud.points):

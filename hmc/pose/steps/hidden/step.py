@@ -67,7 +67,7 @@ def _there(settings: LimbSettings, memory: LimbMemory) -> _There:
 
 
 def _asked(tracked: Tracked, target: HullTarget, there: _There) -> HullTarget:
-    """The hulls without what only a missing part would explain."""
+    """The hulls without what only a missing part would cover."""
     if there.parts.all():
         return target
     body, state = tracked.subject.body, tracked.state

@@ -268,7 +268,7 @@ def swarm_step(
 def fit_near(
     rng: np.random.Generator, model: SkeletonModel, state: SwarmState, reading: BodyReading, fps: float, settings: SwarmSettings
 ) -> SkeletonFit:
-    """The pose near the last one that explains a frame best: a swarm within the temporal constraint, then every part tuned.
+    """The pose near the last one that fits a frame best: a swarm within the temporal constraint, then every part tuned.
 
     Parameters
     ----------

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from hmc.landmarks import landmark_index
 from hmc.pose.views.hull_target import distance_at, make_target
-from hmc.pose.views.unexplained import explaining
+from hmc.pose.views.uncovered import on_uncovered_pixels
 from hmc.voxels.carving import carve_levels, make_tables
 
 CAMERAS = 4
@@ -42,7 +42,7 @@ def without_forearm(acted, masks, camera_index):
 def test_whole_silhouettes_need_no_tolerant_hull(boxer):
     acted, masks = boxer
     strict, fat, _ = hulls(masks, acted.grid)
-    chosen = explaining(ring(CAMERAS), masks, acted.grid.centres(strict), acted.grid.centres(fat), acted.grid.voxel_size_m)
+    chosen = on_uncovered_pixels(ring(CAMERAS), masks, acted.grid.centres(strict), acted.grid.centres(fat), acted.grid.voxel_size_m)
     assert len(fat) > 0.3 * len(strict)
     assert chosen.mean() < 0.1
 
@@ -56,7 +56,7 @@ def test_a_forearm_that_one_camera_lost_is_needed(boxer, camera_index):
     known = acted.grid.centres(strict)
 
     def new(points):
-        return explaining(rig, holed, known, points, size)
+        return on_uncovered_pixels(rig, holed, known, points, size)
 
     chosen = new(acted.grid.centres(fat))
     assert chosen.mean() < 0.35  # the rest of the person is as it was
@@ -78,8 +78,8 @@ def test_what_is_known_is_never_news(seed):
     points = rng.uniform(ROOM[0], ROOM[1], (50, 3))
     masks = [rng.random(camera.size[::-1]) < 0.7 for camera in rig]
     masks[0] = None
-    assert not explaining(rig, masks, points, points, 0.03).any()
-    everything = explaining(rig, masks, points[:0], points, 0.03)
-    nothing = explaining(rig, [None if mask is None else mask & False for mask in masks], points[:0], points, 0.03)
+    assert not on_uncovered_pixels(rig, masks, points, points, 0.03).any()
+    everything = on_uncovered_pixels(rig, masks, points[:0], points, 0.03)
+    nothing = on_uncovered_pixels(rig, [None if mask is None else mask & False for mask in masks], points[:0], points, 0.03)
     assert everything.mean() > 0.5 and not nothing.any()
-    assert explaining(rig, masks, points, points[:0], 0.03).shape == (0,)
+    assert on_uncovered_pixels(rig, masks, points, points[:0], 0.03).shape == (0,)

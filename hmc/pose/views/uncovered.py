@@ -1,7 +1,7 @@
-"""Where a tolerant hull is needed: voxels on pixels of a silhouette that no voxel of the strict hull explains.
+"""Where a tolerant hull is needed: voxels on pixels of a silhouette that no voxel of the strict hull covers.
 
 Cameras that agree make a strict hull that projects back on whole silhouettes: a tolerant one is then the same person and fatter. Where a
-camera lost a forearm, the strict hull lacks it, and the silhouettes of the others show a forearm that nothing explains.
+camera lost a forearm, the strict hull lacks it, and the silhouettes of the others show a forearm that nothing covers.
 """
 
 from __future__ import annotations
@@ -12,10 +12,12 @@ import numpy as np
 
 from hmc.camera.model import Camera, Rig, project
 
-__all__ = ["explaining"]
+__all__ = ["on_uncovered_pixels"]
 
 
-def explaining(rig: Rig, masks: Sequence[np.ndarray | None], known: np.ndarray, candidates: np.ndarray, spacing_m: float) -> np.ndarray:
+def on_uncovered_pixels(
+    rig: Rig, masks: Sequence[np.ndarray | None], known: np.ndarray, candidates: np.ndarray, spacing_m: float
+) -> np.ndarray:
     """Which voxels show on pixels of silhouettes on which no known voxel shows.
 
     Parameters

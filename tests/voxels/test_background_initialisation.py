@@ -6,7 +6,7 @@ import pytest
 
 from hmc.camera.segmentation import SegmentationSettings, segment_views
 from hmc.io.recording import iterate_frames, open_recording
-from hmc.voxels.never_empty import learn_from_people, with_unseen_places
+from hmc.voxels.background_initialisation import learn_from_people, with_unseen_places
 
 
 @pytest.fixture(scope="module")
