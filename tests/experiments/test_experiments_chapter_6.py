@@ -227,6 +227,7 @@ def test_what_an_action_varies_by_is_told_by_its_poses():
     np.testing.assert_allclose(filter_runs.action_drift(body, landmarks(body, states[:1])), 0.5 * filter_runs.LEAST_VARIATION)
 
 
+@pytest.mark.slow
 def test_the_likelihood_map_is_best_near_the_truth_with_all_scores(small, monkeypatch):
     source, inputs = small
     monkeypatch.setattr(fig_6_11, "SIDE", 21)

@@ -103,6 +103,7 @@ def test_readme_names_every_part_of_the_tree():
     assert not unnamed
 
 
+@pytest.mark.slow
 def test_python_of_the_readme_runs(tmp_path, monkeypatch, capsys):
     code = next(block for language, block in BLOCK.findall(README.read_text(encoding="utf-8")) if language == "python")
     (tmp_path / "data").symlink_to(ROOT / "data", target_is_directory=True)

@@ -51,6 +51,7 @@ def arm_errors(targets, acted, arm, search, seed):
     return np.array(errors)
 
 
+@pytest.mark.slow
 def test_an_arm_that_is_lost_for_more_than_half_a_second_is_taken_back():
     """A talking man's left arm, in one camera's silhouette alone for twelve frames; without the limb search it stays lost for longer."""
     acted, gone = act("gesture", frames=30, fps=20), (3, 15)
