@@ -6,9 +6,9 @@
 >>> people.positions.shape  # rows, landmarks, x y z in metres
 (8, 15, 3)
 
-These names promise to stay: `open_recording`, `check`, `silhouettes`, `hulls`, `track`, `views`, `pose`, `evaluate`, `view`; the records
+These names will stay: `open_recording`, `check`, `silhouettes`, `hulls`, `track`, `views`, `pose`, `evaluate`, `view`; the records
 `Recording`, `Rig`, `Camera`, `TrackTable`, `PoseTable`, `PosedPeople`; `METHODS` and `TRACKERS`, `pose_method`, `PoseMethod` and `register`
-for whoever adds a method; and `InputError`. What is in the modules below may move.
+to add a method; and `InputError`. What is in the modules below may move.
 """
 
 from __future__ import annotations

@@ -101,7 +101,7 @@ def hulls(recording: Recording, voxel_size_m: float = POSE_VOXEL_M, masks: Itera
 def track(
     recording: Recording | str | Path, tracker: str | Tracker = "sparse", seed: int = 0, voxel_size_m: float = TRACK_VOXEL_M
 ) -> TrackTable:
-    """Where everybody is in every frame.
+    """The track of every person: where each is in every frame.
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ def pose(
     smooth_s: float = 0.0,
     on_frame: Callable[[int, int], None] | None = None,
 ) -> PosedPeople:
-    """The pose of everybody in every frame.
+    """The pose of every person in every frame.
 
     Parameters
     ----------
@@ -188,7 +188,7 @@ def pose(
     seed : int
         The same seed gives the same result.
     height_m : float, optional
-        Stature of everybody; where left out what the recording says of a single person, else estimated for each.
+        Stature of every person; where left out what the recording says of a single person, else estimated for each.
     smooth_s : float
         Time over which finished poses are smoothed, seconds; 0: they are not.
     on_frame : callable, optional

@@ -66,7 +66,7 @@ def to_cones(maps: ConeMaps, points: np.ndarray) -> np.ndarray:
 
 
 def spread(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Mean place of points in all particles, shape (m, 3), and how far they go from there, shape (m,).
+    """Mean position of points in all particles, shape (m, 3), and how far they go from there, shape (m,).
 
     Parameters
     ----------

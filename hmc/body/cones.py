@@ -1,6 +1,6 @@
 """Distances to truncated cones with elliptic cross-sections: of points, and of rays that pass by; and depths in them.
 
-Places come as (m, 3), or with directions as (m, 6): a ray goes through its place in a unit direction; a direction of zero is a point.
+Points come as (m, 3), or with directions as (m, 6): a ray goes through its point in a unit direction; a direction of zero is a point.
 A cone's coordinates are two across it and one along its axis, from its start.
 """
 
@@ -18,7 +18,7 @@ __all__ = [
 
 
 def places_and_directions(points: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
-    """What is to be covered, shape (m, 3) or (m, 6), as places and, where there are rays, directions; each of shape (m, 3)."""
+    """What is to be covered, shape (m, 3) or (m, 6), as points and, where there are rays, directions; each of shape (m, 3)."""
     return points[:, :3], points[:, 3:] if points.shape[1] > 3 else None
 
 
@@ -28,7 +28,7 @@ def slide_to_axis(local: np.ndarray, directions: np.ndarray, lengths: np.ndarray
     Parameters
     ----------
     local : ndarray, shape (3, ...)
-        Places in the cones' coordinates, metres; written over.
+        Points in the cones' coordinates, metres; written over.
     directions : ndarray, shape (3, ...)
         In the same coordinates, of unit length; zero for points that stay.
     lengths : ndarray

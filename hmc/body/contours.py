@@ -21,7 +21,7 @@ STEPS = 24
 #: Where circles of latitude are, in shares of the superellipsoid's length, and how many pairs of meridians there are.
 LEVELS = np.linspace(0.08, 0.88, 8)
 MERIDIANS = 3
-#: A viewing ray is asked whether it enters a solid at so many places between its entry into the bounding box and its exit, halving the
+#: A viewing ray is asked whether it enters a solid at so many points between its entry into the bounding box and its exit, halving the
 #: gaps in between so many times.
 HALVINGS = 4
 

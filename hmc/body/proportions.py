@@ -1,6 +1,6 @@
 """Dimensions of a body from the person's height, and the body made from them.
 
-Joint-centre lengths and flesh lengths are two things: the forearm ends at the wrist's centre while its flesh reaches to the
+Joint-centre lengths and flesh lengths differ: the forearm ends at the wrist's centre while its flesh reaches to the
 finger tips, the shank ends at the ankle while its flesh has a foot. Canton's Table 6.1 has one length a part, and arms longer
 than people's; it is the preset `canton_body`.
 """

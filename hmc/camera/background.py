@@ -1,4 +1,4 @@
-"""The empty scene from a recording in which it is never empty.
+"""Background initialisation: the empty scene from a recording with people in all frames.
 
 A median over time needs every place to be free of people half of the time. People who move about in place do not grant that. What is
 behind them comes back with exactly the same value each time it is uncovered, while cloth and skin change with every fold: so the value
@@ -39,7 +39,7 @@ def stable_background(images: Sequence[np.ndarray], share: float = 0.25) -> tupl
     -------
     background : ndarray of uint8, shape (height, width, 3)
     unseen : ndarray of bool, shape (height, width)
-        Where the images do not agree closely enough, so that somebody may have been there all the time; small gaps are closed. Somebody
+        Where the images do not agree closely enough, so that a person may have been there all the time; small gaps are closed. A person
         of one even color who never moves is taken for background.
 
     Raises

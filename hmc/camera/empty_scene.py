@@ -4,7 +4,7 @@ A median over time holds the people who stay about one place. So people are cut 
 scene is, in turns:
 
 - the scene as it is known so far: what differs from it may be a person, and so may what is where nothing is known;
-- the other cameras: only what lies in a visual hull of all views can be a person, not a mirror image, a shadow or somebody far away;
+- the other cameras: only what lies in a visual hull of all views can be a person, not a mirror image, a shadow or a person far away;
 - color: a graph cut between the colors of this camera's people and those of its surroundings (`hmc.camera.people_cut`).
 
 The scene is the median of what is left. A place that is hardly ever left free is not filled in but told: `unseen`.
@@ -95,7 +95,7 @@ def empty_scenes(
 
 
 def replace_people(image: np.ndarray, scene: np.ndarray) -> np.ndarray:
-    """The image with the scene wherever it is far from it: as if nobody were there, with the image's own noise elsewhere."""
+    """The image with the scene wherever it is far from it: as if no person were there, with the image's own noise elsewhere."""
     far = cv2.absdiff(image, scene).max(axis=2) > DISTANCE
     return np.where(far[..., None], scene, image)
 
@@ -134,7 +134,7 @@ def _differs(image: np.ndarray, scene: np.ndarray, unseen: np.ndarray) -> np.nda
 def _scene(images: Sequence[np.ndarray], people: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     """Median of what people leave free, and where that is hardly ever anything.
 
-    A place that never changes is either scene or somebody who never moved: where most samples show people there, the few in which
+    A place that never changes is either scene or a person who never moved: where most samples show people there, the few in which
     they were missed do not make it scene.
     """
     size = images[0].shape[1::-1]

@@ -72,7 +72,7 @@ def looks_like_people(image: np.ndarray, people: np.ndarray, palette: Palette, l
     ----------
     image : ndarray of uint8, shape (height, width, 3)
     people : ndarray of bool, shape (height, width)
-        Where people may be, as far as is known: these pixels are nobody's surroundings.
+        Where people may be, as far as is known: these pixels are no person's surroundings.
     palette : Palette
     log_ratio : float
         Natural logarithm of the likelihood ratio from which a pixel counts.

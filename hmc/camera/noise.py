@@ -29,7 +29,7 @@ LEAST_VARIANCE, LEAST_HIDDEN_VARIANCE = 4.0, 12.0
 HIDDEN_BELOW, SEEN_ABOVE = 1.6, 1.9
 #: Variance of blue, green and red together for one of luma, and for one of chroma (both axes alike).
 OF_LUMA, OF_CHROMA = 3.0, 5.7
-#: Each row and column of which one in so many tells; a pixel is colored whose channels differ by more than so many grey levels; an
+#: Each row and column of which one in so many tells; a pixel is colored if its channels differ by more than so many grey levels; an
 #: image is, if more than this share of it is.
 STEP = 8
 LEAST_COLOR, MOST_COLORED = 8, 0.001

@@ -39,7 +39,7 @@ class View:
     differs : ndarray of bool, shape (height, width)
         Where it is not the scene.
     surely, possibly : ndarray of bool, shape (height, width)
-        Where all cameras, and nearly all, agree that somebody is (`hmc.voxels.agreement`).
+        Where all cameras, and nearly all, agree that a person is (`hmc.voxels.agreement`).
     unseen : ndarray of bool, shape (height, width)
         Where the scene is not known.
     """

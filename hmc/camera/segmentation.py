@@ -4,7 +4,7 @@ The engine is an adaptive mixture of Gaussians with shadow removal (Canton (2009
 Landabaso's shadow test; here OpenCV's MOG2, by Zivkovic (2004)). It is trained on frames of the empty scene and then adapts slowly, and
 never where a person stands. What it finds is cleaned and completed (`hmc.camera.silhouettes`).
 
-A model is a state: `train_background` makes one, `segment` takes one and returns the next. Two things inside are not values: the OpenCV
+A model is a state: `train_background` makes one, `segment` takes one and returns the next. Two parts of it are not values: the OpenCV
 mixture and the running mean change in place when they learn, so go on with the model that `segment` returns, not with the one it was given.
 """
 
@@ -176,7 +176,7 @@ def train_background(
         BGR images without people, one at least and 20 or more for a good model; they are read once and not kept.
     settings : SegmentationSettings, optional
     unseen : ndarray of bool, shape (height, width), optional
-        Where somebody stood in all frames.
+        Where a person stood in all frames.
 
     Returns
     -------
@@ -409,7 +409,7 @@ def _hidden(mask: np.ndarray, answer: np.ndarray, settings: SegmentationSettings
 def _learn(model: BackgroundModel, image: np.ndarray, hidden: np.ndarray, rate: float, settings: SegmentationSettings) -> None:
     """Let the background take in a share of the image, in place; where it is hidden, it changes as its surroundings do.
 
-    Left as it is while the light drifts, a hidden place would come out as foreground, be hidden for that, and never be learnt again.
+    Left as it is while the light drifts, a hidden place would be foreground, be hidden for that, and never be learnt again.
     """
     mean = model.mean
     seen = 1 - hidden

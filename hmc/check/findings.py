@@ -1,4 +1,4 @@
-"""What is wrong with a recording: everything that can be found, not only the first thing.
+"""What is wrong with a recording: everything that can be found, not only the first fault.
 
 `hmc.io.recording.open_recording` stops at the first fault that makes a recording useless; here each part is looked at alone, and what is
 merely odd is told too.
@@ -36,7 +36,7 @@ FEW_BACKGROUND_FRAMES = 10
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing found: ``severity`` is "error" (the recording cannot be used), "warning" (results will suffer) or "note"."""
+    """One finding: ``severity`` is "error" (the recording cannot be used), "warning" (results will suffer) or "note"."""
 
     severity: str
     sentence: str
@@ -106,10 +106,10 @@ def inspect_recording(path: str | Path, cameras: Sequence[str] | None = None, re
         say("error", [f"{path}: no camera named '{unknown[0]}' in the calibration; it has {', '.join(entry.name for entry in entries)}"])
     if cameras is None:
         say("note", unused_views(path, [entry.name for entry in entries]))
-    everyone = [entry.name for entry in entries]
+    all_names = [entry.name for entry in entries]
     entries = [entry for entry in entries if cameras is None or entry.name in cameras]
 
-    views = _views_by_camera(path, [entry.name for entry in entries], everyone, say)
+    views = _views_by_camera(path, [entry.name for entry in entries], all_names, say)
     rig = _usable_rig(entries, {name: view.size for name, view in views.items()}, say)
     if rig is None:
         return Inspection(_sorted(found))
@@ -147,7 +147,7 @@ def _sorted(found: Sequence[Finding]) -> tuple[Finding, ...]:
     return tuple(sorted(dict.fromkeys(found), key=lambda finding: order.index(finding.severity)))
 
 
-def _views_by_camera(path: Path, names: Sequence[str], everyone: Sequence[str], say: Say) -> dict[str, Footage]:
+def _views_by_camera(path: Path, names: Sequence[str], all_names: Sequence[str], say: Say) -> dict[str, Footage]:
     """The images, or else the silhouettes, of each camera that has some; what is wrong with the others is told."""
     unreadable = set()
 
@@ -155,7 +155,7 @@ def _views_by_camera(path: Path, names: Sequence[str], everyone: Sequence[str], 
         unreadable.add(name)
         say("error", [sentence])
 
-    footage, silhouettes = find_views(path, names, everyone, count=False, on_error=on_error)
+    footage, silhouettes = find_views(path, names, all_names, count=False, on_error=on_error)
     views = {name: image or mask for name, image, mask in zip(names, footage, silhouettes, strict=True)}
     for name in names:
         if views[name] is None and name not in unreadable:
@@ -270,8 +270,8 @@ def background(recording: Recording) -> list[str]:
     few = [name for name, n in counts.items() if 0 < n < FEW_BACKGROUND_FRAMES]
     sentences = []
     if none and not recording.has_silhouettes:
-        who = "no camera has" if len(none) == len(counts) else f"{', '.join(none)} have no"
-        sentences.append(f"{who} frames of the empty scene in background/; the temporal median of the recording takes their place")
+        subject = "no camera has" if len(none) == len(counts) else f"{', '.join(none)} have no"
+        sentences.append(f"{subject} frames of the empty scene in background/; the temporal median of the recording takes their place")
     if few:
         sentences.append(f"{', '.join(few)} have fewer than {FEW_BACKGROUND_FRAMES} frames of the empty scene; 30 or more are better")
     return sentences

@@ -42,7 +42,7 @@ LEAST_BEYOND_M3, LEAST_BEYOND = 0.004, 0.03
 
 @dataclass(frozen=True)
 class Hull:
-    """Fine voxels at which at most one camera sees nobody.
+    """Fine voxels at which at most one camera sees no person.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class Hull:
         Centres, world, metres.
     voxel_m : float
     seen, missed : ndarray of bool, shape (n_cameras, n)
-        The camera has a silhouette and sees the voxel; and sees nobody there.
+        The camera has a silhouette and sees the voxel; and sees no person there.
     pixels : tuple of ndarray of int, shape (2, n), one a camera
         Row and column on which each voxel falls; 0 where not seen.
     masks : tuple of ndarray of bool, shape (height, width), or None; one a camera
@@ -162,7 +162,7 @@ def odd_camera(rig: Rig, hulls: Sequence[Hull], shares: np.ndarray) -> tuple[int
     """The camera that does not fit the others.
 
     It is the one without which the others' silhouettes fit each other, and whose own do not fit theirs: one before which furniture hides
-    somebody spoils the others' fit too, but its own silhouettes are covered. Where no camera is (four cameras always fit without one of
+    a person spoils the others' fit too, but its own silhouettes are covered. Where no camera is (four cameras always fit without one of
     them, nearly), it is the one whose silhouettes would fit much better if they were moved.
 
     Parameters
@@ -195,11 +195,11 @@ def odd_camera(rig: Rig, hulls: Sequence[Hull], shares: np.ndarray) -> tuple[int
 
 
 def floor_height(hulls: Sequence[Hull], floor_z: float) -> float:
-    """Where the hulls' feet stand, metres, in the middle of the moments; nan where nobody comes near the floor.
+    """Where the hulls' feet stand, metres, in the middle of the moments; nan where no hull comes near the floor.
 
     A hull narrows quickly below the feet: the height is that from which on its cross-section is half of the largest one between 30 cm
-    below the floor and 30 cm above. Who sits or kneels, or whose feet are hidden, stands too high by this measure; whose clothes
-    are wide on the floor, before cameras that look down steeply, some centimetres too low.
+    below the floor and 30 cm above. A person who sits or kneels, or whose feet are hidden, stands too high by this measure; one
+    whose clothes are wide on the floor, before cameras that look down steeply, some centimetres too low.
     """
     edges = floor_z + np.arange(-round(AROUND_M / LAYER_M), round(FEET_M / LAYER_M) + 1) * LAYER_M
     heights = []
@@ -234,7 +234,7 @@ def beyond_room(hulls: Sequence[Hull], room: np.ndarray) -> list[tuple[int, int,
 
 
 def _look(rig: Rig, masks: Masks, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
-    """Which cameras see the points, which of them see nobody there, and on which pixel (row, column) they fall."""
+    """Which cameras see the points, which of them see no person there, and on which pixel (row, column) they fall."""
     seen, missed = (np.zeros((len(rig), len(points)), bool) for _ in range(2))
     pixels = []
     for c, (camera, mask) in enumerate(zip(rig, masks, strict=True)):

@@ -22,12 +22,12 @@ SPACING_M = 0.06
 MAX_POINTS = 100_000
 #: Masks are compared on cells as large as this many times the points' spacing appears.
 CELL = 1.5
-#: A cell counts as silhouette from this share of its pixels on; a point may be somebody's from the lower one, so that thin limbs stay.
+#: A cell counts as silhouette from this share of its pixels on; a point may be a person's from the lower one, so that thin limbs stay.
 COVERED = 0.5
 TOUCHED = 0.2
-#: Cameras that must show somebody for a fine hull to tell anything.
+#: Cameras that must show a person for a fine hull to tell anything.
 LEAST_VIEWS = 4
-#: Feet this far below the floor are told, metres: in good rigs they come out between -.02 and .02, a post 40 cm wide at -.05.
+#: Feet this far below the floor are told, metres: in good rigs they are between -.02 and .02, a post 40 cm wide at -.05.
 LEAST_DEPTH_M = 0.065
 #: Frames of the empty scene that are learnt from.
 LEARNT_FRAMES = 20
@@ -80,7 +80,7 @@ def disagreements(recording: Recording, masks: Sequence[Sequence[np.ndarray | No
     ----------
     recording : Recording
     masks : sequence (frames) of sequence (cameras) of ndarray, shape (h, w) bool, or None
-        A few moments, with somebody in the room.
+        A few moments, with a person in the room.
 
     Returns
     -------
@@ -90,14 +90,14 @@ def disagreements(recording: Recording, masks: Sequence[Sequence[np.ndarray | No
     if all(len([mask for mask in frame if mask is not None]) < 3 for frame in masks):
         return []
     views = _views(recording)
-    everyone = list(range(len(views)))
-    shares = silhouette_agreement(views, masks, everyone)
+    all_views = list(range(len(views)))
+    shares = silhouette_agreement(views, masks, all_views)
     known = shares[~np.isnan(shares)]
     if not known.size or known.min() >= GOOD_AGREEMENT:
         return []
     names = recording.rig.names
-    for index in everyone:
-        others = [other for other in everyone if other != index]
+    for index in all_views:
+        others = [other for other in all_views if other != index]
         rest = silhouette_agreement(views, masks, others)
         better = ~np.isnan(rest) & ~np.isnan(shares[others])
         if better.any() and rest[better].mean() >= max(GOOD_AGREEMENT, shares[others][better].mean() + GAIN):

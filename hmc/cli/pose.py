@@ -1,4 +1,4 @@
-"""``hmc pose``: the pose of everybody in every frame."""
+"""``hmc pose``: the pose of every person in every frame."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     """Add the command to the parser."""
     parser = subparsers.add_parser(
         "pose",
-        help="the pose of everybody in every frame",
-        description="Find and follow everybody in a recording and fit an articulated body to each. Writes tracks.csv, joints.csv (frame, "
+        help="the pose of every person in every frame",
+        description="Find and follow all persons in a recording and fit an articulated body to each. Writes tracks.csv, joints.csv (frame, "
         "person, joint, x, y, z; metres), pose.npz (state vectors and bodies) and run.toml. A run that was stopped goes on where it was "
         "when it is started again; a finished one is not repeated unless the recording or a parameter changed.",
     )
@@ -77,7 +77,7 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
         "--height",
         default="recording",
         metavar="M|auto",
-        help="everybody's stature in metres; auto: estimated from each person's volume; by default what recording.toml says of a "
+        help="every person's stature in metres; auto: estimated from each person's volume; by default what recording.toml says of a "
         "single person, else auto",
     )
     parser.add_argument(
@@ -195,7 +195,7 @@ def _track(args: argparse.Namespace, recording, how, key: str, problems: list[st
 
 
 def _pelvis_tracks(people):
-    """Where a person was who was not tracked: the pelvis and the top of the head."""
+    """Positions of persons that no tracker gave: the pelvis and the top of the head."""
     from hmc.io.results import TrackTable
     from hmc.landmarks import landmark_index
 
@@ -206,7 +206,7 @@ def _pelvis_tracks(people):
 
 
 def _tell(people, recording, path: Path) -> None:
-    """Print who was found."""
+    """Print the persons that were found."""
     import numpy as np
 
     from hmc.body.proportions import stature
@@ -217,7 +217,7 @@ def _tell(people, recording, path: Path) -> None:
         tall = "no pose" if body is None else f"stature about {stature({name: float(value) for name, value in body.items()}):.2f} m"
         print(f"person {person}: {rows.sum()} frames, from {frames.min()} to {frames.max()}, {tall}")
     if not len(people.poses.frames):
-        print(f"nobody in {recording.n_frames} frames")
+        print(f"no person in {recording.n_frames} frames")
     print(f"wrote {path}")
 
 

@@ -30,8 +30,8 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     parser = subparsers.add_parser(
         "track",
         help="where people are in every frame",
-        description="Find and follow everybody in a recording. Writes tracks.csv (frame, person, x, y, z of the centroid and of the head; "
-        "metres) and run.toml. A run that was stopped goes on where it was when it is started again; a finished one is not repeated "
+        description="Find and follow all persons in a recording. Writes tracks.csv (frame, person, x, y, z of the centroid and of the "
+        "head; metres) and run.toml. A run that was stopped goes on where it was when it is started again; a finished one is not repeated "
         "unless the recording or a parameter changed.",
     )
     add_selection_options(parser)
@@ -159,7 +159,7 @@ def _summary(table, n_frames: int) -> str:
 
     persons, counts = np.unique(table.persons, return_counts=True)
     if len(persons) == 0:
-        return f"nobody in {n_frames} frames"
+        return f"no person in {n_frames} frames"
     lines = [f"{len(persons)} person{'s' if len(persons) > 1 else ''} in {n_frames} frames"]
     for person, count in zip(persons[:20], counts, strict=False):
         frames = table.frames[table.persons == person]

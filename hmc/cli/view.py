@@ -17,7 +17,7 @@ def add_parser(subparsers) -> None:
         "view",
         help="draw a result over its recording",
         description="Draw the fitted bodies into every camera's image, beside a 3-D panel with the voxels; left limbs orange, right "
-        "limbs blue. Of tracks alone, draw everybody as an ellipsoid with a number, beside the room from above. "
+        "limbs blue. Of tracks alone, draw every person as an ellipsoid with a number, beside the room from above. "
         "A video shows all selected frames (by default those of the run), a picture one of them (the middle one) or those of --frame, one "
         "below the other.",
     )

@@ -19,7 +19,7 @@ COLUMNS = ("frame", "camera", "u", "v")
 
 @dataclass(frozen=True)
 class DetectionTable:
-    """Places in images where a marker was seen, true or not; which marker it is, nobody knows.
+    """Positions in images where a marker was seen, true or not; which marker it is, is not known.
 
     Parameters
     ----------

@@ -93,7 +93,7 @@ def find_footage(folder: Path, name: str, first_number: int | None = None, count
 def open_video(path: Path, count: bool = True) -> Footage:
     """Look a video over: size, rate and a frame count that can be believed.
 
-    The header's count is taken when the last frame it promises is there and none follows; otherwise the frames are counted one by one.
+    The header's count is taken when the last frame it states is there and none follows; otherwise the frames are counted one by one.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def open_video(path: Path, count: bool = True) -> Footage:
     finally:
         capture.release()
     n_frames = stated if believed else _count(path)
-    notes = (f"{path.name}: its header promises {stated} frames, {n_frames} can be read (cut off?)",) if stated > n_frames else ()
+    notes = (f"{path.name}: its header states {stated} frames, {n_frames} can be read (cut off?)",) if stated > n_frames else ()
     return Footage(path, n_frames, (image.shape[1], image.shape[0]), fps=fps if 0 < fps < 1e4 else None, notes=notes)
 
 
@@ -214,7 +214,7 @@ def read_footage(footage: Footage, first: int, last: int, on_problem: Callable[[
     footage : Footage
     first, last : int
     on_problem : callable
-        Called with one line for each thing that went wrong.
+        Called with one line for each fault.
     label : str
         What the lines call this footage.
 
@@ -242,7 +242,7 @@ def read_footage(footage: Footage, first: int, last: int, on_problem: Callable[[
                 image = None
             elif image is None and index < footage.n_frames and (images is None or index in images):
                 lost.append(index)
-            # Who knows how many frames there are asks for no more after the last.
+            # A caller that knows how many frames there are asks for no more after the last.
             if image is not None or index + 1 == last:
                 say_lost()
             yield image

@@ -90,7 +90,7 @@ class Recording:
 
     @property
     def known_height_m(self) -> float | None:
-        """The stature of whoever is in it, metres; None where it is not known, or somebody else may be there too."""
+        """The stature of the person in it, metres; None where it is not known, or another person may be there too."""
         return self.subject_height_m[0] if len(self.subject_height_m) == 1 and self.persons in (None, 1) else None
 
     @property
@@ -140,7 +140,7 @@ def open_recording(path: str | Path, cameras: Sequence[str] | None = None, start
         raise InputError(f"{path}: no such folder; a recording is a folder with calibration.toml and videos/ or images/")
     settings = read_settings(path)
     entries = read_entries(path)
-    everyone = [entry.name for entry in entries]
+    all_names = [entry.name for entry in entries]
     if cameras is not None:
         cameras = [cameras] if isinstance(cameras, str) else cameras
         by_name = {entry.name: entry for entry in entries}
@@ -150,12 +150,12 @@ def open_recording(path: str | Path, cameras: Sequence[str] | None = None, start
         entries = [by_name[name] for name in cameras]
     names = [entry.name for entry in entries]
     starts = settings.get("first_frame", {})
-    strangers = [name for name in starts if name not in everyone]
+    strangers = [name for name in starts if name not in all_names]
     if strangers:
         raise InputError(
-            f"{path / 'recording.toml'}: `first_frame` names '{strangers[0]}', no camera of the calibration ({', '.join(everyone)})"
+            f"{path / 'recording.toml'}: `first_frame` names '{strangers[0]}', no camera of the calibration ({', '.join(all_names)})"
         )
-    footage, silhouettes = find_views(path, names, everyone, starts=starts)
+    footage, silhouettes = find_views(path, names, all_names, starts=starts)
     both = [image or mask for image, mask in zip(footage, silhouettes, strict=True)]
     sizes = {name: view.size for name, view in zip(names, both, strict=True) if view is not None}
     try:
@@ -276,7 +276,7 @@ def background_frames(recording: Recording, camera_index: int, limit: int | None
 def find_views(
     path: Path,
     names: Sequence[str],
-    everyone: Sequence[str],
+    all_names: Sequence[str],
     count: bool = True,
     on_error: Callable[[str, str], None] | None = None,
     starts: Mapping[str, int] | None = None,
@@ -289,7 +289,7 @@ def find_views(
         Folder of the recording.
     names : sequence of str
         The cameras wanted.
-    everyone : sequence of str
+    all_names : sequence of str
         All cameras of the calibration: numbered images count from the smallest number of all, whichever are wanted.
     count : bool
         As `hmc.io.footage.open_video`.
@@ -310,10 +310,10 @@ def find_views(
             return None
 
     images = path / "images"
-    first = _first_number(images, everyone)
+    first = _first_number(images, all_names)
     footage = [find(path / "videos", name, 0) or find(images, name, first) for name in names]
     if not any(footage):
-        first = _first_number(path / "silhouettes", everyone)
+        first = _first_number(path / "silhouettes", all_names)
     return footage, [find(path / "silhouettes", name, first) for name in names]
 
 

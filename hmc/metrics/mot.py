@@ -173,7 +173,7 @@ def _assign(pairs: list[int], objects: list[int], estimates: list[int], values: 
     rows = {name: place for place, name in enumerate(dict.fromkeys(objects[k] for k in pairs))}
     columns = {name: place for place, name in enumerate(dict.fromkeys(estimates[k] for k in pairs))}
     if len(rows) == len(pairs) == len(columns):
-        return pairs  # nobody competes
+        return pairs  # no two pairs compete
     # A pair that may not match costs more than any assignment of pairs that may.
     costs = np.full((len(rows), len(columns)), 2 * min(len(rows), len(columns)) * (np.abs(values[pairs]).max() + 1) + 1)
     places = {}

@@ -45,7 +45,7 @@ def match_persons(
     Returns
     -------
     dict
-        Estimated person to true person; who matches nobody is not in it.
+        Estimated person to true person; those that match no true person are not in it.
     """
     true_names, names = np.unique(truth_persons), np.unique(persons)
     worth = np.zeros((len(true_names), len(names)))

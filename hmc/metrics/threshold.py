@@ -64,7 +64,7 @@ def normal_quantiles(n: int) -> np.ndarray:
 
 
 def quantile_r2(values: np.ndarray) -> float:
-    """Share of the variance of sorted values that a line over the Gaussian's quantiles explains, in [0, 1]; 1 is a Gaussian.
+    """Share of the variance of sorted values that a line over the Gaussian's quantiles accounts for, in [0, 1]; 1 is a Gaussian.
 
     Parameters
     ----------

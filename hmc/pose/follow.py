@@ -1,4 +1,4 @@
-"""The poses of everybody in a recording by any method: views in, poses out, streamed frame by frame.
+"""The poses of all persons in a recording by any method: views in, poses out, streamed frame by frame.
 
 Each person is a state that a step takes from frame to frame (`hmc.pose.person`). Only the views of people who have just appeared are held
 in memory. Records of what is decided go to a journal, so that a run that was stopped goes on where it was.
@@ -39,7 +39,7 @@ logger = logging.getLogger("hmc")
 
 @dataclass(frozen=True)
 class PosedPeople:
-    """Everybody's poses.
+    """The poses of all persons.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ class FollowOptions:
     seed : int
         The same seed gives the same result, stopped and resumed or not.
     height_m : float or None
-        Stature of everybody; estimated for each person where left out.
+        Stature of every person; estimated for each where left out.
     detections : DetectionTable or None
         For methods that need them; one person's.
     """
@@ -207,7 +207,7 @@ def follow(
 def _views_from(
     recording: Recording, tracks: TrackTable, method: PoseMethod, how: tuple[FollowOptions, RunOptions], first: int
 ) -> Iterator[dict[int, PersonView]]:
-    """What each frame shows of everybody, from the first that somebody still needs to the end of the selection."""
+    """What each frame shows of every person, from the first that one still needs to the end of the selection."""
     options, run = how
     end = recording.start + recording.n_frames
     if method.needs <= {"detections"}:
@@ -244,13 +244,13 @@ def _with_markers(views: dict[int, PersonView], recording: Recording, method: Po
 
 
 def only_person(recording: Recording) -> TrackTable:
-    """The track of somebody who is there in every frame of the selection, nobody knows where: person 0."""
+    """The track of a person who is there in every frame of the selection, at an unknown position: person 0."""
     frames = np.arange(recording.start, recording.start + recording.n_frames)
     return TrackTable(frames, np.zeros(len(frames), int), np.zeros((len(frames), 3)))
 
 
 def persons_of(recording: Recording, tracks: TrackTable) -> dict[int, PersonTrack]:
-    """Everybody who is tracked in the recording's selection.
+    """The tracks of all persons in the recording's selection, by number.
 
     Parameters
     ----------
@@ -269,7 +269,7 @@ def persons_of(recording: Recording, tracks: TrackTable) -> dict[int, PersonTrac
 
 
 def unfitted_notes(persons: Iterable[int], status: Iterable[str]) -> list[str]:
-    """A line for every reason why somebody has frames without a pose.
+    """A line for every reason why a person has frames without a pose.
 
     Parameters
     ----------
@@ -277,7 +277,7 @@ def unfitted_notes(persons: Iterable[int], status: Iterable[str]) -> list[str]:
         Person and status of every frame of a track; "fitted" is a pose.
     """
     why = Counter((int(person), str(reason)) for person, reason in zip(persons, status, strict=True) if reason != "fitted")
-    return [f"person {who}: {n} frame{'s' if n > 1 else ''} without a pose: {reason}" for (who, reason), n in sorted(why.items())]
+    return [f"person {one}: {n} frame{'s' if n > 1 else ''} without a pose: {reason}" for (one, reason), n in sorted(why.items())]
 
 
 def _posed_people(rows: Sequence[DecidedFrames]) -> PosedPeople:

@@ -52,7 +52,7 @@ FrameRng = Callable[[int], np.random.Generator]
 
 @dataclass(frozen=True)
 class Capture:
-    """What is the same for everybody in a recording.
+    """What is the same for every person in a recording.
 
     Parameters
     ----------

@@ -26,7 +26,7 @@ NO_START = "nothing to start from"
 
 @dataclass(frozen=True)
 class PoseTask:
-    """What is the same for everybody in a run.
+    """What is the same for every person in a run.
 
     Parameters
     ----------

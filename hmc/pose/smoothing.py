@@ -54,7 +54,7 @@ def smooth_landmarks(frames: np.ndarray, positions: np.ndarray, fps: float, wind
 
 
 def smooth_people(people: PosedPeople, limits: JointLimits, fps: float, window_s: float) -> PosedPeople:
-    """Everybody's poses, smoothed.
+    """The poses of all persons, smoothed.
 
     Parameters
     ----------

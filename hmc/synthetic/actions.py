@@ -206,7 +206,7 @@ def pick_up(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator) -> 
 
 
 def hug(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator) -> Motion:
-    """Hold somebody who stands .4 m ahead: arms round them, chest leant forwards."""
+    """Hold a person who stands .4 m ahead: arms round them, chest leant forwards."""
     n = len(times)
     feet = _planted(skeleton, n, [(0.05, 0.11, 6), (-0.05, -0.11, -6)])
     shift = 0.02 * np.stack([_wander(times, rng, 1.0, 1.5) for _ in range(2)], axis=-1)

@@ -46,7 +46,7 @@ def throw_item(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator) 
 
 
 def struggle(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator) -> Motion:
-    """Strike about with both arms and twist, as somebody who is attacked."""
+    """Strike about with both arms and twist, as a person who is attacked."""
     keys: list[Key] = [
         (0.0, (0.45, 0.35, -0.40), (0.45, -0.35, -0.40), 0.0, 0.10, 0.0, 0.05),
         (0.4, (0.75, 0.25, 0.25), (0.20, -0.70, -0.30), -0.40, 0.15, 0.03, 0.08),

@@ -19,7 +19,7 @@ Way = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 @dataclass(frozen=True)
 class _Gait:
-    """How somebody walks or runs.
+    """How a person walks or runs.
 
     Parameters
     ----------

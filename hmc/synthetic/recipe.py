@@ -104,7 +104,7 @@ class StepRecipe:
     do : str
         One of `STEPS`.
     to_m : tuple of (x, y)
-        Of a walk: where to, past which places. Who sits down on a chair may be led to it.
+        Of a walk: where to, past which points. A person about to sit down on a chair may be led to it.
     speed_m_s : float
         Of walking; 0 takes 1.2.
     to_deg : float
@@ -116,7 +116,7 @@ class StepRecipe:
     chair : int
         To sit on: the number of the piece of furniture, counted from 1; 0 sits down on the spot.
     seat_m : float
-        Height of the seat, metres; without a chair and near the floor, somebody crouches.
+        Height of the seat, metres; without a chair and near the floor, the person crouches.
     """
 
     do: str
@@ -167,7 +167,7 @@ class ActorRecipe:
     bvh_start_s : float
         Where in the file the clip begins.
     script : tuple of StepRecipe
-        For ``motion = "script"``: what the person does, one thing after another.
+        For ``motion = "script"``: what the person does, one action after another.
     """
 
     height_m: float = 1.75

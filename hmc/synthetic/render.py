@@ -86,7 +86,7 @@ def render_recording(
 
 
 def _write_tables(scene: Scene, folder: Path) -> None:
-    """Calibration, settings, and the truth about the joints and volumes of who is in the room."""
+    """Calibration, settings, and the truth about the joints and volumes of the people in the room."""
     recipe = scene.recipe
     (folder / "truth").mkdir(parents=True)
     write_calibration(folder / "calibration.toml", scene.rig)
@@ -97,7 +97,7 @@ def _write_tables(scene: Scene, folder: Path) -> None:
     write_toml(folder / "recording.toml", settings)
     n, persons = recipe.n_frames, len(scene.actors)
     present = np.array([scene.in_room(k) for k in range(persons)], bool).reshape(persons, n).T
-    frames, who = np.nonzero(present)
+    frames, actors = np.nonzero(present)
     joints = np.zeros((n, persons, len(LANDMARKS), 3))
     centroids, heads = np.zeros((n, persons, 3)), np.zeros((n, persons, 3))
     for k, (actor, motion) in enumerate(zip(scene.actors, scene.motions, strict=True)):
@@ -108,8 +108,8 @@ def _write_tables(scene: Scene, folder: Path) -> None:
             own = crowd.vertices[crowd.persons == k]
             centroids[frame, k] = volume_centroid(own, scene.actors[k].triangles)[1]
             heads[frame, k] = own[scene.actors[k].parts == list(PARTS).index("head")].mean(axis=0)
-    write_joints(folder / "truth" / "joints.csv", PoseTable(frames, who, joints[present]))
-    write_tracks(folder / "truth" / "centroids.csv", TrackTable(frames, who, centroids[present], heads[present]))
+    write_joints(folder / "truth" / "joints.csv", PoseTable(frames, actors, joints[present]))
+    write_tracks(folder / "truth" / "centroids.csv", TrackTable(frames, actors, centroids[present], heads[present]))
 
 
 def _write_pictures(scene: Scene, folder: Path, workers: int, on_progress: Callable[[int, int], None] | None) -> None:
@@ -195,7 +195,7 @@ class _Studio:
 
 
 def _rng(scene: Scene, stage: int, camera: int) -> np.random.Generator:
-    """A generator that depends on what is rendered, never on who renders it."""
+    """A generator that depends on what is rendered, never on the worker that renders it."""
     return np.random.default_rng([scene.seed, stage, camera])
 
 

@@ -115,7 +115,7 @@ def build_scene(recipe: Recipe, seed: int | None = None) -> Scene:
     Raises
     ------
     InputError
-        When somebody leaves the room, but through a door.
+        When a person leaves the room, but through a door.
     """
     seed = recipe.seed if seed is None else seed
     rng_rig, rng_room, rng_light, *rng_actors = (
@@ -167,7 +167,7 @@ def build_scene(recipe: Recipe, seed: int | None = None) -> Scene:
 
 
 def _first_in_wall(actor: ActorRecipe, motion: Motion, room: Room) -> int | None:
-    """The first frame in which somebody comes too near to a wall or is beyond one, other than at a door."""
+    """The first frame in which a person comes too near to a wall or is beyond one, other than at a door."""
     place = motion.root[:, :2]
     high = room.corners[1, :2]
     near = (np.abs(place) > high - 0.3).any(axis=1)

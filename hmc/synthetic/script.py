@@ -1,4 +1,4 @@
-"""Scripts: what a person does one thing after another, walking from place to place, sitting on chairs, waiting for others."""
+"""Scripts: what a person does one action after another, walking from place to place, sitting on chairs, waiting for others."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ __all__ = ["furniture_place", "script_motion", "smooth_way"]
 ACTIONS = {
     "stand": stand, "gesture": gesture, "box": box, "throw_catch": throw_catch, "pick_up": pick_up, "hug": hug, "sit": sit,
 }  # fmt: skip
-#: How far before a chair's middle somebody stands who is about to sit down on it, metres.
+#: How far before a chair's middle a person stands who is about to sit down on it, metres.
 BEFORE_CHAIR_M = 0.36
-#: Time over which one thing flows into the next, seconds.
+#: Time over which one action flows into the next, seconds.
 BLEND_S = 0.4
 #: How long it takes to sit down and to get up again, and the length of `sit` to which these belong, seconds.
 DOWN_S, UP_S, SIT_S = 1.8, 1.7, 5.0
@@ -48,7 +48,7 @@ class _Piece:
 def script_motion(
     actor: ActorRecipe, skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator, furniture: tuple[FurnitureRecipe, ...] = ()
 ) -> Motion:
-    """The motion of an actor's script, in the world; who is done stands where they are.
+    """The motion of an actor's script, in the world; an actor whose script is over stands still.
 
     Parameters
     ----------

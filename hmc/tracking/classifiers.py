@@ -108,7 +108,7 @@ def fit_tree(features: np.ndarray, is_person: np.ndarray, groups: np.ndarray, rn
     """Grow a decision tree on entropy and prune it back to where cross-validation finds it best.
 
     Both classes weigh the same as a whole, however many components are people: else a leaf that a person out of two comes to is none's,
-    because five times as many other things were seen. Minimal cost-complexity pruning (Breiman et al. 1984): of the levels whose
+    because five times as many other objects were seen. Minimal cost-complexity pruning (Breiman et al. 1984): of the levels whose
     weighted share of wrong verdicts on the groups that were held out is within one standard error of the least, the one with the
     smallest tree.
 
@@ -188,7 +188,7 @@ def plain_tree(tree: Tree) -> PersonTree:
 
 def _checked(features: np.ndarray, is_person: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     features, is_person = np.asarray(features, float), np.asarray(is_person, bool)
-    for count, what in ((np.count_nonzero(is_person), "people"), (np.count_nonzero(~is_person), "other things")):
+    for count, what in ((np.count_nonzero(is_person), "people"), (np.count_nonzero(~is_person), "other objects")):
         if count < 2 * N_GAUSSIANS:
             raise InputError(
                 f"{count} components are {what}; a classifier needs {2 * N_GAUSSIANS} at least: give more frames or recordings"

@@ -38,7 +38,7 @@ def looks_like_object(blobs: Blobs, settings: LifecycleSettings) -> np.ndarray:
     """Which sets of voxels may be a chair or the like that was left behind; shape (n,) bool.
 
     They do not look like a person and are lower than one who appears; people who sit on the floor or crouch may be so too, but they
-    move, and who lies is longer.
+    move, and a person who lies is longer.
     """
     return ~looks_like_person(blobs, settings) & (blobs.top_m < settings.least_top_m + 0.1) & (blobs.sides_m[:, 0] < settings.least_lying_m)
 
@@ -49,5 +49,5 @@ def is_established(track: Track, fps: float, settings: LifecycleSettings) -> boo
 
 
 def horizontal_distance(a: np.ndarray, b: np.ndarray) -> float:
-    """Distance of two places seen from above, metres."""
+    """Distance of two points seen from above, metres."""
     return float(np.hypot(*(a - b)[:2]))

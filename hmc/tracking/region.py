@@ -12,7 +12,7 @@ __all__ = ["person_radii", "region_distance"]
 #: Radius of an average person across, metres (Canton, section 4.2.3).
 PERSON_RADIUS_M = 0.30
 
-#: A region's least half-height, metres: someone who kneels or whose legs are hidden keeps a region that reaches the head.
+#: A region's least half-height, metres: a person who kneels or whose legs are hidden keeps a region that reaches the head.
 LEAST_HALF_HEIGHT_M = 0.6
 
 

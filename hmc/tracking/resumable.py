@@ -164,7 +164,7 @@ class Timing:
     input_s : float
         Reading, segmenting, carving, components and colors.
     filter_s : float
-        Saying where the people are who are known.
+        Says where the known people are.
     lifecycle_s : float
         Sharing out voxels, creation and deletion of tracks.
     """

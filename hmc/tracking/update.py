@@ -126,7 +126,7 @@ class FrameUpdate:
     ended : tuple of Track
         Tracks that were deleted in this frame.
     handed_over : tuple of int
-        Persons whose track left the object that it stayed with and goes on with who got up from it.
+        Persons whose track left the object that it stayed with and goes on with the person who got up from it.
     false_tracks : tuple of TrackRow
     rows : tuple of TrackRow
         New lines for the table, of the tracks that were there before.

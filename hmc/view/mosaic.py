@@ -60,7 +60,7 @@ class Result:
 
     @property
     def frames(self) -> np.ndarray:
-        """Frame numbers in which there is anybody, in order."""
+        """Frame numbers in which there is a person, in order."""
         return np.unique(np.concatenate([table.frames for table in (self.poses, self.tracks) if table is not None]))
 
 
@@ -105,7 +105,7 @@ def with_bodies(result: Result, states: PoseStates) -> Result:
 
 
 def people_in(result: Result, frame: int) -> list[Person]:
-    """Everybody in a frame, by number."""
+    """All persons in a frame, by number."""
     poses, tracks, states = (
         {} if table is None else {int(table.persons[row]): row for row in np.flatnonzero(table.frames == frame)}
         for table in (result.poses, result.tracks, result.states)
@@ -209,7 +209,7 @@ def render(
 
 
 def draw_people(image: np.ndarray, camera: Camera, people: list[Person], outlines: bool) -> None:
-    """Draw everybody: outlines first, sticks over them; who has no pose as an ellipsoid."""
+    """Draw all persons: outlines first, sticks over them; a person without a pose as an ellipsoid."""
     width = float(np.clip(min(camera.size) / 160, 1.5, 3.0))
     for person in people:
         if outlines and person.body is not None and person.state is not None:
@@ -288,7 +288,7 @@ def follow(result: Result, room: np.ndarray) -> Callable[[int], np.ndarray]:
     Returns
     -------
     callable
-        Frame number to the box, shape (2, 3), metres; the whole room where there is nobody at all.
+        Frame number to the box, shape (2, 3), metres; the whole room where there is no person at all.
     """
     tables = [table for table in (result.poses, result.tracks) if table is not None]
     frames = np.concatenate([np.repeat(table.frames, table.positions[0].size // 3 if len(table.frames) else 1) for table in tables])
@@ -312,7 +312,7 @@ def follow(result: Result, room: np.ndarray) -> Callable[[int], np.ndarray]:
 
 
 def draw_trails(image: np.ndarray, camera: Camera, result: Result, frame: int) -> None:
-    """Draw everybody's way through the last frames on the floor."""
+    """Draw every person's way through the last frames on the floor."""
     table = result.tracks
     if table is None and result.poses is not None:
         table = TrackTable(result.poses.frames, result.poses.persons, result.poses.positions[:, landmark_index("pelvis")])

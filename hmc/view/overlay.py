@@ -1,6 +1,6 @@
 """Drawing people into an image: stick figures, outlines of the flesh, tracks, labels. Every function draws into the image it is given.
 
-Left limbs are orange and right limbs blue, whoever's they are; trunk, head, outline and label have the person's color. Colors are BGR.
+Left limbs are orange and right limbs blue, of every person; trunk, head, outline and label have the person's color. Colors are BGR.
 """
 
 from __future__ import annotations

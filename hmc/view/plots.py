@@ -190,7 +190,7 @@ def draw_body(body: BodyModel, state: np.ndarray, ax: Axes3D | None = None, pers
 
 
 def draw_tracks(tracks: TrackTable, room: np.ndarray | None = None, truth: TrackTable | None = None, ax: Axes | None = None) -> Axes:
-    """Draw everybody's way from above; a dot where it ends, a thin dark line for the truth.
+    """Draw every person's way from above; a dot where it ends, a thin dark line for the truth.
 
     Parameters
     ----------

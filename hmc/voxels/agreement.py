@@ -17,7 +17,7 @@ from hmc.voxels.components import components
 
 __all__ = ["agreed_views"]
 
-#: Smaller blobs are nobody, cubic metres.
+#: Smaller blobs are no person, cubic metres.
 LEAST_VOLUME = 0.01
 #: How far people may reach beyond the tolerant hull, metres.
 REACH_M = 0.1
@@ -37,7 +37,7 @@ def agreed_views(
     masks : sequence of ndarray of bool, shape (height, width), or None
         One a camera.
     tolerance : int
-        Cameras that may have missed somebody; none where fewer than four have a mask.
+        Cameras that may have missed a person; none where fewer than four have a mask.
 
     Returns
     -------
@@ -60,7 +60,7 @@ def agreed_views(
 
 
 def _bodies(hull: np.ndarray, tables: CarvingTables) -> np.ndarray:
-    """The hull without blobs that are too small for anybody."""
+    """The hull without blobs that are too small for a person."""
     blobs = components(hull, tables.grid, max(1, round(LEAST_VOLUME / tables.grid.voxel_size_m**3)))
     kept = np.zeros_like(hull)
     kept[tuple(blobs.voxels.T)] = True

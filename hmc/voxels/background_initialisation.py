@@ -1,7 +1,7 @@
 """Recordings without frames of the empty scene: what is learnt from images with people in them, and what must be told from frame to frame.
 
-The scene behind people who move about in place comes back bit by bit (`hmc.camera.empty_scene`). A place that somebody hardly ever leaves
-does not: there, no difference from the scene tells when somebody is in it. So in every frame people are cut out by their colors as well,
+The scene behind people who move about in place comes back bit by bit (`hmc.camera.empty_scene`). A place that a person hardly ever leaves
+does not: there, no difference from the scene tells when a person is in it. So in every frame people are cut out by their colors as well,
 in small images, and the silhouettes take that over where the scene was never seen.
 """
 

@@ -5,7 +5,7 @@ camera alone the two are the same, to a rig they are not:
 
 - A shadow lies on a surface. Where the ray of a doubtful pixel meets the floor, other cameras look at the same spot: if it is a shadow,
   they see it as one too; if it was a leg before the floor, they see the bare floor there.
-- A sleeve takes up room. Somewhere along the ray lie voxels at which every camera sees a person or doubts, and several see one.
+- A sleeve fills room. Somewhere along the ray lie voxels at which every camera sees a person or doubts, and several see one.
 
 So doubtful pixels become part of the silhouette where they are no shadow on the floor and look at such voxels. A miss on weak evidence
 is thereby no miss, while a camera that surely sees the empty scene, or furniture before the person, carves as ever.
@@ -208,7 +208,7 @@ def floor_shadows(tables: CompletionTables, masks: Sequence[np.ndarray | None], 
     for pixels, mask, doubt in zip(tables.cell_pixels, masks, doubtful, strict=True):
         if mask is None or doubt is None:
             continue
-        told = np.full(mask.size + 1, 2, np.uint8)  # 0: bare, 1: doubted, 2: nothing, as somebody hides it or it is not in the image
+        told = np.full(mask.size + 1, 2, np.uint8)  # 0: bare, 1: doubted, 2: nothing, as a person hides it or it is not in the image
         np.maximum(doubt.ravel().view(np.uint8), 2 * mask.ravel().view(np.uint8), out=told[:-1])
         told = told.take(pixels)
         doubting += told == 1

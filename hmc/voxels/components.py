@@ -140,7 +140,7 @@ def _label_runs(occupied: np.ndarray) -> tuple[Runs, np.ndarray]:
     start = index[first]
     column = start // nz
     runs = Runs(column // ny, column % ny, start - column * nz, length)
-    # Keys that grow with (x, y, z), with a gap between columns, so that a neighbour beyond a border is nobody's.
+    # Keys that grow with (x, y, z), with a gap between columns, so that a neighbour beyond a border matches no voxel.
     stride_y = nz + 2
     stride_x = (ny + 1) * stride_y
     low = runs.x * stride_x + runs.y * stride_y + runs.z

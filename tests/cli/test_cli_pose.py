@@ -155,7 +155,7 @@ def test_the_height_of_the_recording_is_used_unless_auto(tmp_path):
 def test_an_empty_room(tmp_path, ring, capsys):
     folder = draw_recording(tmp_path / "empty", ring, [[]] * 4)
     assert pose(tmp_path / "out", "--voxel", "0.08", recording=folder) == 0
-    assert "nobody in 4 frames" in capsys.readouterr().out
+    assert "no person in 4 frames" in capsys.readouterr().out
     assert len(read_joints(tmp_path / "out" / "joints.csv").frames) == 0
     assert len(read_pose(tmp_path / "out" / "pose.npz").frames) == 0
 

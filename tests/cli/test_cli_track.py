@@ -95,7 +95,7 @@ def test_a_journal_of_other_parameters_is_begun_anew(folder, tmp_path, monkeypat
 def test_an_empty_room_and_a_selection(tmp_path, ring, capsys):
     path = draw_recording(tmp_path / "empty", ring, [[]] * 6)
     assert track(path, tmp_path / "out", "--start", "2", "--frames", "3", "--cameras", "cam_00,cam_01,cam_02") == 0
-    assert "nobody in 3 frames" in capsys.readouterr().out
+    assert "no person in 3 frames" in capsys.readouterr().out
     assert len(read_tracks(tmp_path / "out" / "tracks.csv").frames) == 0
 
 

@@ -90,7 +90,7 @@ def test_nobody_at_all(clip, tmp_path, capsys):
             cv2.imwrite(str(image(clip, camera.name, index)), empty.read()[1])
         empty.release()
     assert main(["track", str(clip), "--out", str(tmp_path / "out"), "--quiet", "--voxel", "0.08", "--tracker", "naive"]) == 0
-    assert "nobody in 6 frames" in capsys.readouterr().out
+    assert "no person in 6 frames" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

@@ -363,7 +363,7 @@ def test_nobody_begins_on_the_head():
     assert not is_upright(on_head.state)
     for voxels in (True, False):
         none, info = swarm_step(np.random.default_rng(0), MODEL, None, reading, 30.0, None, SwarmSettings(voxels=voxels))
-        assert none is None and info.status == "no fit: nobody is upright in the curves"
+        assert none is None and info.status == "no fit: no person is upright in the curves"
 
 
 def test_a_pose_that_is_too_far_from_the_curves_is_no_fit():

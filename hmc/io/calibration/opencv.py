@@ -13,7 +13,7 @@ from hmc.io.calibration.entry import CalibrationEntry
 
 __all__ = ["Storage", "read_opencv"]
 
-#: The names under which programs keep each thing; the first that is there, with a fitting shape, counts.
+#: The names under which programs keep each value; the first that is there, with a fitting shape, counts.
 MATRIX = ("camera_matrix", "cameraMatrix", "Camera_Matrix", "CameraMatrix", "Intrinsics", "intrinsic", "matrix", "K", "M", "M1")
 DISTORTIONS = (
     "distortion_coefficients",

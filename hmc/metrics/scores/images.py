@@ -1,4 +1,4 @@
-"""Scores of poses in images: the landmarks' places in pixels, camera by camera (Canton 2009, section 5.3.1: the metrics in R^2)."""
+"""Scores of poses in images: the landmarks' positions in pixels, camera by camera (Canton 2009, section 5.3.1: the metrics in R^2)."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ class ImageEvaluation:
 
 
 def read_image_landmarks(path: str | Path, cameras: Sequence[str]) -> ImageTable:
-    """Read a table `frame, camera, person, joint, u, v`, one row a landmark that somebody marked in an image.
+    """Read a table `frame, camera, person, joint, u, v`, one row a landmark that was marked in an image by hand.
 
     Parameters
     ----------

@@ -120,13 +120,13 @@ def evaluate_pose(estimate: PoseTable, truth: PoseTable, thresholds_m: Sequence[
     later = [means[np.isfinite(means)][1:] for means in frame_means.values()]
     covered = sum(int(np.isfinite(means).sum()) for means in frame_means.values())
     with_truth = sum(int((~np.isnan(person.errors)).any(axis=1).sum()) for person in persons)
-    nobody = ~np.isin(estimate.persons, list(names)) if names else np.ones(len(estimate.persons), bool)
+    unmatched = ~np.isin(estimate.persons, list(names)) if names else np.ones(len(estimate.persons), bool)
     summary = {
         "true_persons": len(persons),
         "person_frames": with_truth,
         "person_frames_estimated": covered,
         "coverage": covered / with_truth if with_truth else float("nan"),
-        "person_frames_of_nobody": int(nobody.sum()),
+        "person_frames_of_nobody": int(unmatched.sum()),
         "initialisation_mean_mm": _mean_mm(np.array(first)),
         "tracking_mean_mm": _mean_mm(np.concatenate(later)) if later else float("nan"),
         "sides_exchanged_mean_mm": _mean_mm(np.concatenate([_frame_means(_with_sides_exchanged(person)) for person in persons])),
@@ -134,7 +134,7 @@ def evaluate_pose(estimate: PoseTable, truth: PoseTable, thresholds_m: Sequence[
     }
     summary |= {key: value for key, value in rows[len(LANDMARKS)].items() if key not in ("person", "landmark", "frames", "true_frames")}
     summary |= chosen
-    return PoseEvaluation(persons, rows, summary, tuple(_notes(persons, frame_means, estimate.persons[nobody])), known)
+    return PoseEvaluation(persons, rows, summary, tuple(_notes(persons, frame_means, estimate.persons[unmatched])), known)
 
 
 def evaluate_tracks(estimate: TrackTable, truth: TrackTable) -> MotScores:
@@ -157,7 +157,7 @@ def known_thresholds(
     Parameters
     ----------
     errors : ndarray, shape (n, 15)
-        From `hmc.metrics.landmarks.landmark_errors`, of everybody; metres, or pixels.
+        From `hmc.metrics.landmarks.landmark_errors`, of all persons; metres, or pixels.
     thresholds : sequence of float or "auto"
         In the unit of the errors.
     unit : {"mm", "px"}
@@ -248,7 +248,7 @@ def _mean_mm(values: np.ndarray) -> float:
     return float(values.mean() * 1000) if len(values) else float("nan")
 
 
-def _notes(persons: Sequence[PersonErrors], frame_means: Mapping[int, np.ndarray], nobody: np.ndarray) -> list[str]:
+def _notes(persons: Sequence[PersonErrors], frame_means: Mapping[int, np.ndarray], unmatched: np.ndarray) -> list[str]:
     notes = []
     for person in persons:
         if not person.estimated_as:
@@ -271,7 +271,7 @@ def _notes(persons: Sequence[PersonErrors], frame_means: Mapping[int, np.ndarray
                     f"person {person.person}: left and right {limbs} seem swapped in {_frames(person.frames[swapped])}: their mean error "
                     f"there is {_mean_mm(as_is[swapped]):.0f} mm, and {_mean_mm(exchanged[swapped]):.0f} mm with the sides exchanged"
                 )
-    for name, count in zip(*np.unique(nobody, return_counts=True), strict=True):
+    for name, count in zip(*np.unique(unmatched, return_counts=True), strict=True):
         notes.append(f"estimated person {name} ({count} frames) matches no true person")
     return notes
 

@@ -32,13 +32,13 @@ RIVAL_COST = 2.0
 HEIGHTS_M = (1.55, 1.65, 1.75, 1.85, 1.95)
 #: After this many frames without a pose it is begun anew.
 LOST_FRAMES = 10
-#: So many points that several views agree on, away from the person, are somebody else's.
+#: So many points that several views agree on, away from the person, are another person's.
 ANOTHER_PERSON = 8
 #: Where markers are worn is learnt from at most this many frames.
 LEARN_FRAMES = 60
 #: How long the person is watched first, seconds.
 WINDOW_S = 2.0
-#: Of the random numbers: of a first pose, of the frames that prove it, and of those from which places are learnt.
+#: Of the random numbers: of a first pose, of the frames that prove it, and of those from which the markers' positions are learnt.
 STARTING, PROVING, LEARNING = 3, 2, 4
 #: Every way counts as what it costs: in which one a frame's filter ended says nothing.
 TELLING_APART = LegSettings(doubt=0.0, jump_weight=5e-5, arms_too=True)
@@ -63,7 +63,7 @@ class MarkerStart:
     def __call__(
         self, frame_rng: FrameRng, views: Sequence[PersonView], capture: Capture, height_m: float | None = None
     ) -> StartPose | None:
-        """The body, the pose and the places of the markers; None where no frame has enough points that views agree on.
+        """The body, the pose and the positions of the markers; None where no frame has enough points that views agree on.
 
         Raises
         ------

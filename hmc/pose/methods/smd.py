@@ -43,13 +43,13 @@ SMD_PRESETS: dict[str, SmdPreset] = {
 
 @dataclass(frozen=True)
 class DaVinciStart:
-    """The paper's start: the first frame of the window in which somebody stands as da Vinci's man does (section 6.3).
+    """The paper's start: the first frame of the window in which the person stands as da Vinci's man does (section 6.3).
 
     Parameters
     ----------
     preset : SmdPreset
     otherwise : Start
-        Where nobody does.
+        Where no frame shows that.
     """
 
     preset: SmdPreset

@@ -163,7 +163,7 @@ def _capsule(cones: Cones, run: np.ndarray, frame: np.ndarray, half_length: floa
 
 
 def _radius_at(cones: Cones, run: np.ndarray, frame: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """Radius of a run's flesh at places along its axis: that of a circle as large as the widest cone's section there."""
+    """Radius of a run's flesh at points along its axis: that of a circle as large as the widest cone's section there."""
     at = [(knots[run] - frame[3, :3]) @ frame[2, :3] for knots in (cones.start, cones.end)]
     radii = np.sqrt(cones.radii[run].prod(axis=2))
     # Beyond its ends a cone counts as little as can be, but where no other reaches.

@@ -44,7 +44,7 @@ def near_pieces(pieces: Pieces, pairs: np.ndarray, frames: np.ndarray) -> tuple[
     axis_i, axis_j = axis[i], axis[j]
     cos, along_i, along_j = _dot(axis_i, axis_j), _dot(axis_i, between), _dot(axis_j, between)
     sin2 = np.maximum(1 - cos * cos, np.float32(1e-6))
-    # The places s and t on the axes, from their middles, where they are nearest.
+    # The points s and t on the axes, from their middles, where they are nearest.
     half_i, half_j = half[i, None], half[j, None]
     s = cos * along_j
     s -= along_i

@@ -289,7 +289,7 @@ class Symmetric:
     def _terms(self, states: np.ndarray) -> tuple[np.ndarray, ...]:
         """What the cost is made of.
 
-        Metres, each of shape (., n): distances of body from hulls; of silhouettes from the body, of places that are not in it in every
+        Metres, each of shape (., n): distances of body from hulls; of silhouettes from the body, of points that are not in it in every
         state, and which these are; depths. Square metres: the cost of hanging in the air, shape (n,), and of each angle, shape (n, 27).
         """
         body, settings = self.body, self.settings

@@ -185,7 +185,7 @@ def segment_body(
 
 
 def _halves(edges: np.ndarray, own: np.ndarray, points: np.ndarray, settings: LimbSegmentationSettings) -> np.ndarray:
-    """Where to cut a branch that is two limbs in one, pairs of neighbours: half-way between the two places where it meets the trunk."""
+    """Where to cut a branch that is two limbs in one, pairs of neighbours: half-way between the two points where it meets the trunk."""
     none = np.zeros((0, 2), int)
     places = contacts(own.astype(int), edges, 1, 0)
     if len(places) < 2:

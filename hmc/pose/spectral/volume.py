@@ -9,7 +9,7 @@ from scipy import ndimage
 
 __all__ = ["FARTHEST_M", "BodyVolume", "observe_volume"]
 
-#: Farther than this is all the same, metres: a piece of the hull that is nobody's must not draw limbs from afar.
+#: Farther than this is all the same, metres: a piece of the hull that is no person's must not draw limbs from afar.
 FARTHEST_M = 0.15
 
 

@@ -1,4 +1,4 @@
-"""The first pose, where somebody stands as da Vinci's man does: arms and legs spread. Kehl (2006), section 6.3.
+"""The first pose, where the person stands as da Vinci's man does: arms and legs spread. Kehl (2006), section 6.3.
 
 Planes sweep from below for the feet, from the sides for the hands and from above for the head; limb lengths follow by proportion.
 The paper takes the ratios from Dreyfuss (1959), which we do not have; ours are those of `hmc.body.proportions`, and the arms
@@ -22,7 +22,7 @@ __all__ = ["DaVinci", "find_da_vinci"]
 #: What is looked at, in shares of the stature: the sole's slice, that of the shanks, and the heights between which hands are.
 _SOLE, _SHANK = (0.0, 0.045), (0.10, 0.20)
 _HANDS = (0.62, 1.0)
-#: Who spreads the arms spans this share of the stature at least, and the feet stand this far apart.
+#: Spread arms span this share of the stature at least, and the feet stand this far apart.
 _LEAST_SPAN, _LEAST_STEP = 0.80, 0.12
 #: The span may change the arms' lengths by these factors at most.
 _ARMS = (0.88, 1.12)
@@ -53,7 +53,7 @@ def find_da_vinci(points: np.ndarray, voxel_size_m: float, floor_z: float, heigh
     Returns
     -------
     DaVinci or None
-        None where nobody stands like that.
+        None where the person does not stand like that.
     """
     if len(points) < 100:
         return None

@@ -1,6 +1,6 @@
 """The first pose from markers alone: points of the world without names, and bodies that are laid into them.
 
-Among many false detections more than half of the points are false, so a body of any posture finds points to take. Two things tell
+Among many false detections more than half of the points are false, so a body of any posture finds points to take. Two signs tell
 the right one: its markers lie where most views agree, and no such point is left over. From every heading an annealed search looks for
 it; the best finds are then fitted with a point of its own for every marker.
 """
@@ -33,7 +33,7 @@ SEARCH_SD = {
 #: The search near a pose, with so many times those deviations.
 NEAR_SEARCH = AnnealedSettings(layers=8, particles=1000, survival_rate=0.05, spread=0.7)
 NEAR_SHARE = 0.5
-#: A marker without a point, and a point that must be somebody's without a marker, count as being this far apart, metres.
+#: A marker without a point, and a point that must be a person's without a marker, count as being this far apart, metres.
 SEARCH_GATE_M = 0.4
 #: What a point on which the fewest views agree counts as farther away (in squares), metres; 0 for one on which the most do.
 DOUBT_M = 0.1

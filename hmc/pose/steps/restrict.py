@@ -124,7 +124,7 @@ def coarser_table(table: ScoreTable, every: int) -> ScoreTable:
         blocks.append((part, segment, is_surface, n, n + len(rows[-1])))
         counts[part, : 4 if is_surface else 3] += len(rows[-1])
         n += len(rows[-1])
-    # Parts without flesh have scores that nobody reads.
+    # Parts without flesh have scores that are not read.
     return replace(table, points=table.points[np.concatenate(rows)], blocks=tuple(blocks), counts=np.maximum(counts, 1))
 
 

@@ -99,7 +99,7 @@ def make_target(
     floor_z : float, optional
         Height of the floor, metres.
     new : callable, optional
-        Which of some places, shape (n, 3), world, metres, show on silhouettes where the strict hull does not
+        Which of some points, shape (n, 3), world, metres, show on silhouettes where the strict hull does not
         (`hmc.pose.views.uncovered`). What else is in the tolerant and in the loose hull is no place for a body then.
 
     Returns

@@ -32,7 +32,7 @@ __all__ = ["EVIDENCE", "IMAGES_FOR", "PersonView", "VoxelView", "check_needs", "
 EVIDENCE = ("hulls", "skin", "voxels", "detections")
 #: For these the images are read too.
 IMAGES_FOR = frozenset({"skin", "voxels"})
-#: Of so few cameras, hulls in which one or two may miss are mostly nobody: they count only where silhouettes ask for them. Of more, they
+#: Of so few cameras, hulls in which one or two may miss are mostly no person: they count only where silhouettes ask for them. Of more, they
 #: are little fatter than the strict one, and hold what furniture hides without silhouettes that would ask for it.
 FEW_CAMERAS = 4
 #: Colors vote for edges between voxels of one color up to so many grey levels apart.
@@ -103,7 +103,7 @@ def check_needs(needs: Collection[str]) -> frozenset[str]:
 def views_of(
     recording: Recording, grid: VoxelGrid, tracks: TrackTable, hull: HullStep, needs: Collection[str] = ("hulls",)
 ) -> dict[int, PersonView]:
-    """What a frame shows of everybody who is tracked in it.
+    """What a frame shows of every person who is tracked in it.
 
     Parameters
     ----------
@@ -136,13 +136,13 @@ def views_of(
 
 
 def _targets(recording, grid, hull, strict, tolerant) -> list[HullTarget | None]:
-    """Everybody's hulls and rays. The tolerant hull is shared out among the people; the rest of the loose one is anybody's."""
+    """Every person's hulls and rays. The tolerant hull is shared out among the people; the rest of the loose one may be any person's."""
     spare, floor_z = hull.loose & ~hull.tolerant, float(recording.room[0, 2])
     nothing = np.zeros((0, 3), int)
     new = None
     if sum(mask is not None for mask in hull.masks) <= FEW_CAMERAS:
-        everybody = grid.centres(np.concatenate([nothing, *strict]))
-        new = partial(on_uncovered_pixels, recording.rig, hull.masks, everybody, spacing_m=grid.voxel_size_m)
+        all_strict = grid.centres(np.concatenate([nothing, *strict]))
+        new = partial(on_uncovered_pixels, recording.rig, hull.masks, all_strict, spacing_m=grid.voxel_size_m)
     targets = []
     for k in range(len(strict)):
         target = make_target(grid, strict[k], tolerant[k], spare, floor_z, new)

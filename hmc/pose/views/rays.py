@@ -3,7 +3,7 @@
 A hull of few cameras is much fatter than its person, and some of it is no person at all: its surface asks for a body that is not there. The
 silhouettes from which it was carved do not: what they show is the person's, only the distance is not known.
 
-What a body has to cover is an array of places (m, 3), or of places and directions (m, 6): a ray goes through its place in a unit
+What a body has to cover is an array of points (m, 3), or of points and directions (m, 6): a ray goes through its point in a unit
 direction and is covered where any point of it is; a point of the hull's surface has direction zero, and is covered there only.
 """
 
@@ -63,7 +63,7 @@ def silhouette_rays(
         A place on each ray, one of the points, and the unit direction from the camera; camera by camera.
     """
     rays = [np.zeros((0, 6))]
-    # Which of a patch's points stands for its ray must not depend on the scan: places where a lost limb may be are drawn from them.
+    # Which of a patch's points stands for its ray must not depend on the scan: points where a lost limb may be are drawn from them.
     order = np.random.default_rng(0).permutation(len(points))
     points = points[order]
     for camera, mask in zip(rig, masks, strict=True):
@@ -100,7 +100,7 @@ def _patches(camera: Camera, points: np.ndarray, per_unit: float) -> np.ndarray:
 
 
 def points_to_cover(rng: np.random.Generator, target: HullTarget, n: int, ray_share: float) -> np.ndarray:
-    """About ``n`` places of a person that a body has to cover, evenly spread: rays of the silhouettes, and points of the strict hull.
+    """About ``n`` points of a person that a body has to cover, evenly spread: rays of the silhouettes, and points of the strict hull.
 
     Parameters
     ----------

@@ -35,8 +35,8 @@ def locate_births(update: FrameUpdate, settings: FollowingSettings) -> FrameUpda
 def propose_candidates(update: FrameUpdate, settings: FollowingSettings) -> FrameUpdate:
     """The update whose candidates are carried on with what was seen in this frame, nearest pairs first, and new ones begun.
 
-    Nothing nearer to a track than `least_distance_m` is a candidate, but whom a track let go is. Candidates missed more often than seen
-    are gone.
+    Nothing nearer to a track than `least_distance_m` is a candidate, except a person whom a track let go. Candidates missed
+    more often than seen are gone.
     """
     least = settings.lifecycle.least_distance_m
     births = [row for row in update.births if all(horizontal_distance(row.position, track.position) >= least for track in update.tracks)]

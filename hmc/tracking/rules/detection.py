@@ -24,7 +24,7 @@ def detect_people(update: FrameUpdate, settings: FollowingSettings) -> FrameUpda
 
 
 def owned_voxels(update: FrameUpdate) -> np.ndarray:
-    """Voxels that are of no detection, shape (n,) bool: those of the tracks, of what their persons push, and of who parts from them."""
+    """Voxels that are of no detection, shape (n,) bool: those of the tracks, of what their persons push, of people who part from them."""
     held = update.claimed >= 0
     for rows in update.parted.values():
         held[rows] = True

@@ -17,12 +17,12 @@ from hmc.tracking.update import FrameUpdate
 
 __all__ = ["reject_false_tracks", "remember_false_tracks"]
 
-#: Who stands where an object was tracked has the head so much higher, metres.
+#: A person who stands where an object was tracked has the head so much higher, metres.
 STANDS_HIGHER_M = 0.2
 
 
 def reject_false_tracks(update: FrameUpdate, settings: FollowingSettings) -> FrameUpdate:
-    """The update without births where an object was tracked; who stands there is higher."""
+    """The update without births where an object was tracked; a person who stands there is higher."""
 
     def is_object(row: TrackRow, one: TrackRow) -> bool:
         near = horizontal_distance(row.position, one.position) <= settings.lifecycle.least_distance_m

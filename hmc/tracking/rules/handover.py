@@ -1,6 +1,6 @@
 """Handover: where a person gets up from an object that the track stays with, the number goes with the person.
 
-Only established tracks are given on, and who comes in at the edge of the room is not taken for one of them. Shown by
+Only established tracks are given on, and a person who comes in at the edge of the room is not taken for one. Shown by
 `test_who_gets_up_from_a_chair_that_stays_keeps_the_number_and_the_chair_is_nobody` and
 `test_a_newcomer_does_not_take_the_number_of_somebody_who_sits_low`.
 """
@@ -17,9 +17,9 @@ from hmc.tracking.update import FrameUpdate
 
 __all__ = ["hand_over_tracks"]
 
-#: Who gets up from an object is first seen apart from it within this distance, metres.
+#: A person who gets up from an object is first seen apart from it within this distance, metres.
 APART_M = 1.5
-#: And until the track begins comes no nearer to it than by this, metres: who walks up to it does.
+#: And until the track begins comes no nearer to it than by this, metres: a person who walks up to it does.
 NEARER_M = 0.15
 #: The centroid of what is left when a person gets up is no higher than this, metres.
 LOW_M = 0.5

@@ -25,7 +25,7 @@ CLEAR_GAIN = 0.3
 MEETING_M = 2.0
 #: A reference histogram learns nothing while another person is nearer than this, metres.
 ALONE_M = 0.8
-#: Someone who left is recognised by at least this coefficient, and by this much more than anybody else who left.
+#: A person who left is recognised by at least this coefficient, and by this much more than any other person who left.
 RECOGNISED, CLEARLY = 0.7, 0.1
 #: A person is compared with those who left after this time, when their colors are known; seconds.
 REIDENTIFY_AFTER_S = 1.0
@@ -97,7 +97,7 @@ def recognise(histogram: np.ndarray, first_frame: int, departed: tuple[DepartedT
     ----------
     histogram : ndarray, shape (n_colors,)
     first_frame : int
-        In which the person was seen again; who was seen elsewhere then is another person.
+        In which the person was seen again; a person seen elsewhere then is another one.
     departed : tuple of DepartedTrack
     """
     absent = [one for one in departed if one.last_frame < first_frame]

@@ -3,7 +3,7 @@
 Beyond Canton (2009), whose room is empty when the background is learnt. A chair that was moved is foreground from then on, in both
 places; left with the people's voxels it draws their filters on, joins people to one another and takes their numbers over. Shown by
 `test_a_chair_that_was_pushed_and_left_takes_nobody_over`, `test_where_a_thing_was_taken_for_a_person_nothing_begins_while_it_stands_there`
-and, of who lies, `test_a_person_who_lies_down_and_gets_up_again_keeps_the_number`.
+and, of people who lie, `test_a_person_who_lies_down_and_gets_up_again_keeps_the_number`.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ UPRIGHT_M = 1.35
 LEGS_M, STANCE_M = 1.0, 0.35
 #: And is not static after it was empty for so long.
 EMPTY_S = 0.2
-#: What touches a static object and is hardly higher than where it does is more of it; who sits on it is higher by this, metres.
+#: What touches a static object and is hardly higher than where it does is more of it; a person on it is higher by this, metres.
 HIGHER_M = 0.2
 
 
@@ -126,7 +126,7 @@ def learn_static(static: StaticObjects, observation: Observation, people: Iterab
 
 
 def _is_more_of(observation: Observation, rows: np.ndarray, places: np.ndarray) -> bool:
-    """Whether the voxels in `rows` touch what stands at places (m, 3) and are hardly higher."""
+    """Whether the voxels in `rows` touch what stands at positions (m, 3) and are hardly higher."""
     points = observation.points[rows]
     touched = places[cKDTree(points).query(places, distance_upper_bound=2 * observation.voxel_size_m)[0] < np.inf]
     return bool(len(touched) and points[:, 2].max() <= touched[:, 2].max() + HIGHER_M)

@@ -1,5 +1,5 @@
-"""Detections in the tolerant hull alone beside people whom all cameras see: all cameras see who pushes furniture, and the tolerant hull
-makes what looks like a person of the furniture.
+"""Detections in the tolerant hull alone beside people whom all cameras see: all cameras see the person who pushes
+furniture, and the tolerant hull makes what looks like a person of the furniture.
 
 Shown by `test_what_one_camera_does_not_see_is_no_newcomer_beside_somebody_whom_all_see` and the recipe `meeting_moved`, where false
 positives go from 1 to 30 without it (naive tracker).

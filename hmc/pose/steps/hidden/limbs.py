@@ -144,7 +144,7 @@ def look_again(memory: LimbMemory, evidence: np.ndarray, settings: LimbSettings)
     Returns
     -------
     LimbMemory
-        A limb changes after its evidence has held long enough on end. Who loses a limb loses what needs it.
+        A limb changes after its evidence has held long enough on end. A body that loses a limb loses what needs it.
     """
     streak = np.where(evidence, memory.streak + 1, 0)
     enough = np.where(memory.active, settings.lost_frames, settings.found_frames)

@@ -15,7 +15,7 @@ LEAST_FOOT_M = 0.05
 
 
 def heading_of(feet: np.ndarray, velocity: np.ndarray | None = None) -> np.ndarray | None:
-    """The horizontal direction in which somebody faces, as the feet and the walk show it.
+    """The horizontal direction in which a person faces, as the feet and the walk show it.
 
     Parameters
     ----------

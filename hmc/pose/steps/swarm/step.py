@@ -123,7 +123,7 @@ def swarm_memory(state: SwarmState) -> dict[str, np.ndarray]:
 
 
 def _before(tracked: Tracked) -> SwarmState:
-    """The swarm's state of a pose, whoever found it."""
+    """The swarm's state of a pose, whichever method found it."""
     model, body = tracked.subject.extras[_SKELETON], tracked.subject.body
     now, last = (skeleton_state(model, landmarks(body, one), one) for one in (tracked.state, tracked.state - tracked.velocity))
     memory: Mapping[str, np.ndarray] = tracked.memory

@@ -230,7 +230,7 @@ def swarm_step(
         trials = start_fits(rng, model, reading, heading, settings)
         first = next((one for one in trials if is_upright(one.state)), None)
         if first is None:
-            return None, SwarmInfo("no fit: nobody is upright in the curves", np.nan, False, False, 0, doubts)
+            return None, SwarmInfo("no fit: no person is upright in the curves", np.nan, False, False, 0, doubts)
         facing = facing_evidence(first.state, heading)
         return SwarmState(first.state, np.zeros_like(first.state), first.cost_m, facing), _info(first, True, False, 0, doubts)
     frames = 1 + state.missed
