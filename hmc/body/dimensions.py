@@ -41,7 +41,7 @@ class FitBodySettings:
 
 
 def reshaped(body: BodyModel, shape: np.ndarray) -> BodyModel:
-    """A body whose fitted dimensions are others.
+    """The body with other values of its fitted dimensions.
 
     Parameters
     ----------

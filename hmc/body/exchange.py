@@ -55,7 +55,7 @@ def swapped_pose(body: BodyModel, state: np.ndarray, what: Literal["all", "legs"
 
 
 def swapped_poses(body: BodyModel, state: np.ndarray) -> np.ndarray:
-    """All that a hull confuses with a pose: turned about, legs exchanged, arms exchanged (`swapped_pose`).
+    """The poses that a hull confuses with a pose: turned about, legs exchanged, arms exchanged (`swapped_pose`).
 
     Parameters
     ----------

@@ -42,7 +42,7 @@ def floor_gap(body: BodyModel, rotations: np.ndarray, positions: np.ndarray, flo
 
 
 def above_floor(height: np.ndarray, floor_z: float) -> np.ndarray:
-    """The same of a height, metres, as from `lowest_support`."""
+    """The gap (`floor_gap`) of a height, metres, as from `lowest_support`."""
     height = height - floor_z
     return height - np.minimum(np.maximum(height, -SINK_M), HANG_M)
 

@@ -38,7 +38,7 @@ class _Misses:
 
     @property
     def residuals(self) -> np.ndarray:
-        """Shape (3 k,), metres."""
+        """Landmarks minus their targets, coordinate by coordinate, shape (3 k,), metres."""
         return self.miss.ravel()
 
     def pulls(self) -> tuple[slice, np.ndarray]:

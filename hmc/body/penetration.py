@@ -91,7 +91,7 @@ def penetration_depth(body: BodyModel, axes: AxisPoints, rotations: np.ndarray, 
 
 
 def depths_placed(body: BodyModel, axes: AxisPoints, placed: np.ndarray, maps: ConeMaps) -> np.ndarray:
-    """The same for placed segments, particles last.
+    """Depth of each axis point (`penetration_depth`) for placed segments, particles last.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def _place_points(axes: AxisPoints, placed: np.ndarray) -> np.ndarray:
 def penetration_rows(
     body: BodyModel, axes: AxisPoints, rotations: np.ndarray, positions: np.ndarray, maps: ConeMaps
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """The same for one state, with what is needed to move the parts apart.
+    """Depth of each axis point (`penetration_depth`) in one state, with what is needed to move the parts apart.
 
     Parameters
     ----------

@@ -68,7 +68,7 @@ class Objective(Protocol):
     @property
     def body(self) -> BodyModel: ...
     def cost(self, states: np.ndarray) -> np.ndarray:
-        """Of states (n, 27), shape (n,)."""
+        """The cost of states (n, 27), shape (n,)."""
 
     def by_part(self, states: np.ndarray) -> np.ndarray | None:
         """The share of each of `hmc.body.model.PARTS` in the cost, shape (n, n_parts); None where it cannot be told."""
@@ -77,7 +77,7 @@ class Objective(Protocol):
         """Residuals at a state (27,), with what it takes to tell how they change."""
 
     def coarser(self, rng: np.random.Generator, n: int) -> Objective:
-        """The same on about `n` of the data's points."""
+        """The objective on about `n` of the data's points."""
 
 
 @dataclass(frozen=True)

@@ -283,7 +283,7 @@ class Symmetric:
         return distances(self, state, near)
 
     def coarser(self, rng: np.random.Generator, n: int) -> Symmetric:
-        """The same with about `n` of what has to be covered."""
+        """The objective with about `n` of the points to be covered."""
         return replace(self, asked=sample_points(rng, self.asked, n), asked_part=None)
 
     def _terms(self, states: np.ndarray) -> tuple[np.ndarray, ...]:

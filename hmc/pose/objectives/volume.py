@@ -22,7 +22,7 @@ _SHARES = (0.3, 0.6, 0.9)
 
 
 def volume_error(model: SkeletonModel, starts: np.ndarray, ends: np.ndarray, volume: BodyVolume) -> np.ndarray:
-    """How badly skeletons lie in the voxels.
+    """Error of skeletons against the voxels.
 
     Parameters
     ----------

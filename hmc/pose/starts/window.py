@@ -203,7 +203,7 @@ class _Window:
 
     @property
     def velocities(self) -> np.ndarray:
-        """Of the track, shape (n, 3), metres a second."""
+        """The person's velocities in the window, by the track, shape (n, 3), metres a second."""
         return np.array([view.velocity for view in self.views])
 
     def target(self, k: int) -> HullTarget:

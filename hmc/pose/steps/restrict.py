@@ -177,7 +177,7 @@ class SymmetricData:
     part: np.ndarray | None = None
 
     def likelihood(self, subject: Subject, keep: np.ndarray, every: int = 1, by_limb: bool = False) -> LogLikelihood:
-        """Of the kept parts, at every so many-th point of the body's surface; whole, or a column a limb."""
+        """The log-likelihood of the kept parts, at every so many-th point of the body's surface; whole, or a column a limb."""
         one, target = restricted(subject, keep), restrict_target(self.target, keep)
         samples = one.points if every == 1 else thinned(one.points, max(1, len(one.points.surface.points) // every))
         if self.part is None:
@@ -206,7 +206,7 @@ class ScoreData:
     whole: bool = False
 
     def likelihood(self, subject: Subject, keep: np.ndarray, every: int = 1, by_limb: bool = False) -> LogLikelihood:
-        """Of the kept parts, at every so many-th point of the flesh; whole, or a column a limb, if it is a product over the parts."""
+        """The log-likelihood of the kept parts, at every so many-th point of the flesh; whole, or a column a limb if it is a product."""
         if subject.flesh is None:
             raise ValueError("the subject has no table of its flesh")
         keep = keep & subject.parts

@@ -82,7 +82,7 @@ def suited(hierarchies: Sequence[Inclusive], state: np.ndarray, there: np.ndarra
 
 
 def _likelihood(tracked: Tracked, data: ScoreData | SymmetricData, hierarchy: Inclusive, level: int, preset: PosePreset) -> LogLikelihood:
-    """Of one model."""
+    """The log-likelihood of one model."""
     keep = part_mask(hierarchy.models[level].parts)
     every = 1 if level == len(hierarchy.models) - 1 else hierarchy.thinning
     log_likelihood = data.likelihood(tracked.subject, keep, every, by_limb=preset.structural.by_limb)

@@ -196,7 +196,7 @@ def distance_at(target: HullTarget, points: np.ndarray) -> np.ndarray:
 
 
 def distance_gradient(target: HullTarget, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The same distance, interpolated between voxels, and its gradient.
+    """Distance to the hull (`distance_at`), interpolated between voxels, and its gradient.
 
     Parameters
     ----------

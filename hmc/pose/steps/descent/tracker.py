@@ -127,7 +127,7 @@ def track_init(state: np.ndarray) -> TrackState:
 
 
 def track_step(rng: np.random.Generator, tracker: SmdTracker, before: TrackState, observed: Skin | None) -> tuple[TrackState, TrackInfo]:
-    """One frame.
+    """The person's state after one more frame.
 
     Parameters
     ----------

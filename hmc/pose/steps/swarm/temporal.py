@@ -200,7 +200,7 @@ def swarm_step(
     velocity: np.ndarray | None = None,
     settings: SwarmSettings | None = None,
 ) -> tuple[SwarmState | None, SwarmInfo]:
-    """One frame of a person.
+    """The person's state after one more frame.
 
     Parameters
     ----------
