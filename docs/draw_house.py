@@ -144,7 +144,8 @@ def arrow(axes: plt.Axes, one: str, other: str, color: str, width: float, bend: 
     if label:
         x, y = (start[0] + end[0]) / 2, (start[1] + end[1]) / 2
         upright = abs(x1 - x0) < 0.1
-        shift = (0.08, 0.0) if upright else (0.0, 0.1)
+        level = abs(y1 - y0) < 0.1  # between two boxes there is less room than a name takes: above them
+        shift = (0.08, 0.0) if upright else (0.0, HEIGHT / 2 + 0.03 if level else 0.1)
         axes.text(x + shift[0], y + shift[1], label, ha="left" if upright else "center", va="bottom", fontsize=8.5, color=BLUE, zorder=5)
 
 
