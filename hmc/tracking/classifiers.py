@@ -154,7 +154,7 @@ def frame_groups(frames: np.ndarray, recordings: np.ndarray, frames_a_group: int
     Parameters
     ----------
     frames, recordings : ndarray of int, shape (n,)
-        As in `hmc.tracking.features.FeatureTable`.
+        As in `hmc.tracking.feature_table.FeatureTable`.
     frames_a_group : int
         Length of a stretch.
 

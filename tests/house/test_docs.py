@@ -1,5 +1,6 @@
 """What the documentation says can be done: its commands are understood, its links lead somewhere, its Python runs."""
 
+import importlib
 import re
 import shlex
 from pathlib import Path
@@ -17,6 +18,7 @@ BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 INLINE = re.compile(r"(?<!`)`([^`]+)`(?!`)")
 LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")
 HEADING = re.compile(r"^#+ +(.*)$", re.MULTILINE)
+NAME = re.compile(r"`(hmc(?:\.\w+)+)")
 PREFIXES = (("hmc",), ("python", "-m", "hmc"), (".venv/bin/hmc",), (".venv/bin/python", "-m", "hmc"))
 
 
@@ -43,6 +45,30 @@ def hmc_commands(page):
         for prefix in PREFIXES:
             if tuple(words[: len(prefix)]) == prefix and len(words) > len(prefix):
                 yield words[len(prefix) :]
+
+
+def resolves(name):
+    """Whether a dotted name leads to a module, or to something in one, be it a method."""
+    parts = name.split(".")
+    for k in range(len(parts), 0, -1):
+        try:
+            found = importlib.import_module(".".join(parts[:k]))
+        except ModuleNotFoundError:
+            continue
+        for part in parts[k:]:
+            fields = getattr(found, "__dataclass_fields__", {})
+            if not (hasattr(found, part) or part in fields):
+                return False
+            found = getattr(found, part, None)
+        return True
+    return False
+
+
+def test_names_in_docstrings_and_pages_are_there():
+    pages = [*PAGES, *(ROOT / "hmc").rglob("*.py"), *(ROOT / "notebooks").glob("*.ipynb")]
+    named = {(name_of(page), name) for page in pages for name in NAME.findall(page.read_text(encoding="utf-8"))}
+    assert len(named) > 100
+    assert not sorted((page, name) for page, name in named if not resolves(name))
 
 
 def anchor_of(heading):

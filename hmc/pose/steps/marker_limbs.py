@@ -40,7 +40,7 @@ SEARCH_GATES_M = (0.6, 0.4, 0.2)
 LEFT_OVER_M = 0.12
 #: Steps of inverse kinematics in the refinement.
 REFINE_STEPS = 12
-#: What of left and right may be exchanged (`hmc.pose.starts.templates.swapped_pose`).
+#: What of left and right may be exchanged (`hmc.body.exchange.swapped_pose`).
 _EXCHANGES: tuple[Literal["legs", "arms"], ...] = ("legs", "arms")
 #: A pose with exchanged legs or arms that strains more than the present one times this is not refined.
 EXCHANGE_RATIO = 1.3
