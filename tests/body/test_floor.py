@@ -86,6 +86,20 @@ def test_loose_hull_is_cheap_and_reaches_the_floor():
     assert (distance_at(hard, inside) > 0.1).all()
 
 
+@pytest.mark.parametrize("floor_z", [0.0, 0.2])
+def test_below_the_floor_hulls_say_what_they_say_right_above_it(floor_z):
+    lowest = round(floor_z / 0.05)
+    foot = np.argwhere(np.ones((4, 6, 3), bool)) + [18, 17, lowest]
+    on_floor, in_air = (make_target(GRID, foot, foot, None, floor) for floor in (floor_z, None))
+    beside = np.array([0.0, 0.1, 0.2])[:, None] * [1.0, 0, 0] + [1.05, 1.0, floor_z + 0.025]
+    above = distance_at(on_floor, beside)
+    assert above[0] == 0 and above[1] > 0.04
+    for depth in (0.03, 0.1, 0.2):
+        below = beside - [0, 0, depth]
+        assert_allclose(distance_at(on_floor, below), above, atol=1e-6)
+        assert distance_at(in_air, below)[0] > depth - 0.051
+
+
 def test_stature_follows_the_lengths():
     assert stature(BODY.dimensions) == pytest.approx(1.8)
     assert stature(canton_body(1.7).dimensions) == pytest.approx(1.7)

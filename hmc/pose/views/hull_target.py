@@ -35,7 +35,7 @@ class HullTarget:
     ----------
     distance : ndarray of float32, shape (nx, ny, nz)
         How far a body's surface is from where it may be, metres: the distance to the tolerant hull plus a bounded share of that
-        to the strict one, each as far as `FAR_M`; 0 inside both. A crop around the person.
+        to the strict one, each as far as `FAR_M`; 0 inside both. Below the floor as right above it. A crop around the person.
     tolerant : ndarray of bool, shape (nx, ny, nz)
         The tolerant hull in the same crop.
     loose : ndarray of bool, shape (nx, ny, nz)
@@ -133,6 +133,11 @@ def make_target(
     distance += STRICT_SHARE * np.minimum(_distance_to(core, grid.voxel_size_m), STRICT_CAP_M)
     if loose is not None:
         distance = np.minimum(distance, _distance_to(maybe & needed, grid.voxel_size_m) + LOOSE_M)
+    if floor_z is not None:
+        # Hulls end at the floor because voxels do. A toe that points down, as the body has no ankles, is not outside of them for that; how
+        # deep a sole may sink is for `hmc.body.floor`.
+        ground = int(grid.index_of(np.array([0.0, 0.0, floor_z + 0.5 * grid.voxel_size_m]))[2]) - int(low[2])
+        distance[..., :ground] = distance[..., ground : ground + 1]
     shell = grid.centres(surface(core) + low)
     volume_m3 = len(strict) * grid.voxel_size_m**3
     return HullTarget(distance, occupied, maybe, grid.centres(low), grid.voxel_size_m, shell, volume_m3, floor_z)
