@@ -43,8 +43,7 @@ class SearchSettings:
     reach_share : float
         Share of them that reach for hull points which the body does not cover, where there are any.
     gain : float
-        The new pose is taken when the cost falls by at least this share. An arm before the chest hardly shows in hulls: elsewhere it may
-        cost some percent less for a frame, and the next frames do not lead back.
+        The new pose is taken when the cost falls by at least this share.
     draw_ratio : float
         Poses drawn that all cost more than the present one times this, at few points, are not refined at all.
     refine_ratio : float
@@ -60,7 +59,7 @@ class SearchSettings:
     random_share: float = 0.5
     draws: int = 200
     reach_share: float = 0.5
-    gain: float = 0.1
+    gain: float = 0.03
     draw_ratio: float = 1.5
     refine_ratio: float = 1.3
     back_m: float = 0.05
