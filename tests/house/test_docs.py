@@ -71,6 +71,15 @@ def test_names_in_docstrings_and_pages_are_there():
     assert not sorted((page, name) for page, name in named if not resolves(name))
 
 
+def test_tests_that_pages_name_are_there():
+    text = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "tests").rglob("*.py"))
+    there = {path.stem for path in (ROOT / "tests").rglob("*.py")} | set(re.findall(r"^ *def (test_\w+)", text, re.MULTILINE))
+    named = {(name_of(page), code) for page in PAGES for code in INLINE.findall(BLOCK.sub("", page.read_text(encoding="utf-8")))}
+    tests = {(page, code) for page, code in named if code.startswith("test_")}
+    assert len(tests) > 10
+    assert not sorted((page, code) for page, code in tests if code not in there)
+
+
 def anchor_of(heading):
     """As the sites that show Markdown make them."""
     return re.sub(r"[^\w\- ]", "", heading.strip().lower()).replace(" ", "-")

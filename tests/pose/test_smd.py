@@ -8,7 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
@@ -106,6 +106,7 @@ def test_gradient_of_the_surface_cue_is_the_slope_of_the_objective(tracker, seed
 
 @settings(max_examples=8, deadline=None)
 @given(st.integers(0, 2**32 - 1))
+@example(6230)
 def test_rows_of_the_edge_cue_are_the_slopes_of_its_residuals(tracker, seed):
     """A pair's middle and single points, through distorted lenses; the projection is OpenCV's."""
     rng = np.random.default_rng(seed)
@@ -115,11 +116,13 @@ def test_rows_of_the_edge_cue_are_the_slopes_of_its_residuals(tracker, seed):
     views, posed = stack_views(CAMERAS), pose_body(body, state)
     crops = [Crop(image, 0, 0) for image in images]
     maps = edge_maps(views, crops, shown_contours(tracker, posed, views), ColorEdgeSettings())
-    chosen, view = rng.integers(len(strips.solid), size=60), rng.integers(len(CAMERAS), size=60)
+    n = 240  # of which few have an edge in reach
+    chosen, view = rng.integers(len(strips.solid), size=n), rng.integers(len(CAMERAS), size=n)
     matches = match_edges(tracker, posed, maps, chosen, view, 0.08, 1.0)
     rows = jacobian(posed, matches)
     found = np.flatnonzero(matches.weight > 0)
-    assume(len(found) > 3 and (matches.weight[found] > 1.5 / 120).any())  # some matches, and some pairs among them
+    assert len(found) > 5
+    assert (matches.weight[found] > 1.5 / (2 * n)).any(), "some pairs"
     # Whatever the wrenches act on moves as a rigid part of its segment: residual' = W twist', twist from differences of segments.
     step = 1e-6
     for k, dof in enumerate(FREE):

@@ -116,7 +116,8 @@ def make_target(
     low = np.minimum(strict.min(0), tolerant.min(0)) - pad
     if floor_z is not None:
         # Hidden legs reach from what is left of the hull down to the floor.
-        low[2] = min(low[2], int(grid.index_of(np.array([0.0, 0.0, floor_z]))[2]) - 1)
+        ground = int(grid.index_of(np.array([0.0, 0.0, floor_z + 0.5 * grid.voxel_size_m]))[2])
+        low[2] = min(low[2], ground - 1)
     shape = np.maximum(strict.max(0), tolerant.max(0)) + pad + 1 - low
     occupied = np.zeros(shape, bool)
     occupied[tuple((tolerant - low).T)] = True
@@ -136,8 +137,8 @@ def make_target(
     if floor_z is not None:
         # Hulls end at the floor because voxels do. A toe that points down, as the body has no ankles, is not outside of them for that; how
         # deep a sole may sink is for `hmc.body.floor`.
-        ground = int(grid.index_of(np.array([0.0, 0.0, floor_z + 0.5 * grid.voxel_size_m]))[2]) - int(low[2])
-        distance[..., :ground] = distance[..., ground : ground + 1]
+        layer = ground - int(low[2])
+        distance[..., :layer] = distance[..., layer : layer + 1]
     shell = grid.centres(surface(core) + low)
     volume_m3 = len(strict) * grid.voxel_size_m**3
     return HullTarget(distance, occupied, maybe, grid.centres(low), grid.voxel_size_m, shell, volume_m3, floor_z)
