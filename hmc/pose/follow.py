@@ -210,7 +210,7 @@ def _views_from(
     """What each frame shows of every person, from the first that one still needs to the end of the selection."""
     options, run = how
     end = recording.start + recording.n_frames
-    if method.needs <= {"detections"}:
+    if not method.needs_tracks:
         frames: Iterable = range(first, end)
         for frame in run.progress(frames, end - first) if run.progress else frames:
             persons = tracks.persons[tracks.frames == frame].tolist()

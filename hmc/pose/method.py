@@ -299,8 +299,8 @@ class PoseMethod:
 
     @property
     def needs_tracks(self) -> bool:
-        """Whether people are tracked first: not where detections are given."""
-        return "detections" not in self.needs
+        """Whether people are tracked first: not where detections are all that is read."""
+        return not self.needs <= {"detections"}
 
 
 def unseen(tracked: Tracked, status: str = "no hull of this person in this frame") -> tuple[Tracked, StepInfo]:

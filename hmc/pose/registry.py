@@ -26,7 +26,7 @@ __all__ = ["BUILT_IN", "INITS", "METHODS", "MethodChoice", "MethodEntry", "pose_
 Init = Literal["hypotheses", "spectral"]
 INITS = get_args(Init)
 #: Presets whose work has a start of its own.
-OWN_START = frozenset({"kehl2006", "hsiao2008"})
+OWN_START = frozenset({"canton2009", "kehl2006", "hsiao2008"})
 
 
 @dataclass(frozen=True)

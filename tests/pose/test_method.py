@@ -177,6 +177,19 @@ def test_every_method_is_made_in_every_preset_and_knows_its_source():
             assert method.name == name and method.source and method.settings is not None
 
 
+def test_the_papers_presets_recover_nothing_and_decide_over_no_alternatives():
+    for name, entry in METHODS.items():
+        for preset in entry.presets[1:]:
+            method = pose_method(name, preset)
+            assert (method.recover, method.legs, method.choose) == (None, None, None), (name, preset)
+
+
+def test_people_are_tracked_unless_detections_are_all_that_is_read():
+    markers = pose_method("marker-apf")
+    assert not markers.needs_tracks
+    assert replace(markers, needs=frozenset({"detections", "hulls"})).needs_tracks
+
+
 def test_what_a_method_has_no_use_for_is_refused():
     for given, told in (
         (("guess",), "no pose method named 'guess'; there are apf"),
@@ -191,6 +204,7 @@ def test_what_a_method_has_no_use_for_is_refused():
 @pytest.mark.parametrize(
     ("name", "preset", "model", "init"),
     [
+        ("apf", "canton2009", (), "spectral"),
         ("smd", "kehl2006", (), "spectral"),
         ("pso", "hsiao2008", (), "hypotheses"),
         ("marker-apf", "default", (), "spectral"),

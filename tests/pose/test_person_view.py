@@ -56,7 +56,7 @@ def test_what_is_needed_beside_does_not_change_what_is_seen(frame):
         assert_array_equal(one, other)
 
 
-def test_a_frame_is_labelled_once_for_everybody_and_everything(pair, monkeypatch):
+def test_a_frame_is_labelled_once_for_all_persons_and_all_evidence(pair, monkeypatch):
     calls = []
     for name in ("observe_step", "person_voxels"):
         real = getattr(person_view, name)

@@ -186,7 +186,7 @@ def marker_method(preset: MarkerPreset, skin: bool = True) -> PoseMethod:
         start=MarkerStart(preset, skin),
         step=on_markers(preset),
         needs=frozenset({"detections"}),
-        recover=MarkerRecovery(),
+        recover=MarkerRecovery() if preset.search else None,
         legs=TELLING_APART if preset.search else None,
         limits=canton_limits() if preset.body == "canton" else default_limits(),
         window_s=WINDOW_S,

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 
 from hmc.pose.legs import LegSettings, TellLegs
-from hmc.pose.method import Capture, FrameRng, PoseMethod, Start, StartPose, make_subject, other_rng
+from hmc.pose.method import Capture, FrameRng, PoseMethod, StartPose, make_subject, other_rng
 from hmc.pose.objectives.multicue import CueSettings
 from hmc.pose.recovery import Recovery
 from hmc.pose.starts.da_vinci import find_da_vinci
@@ -48,12 +48,12 @@ class DaVinciStart:
     Parameters
     ----------
     preset : SmdPreset
-    otherwise : Start
-        Where no frame shows that.
+    otherwise : PosePreset
+        Whose start is used where no frame shows that. The paper says nothing of it: this is ours.
     """
 
     preset: SmdPreset
-    otherwise: Start = field(default_factory=lambda: WindowStart(replace(PRESETS["default"], start="spectral")))
+    otherwise: PosePreset = field(default_factory=lambda: replace(PRESETS["default"], start="spectral"))
 
     def __call__(
         self, frame_rng: FrameRng, views: Sequence[PersonView], capture: Capture, height_m: float | None = None
@@ -67,7 +67,7 @@ class DaVinciStart:
             seen, targets = [one.skin for one in views], [one.target for one in views]
             tracker, settled = begin(other_rng(frame_rng(k), SETTLING), self.preset, first, seen, targets, height_m is not None)
             return StartPose(make_subject(tracker.body.skeleton, capture), k, settled.state, with_colors(settled.colors))
-        started = self.otherwise(frame_rng, views, capture, height_m)
+        started = WindowStart(self.otherwise)(frame_rng, views, capture, height_m)
         if started is None:
             return None
         state = started.state.copy()
@@ -87,9 +87,9 @@ def smd_method(preset: SmdPreset, house: PosePreset | None = None) -> PoseMethod
     """
     equip = partial(solid_subject, preset=preset)
     if house is None:
-        return PoseMethod(
-            "smd", "Kehl and Van Gool (2006)", DaVinciStart(preset), as_proposed(descended()), NEEDS, equip, settings={"descent": preset}
-        )
+        start = DaVinciStart(preset)
+        settings = {"descent": preset, "without_da_vinci": start.otherwise}
+        return PoseMethod("smd", "Kehl and Van Gool (2006)", start, as_proposed(descended()), NEEDS, equip, settings=settings)
     return PoseMethod(
         "smd",
         "Kehl and Van Gool (2006), section 6; start, refinement, search and recovery are the house's",
