@@ -21,8 +21,6 @@ class Limb:
     Parameters
     ----------
     name : str
-    ball, hinge : str
-        Names of the joints, prefixes of their angles' names.
     dofs : ndarray of int, shape (4,)
         Places in a state: the ball joint's x, y and z, and the hinge's angle.
     segments, parts : ndarray of int, shape (2,)
@@ -32,8 +30,6 @@ class Limb:
     """
 
     name: str
-    ball: str
-    hinge: str
     dofs: np.ndarray
     segments: np.ndarray
     parts: np.ndarray
@@ -56,8 +52,6 @@ def _limb(side: str, kind: str, joints: tuple[str, str], links: tuple[str, str],
     segment_names = [segment.name for segment in SEGMENTS]
     return Limb(
         f"{side}_{kind}",
-        ball,
-        hinge,
         np.array([k for k, name in enumerate(DOF_NAMES) if name.startswith((ball, hinge))]),
         np.array([segment_names.index(name) for name in names]),
         np.array([PARTS.index(name) for name in names]),

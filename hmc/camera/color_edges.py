@@ -15,7 +15,7 @@ import numpy as np
 
 from hmc.errors import InputError
 
-__all__ = ["ColorEdgeSettings", "ColorEdges", "color_distance", "color_edges", "color_gradient"]
+__all__ = ["ColorEdgeSettings", "ColorEdges", "color_edges", "color_gradient"]
 
 #: From the first to the second neighbour of each pair (rows down, columns right), and the direction it tells of, radians from x to y.
 PAIRS = (((0, -1), (0, 1)), ((-1, -1), (1, 1)), ((-1, 0), (1, 0)), ((1, -1), (-1, 1)))
@@ -59,28 +59,6 @@ class ColorEdges:
 
     strength: np.ndarray
     direction: np.ndarray
-
-
-def color_distance(first: np.ndarray, second: np.ndarray, settings: ColorEdgeSettings | None = None) -> np.ndarray:
-    """How far colors are from one another.
-
-    Parameters
-    ----------
-    first, second : ndarray, shape (..., 3)
-        0 to 255, channels in any order.
-    settings : ColorEdgeSettings, optional
-
-    Returns
-    -------
-    ndarray, shape (...)
-        0 to 1.
-    """
-    settings = settings or ColorEdgeSettings()
-    first, second = np.asarray(first, np.float32), np.asarray(second, np.float32)
-    dot = np.einsum("...i,...i->...", first, second)
-    squares = [np.einsum("...i,...i->...", color, color) for color in (first, second)]
-    bright = [_brightness(color.mean(axis=-1), settings) for color in (first, second)]
-    return _distance(dot, *squares, *bright)
 
 
 def color_gradient(image: np.ndarray, settings: ColorEdgeSettings | None = None) -> np.ndarray:

@@ -55,7 +55,7 @@ def person_hulls(recording: Recording, voxel_size_m: float = VOXEL_M) -> Iterato
         # Pieces near the largest one are the person's; what is elsewhere is noise.
         near = np.linalg.norm(blobs.centroids[:, :2] - blobs.centroids[0, :2], axis=1) < 1.0
         voxels = np.concatenate([blobs.of(k) for k in np.flatnonzero(near).tolist()])
-        yield step, grid, voxels, color_votes(face_neighbours(voxels), voxels, grid, recording.rig, step.images, 40.0)
+        yield step, grid, voxels, color_votes(face_neighbours(voxels), voxels, grid, recording.rig, step.images)
 
 
 def limbs_apart(points: np.ndarray) -> bool:

@@ -168,8 +168,6 @@ class StepInfo:
         Of the estimate, square metres or what the method minimises; NaN without a fit, and of likelihoods that are no costs.
     evaluations : int
         Of the objective, in all.
-    searched : tuple of str
-        Limbs that were looked for.
     missing : ndarray of bool, shape (27,), or None
         Angles of limbs that the data does not show; None: of none.
     alternatives : Alternatives or None
@@ -185,7 +183,6 @@ class StepInfo:
     status: str = "fitted"
     cost: float = np.nan
     evaluations: int = 0
-    searched: tuple[str, ...] = ()
     missing: np.ndarray | None = None
     alternatives: Alternatives | None = None
     annealed: AnnealedInfo | None = None
@@ -231,7 +228,7 @@ class StartPose:
     costs : ndarray, shape (n,)
         Mean cost of each candidate that was followed, the winner first; square metres.
     fit : object
-        What came of fitting the body's dimensions (`hmc.pose.starts.fit_body.FitBodyInfo`); None where they were not.
+        What came of fitting the body's dimensions (`hmc.pose.starts.fit_body.FitBodyInfo`); None where they are not fitted ones.
     """
 
     subject: Subject

@@ -122,11 +122,6 @@ class VoxelGrid:
         """The voxel in which each point lies: (..., 3) metres to (..., 3) int64. Points outside give indices outside the grid."""
         return np.floor((np.asarray(points, float) - self.origin) / self.voxel_size_m).astype(np.int64)
 
-    def contains(self, points: np.ndarray) -> np.ndarray:
-        """Whether each point lies in a voxel of the grid: (..., 3) metres to (...) bool. The highest faces are outside."""
-        index = self.index_of(points)
-        return np.all((index >= 0) & (index < np.array(self.shape)), axis=-1)
-
 
 def available_memory() -> int:
     """Bytes of memory free for a new process, as the system tells; a stated guess of 2 GiB where it does not."""

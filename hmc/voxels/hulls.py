@@ -31,7 +31,7 @@ from hmc.voxels.carving import CarvingTables, carve_levels, make_tables
 from hmc.voxels.completion import complete_masks, doubtful_hull, make_completion_tables
 from hmc.voxels.grid import VoxelGrid
 
-__all__ = ["FrontendSettings", "HullStep", "learn_backgrounds", "stream_hulls", "stream_masks"]
+__all__ = ["FrontendSettings", "HullStep", "stream_hulls", "stream_masks"]
 
 logger = logging.getLogger("hmc")
 
@@ -193,28 +193,6 @@ def stream_masks(
                 yield MaskStep(frame.index, frame.images, completed, doubtful)
         for c, began in changed.items():
             report(_say_changed(names[c], began, frame.index))
-
-
-def learn_backgrounds(recording: Recording, settings: FrontendSettings | None = None, on_problem: Report | None = None) -> tuple:
-    """What is known of the empty scene, a camera at a time.
-
-    Parameters
-    ----------
-    recording : Recording
-    settings : FrontendSettings, optional
-    on_problem : callable, optional
-
-    Returns
-    -------
-    tuple of BackgroundModel or None, one a camera
-        None where ready-made silhouettes are used.
-
-    Raises
-    ------
-    InputError
-        When the source of silhouettes that was asked for is not there.
-    """
-    return _learn(recording, settings or FrontendSettings(), on_problem or logger.warning)[0]
 
 
 def _learn(recording: Recording, settings: FrontendSettings, report: Report) -> tuple[tuple, UnseenPlaces | None]:

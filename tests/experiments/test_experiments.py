@@ -19,7 +19,7 @@ from hmc.experiments import EXPERIMENTS, Inputs, Plan, Source, Table, find_exper
 from hmc.experiments.__main__ import main
 from hmc.experiments.ellipsoid import RADII_M, VOXEL_M, person_voxels
 from hmc.experiments.engine.inputs import _told, once, rendered, source_of
-from hmc.experiments.engine.store import cell_key, cell_rng, digest, read_cell, write_cell
+from hmc.experiments.engine.store import cell_key, cell_rng, cell_text, digest, read_cell, write_text
 from hmc.experiments.engine.style import house_style
 from hmc.experiments.engine.sweep import plan_for
 from hmc.experiments.engine.writing import to_latex, write_report
@@ -213,7 +213,7 @@ def test_keys_depend_on_values_alone(toy):
 
 def test_a_stored_cell_comes_back(tmp_path):
     values = {"x": np.array([1 / 3, np.nan]), "n": np.int64(3), "nothing": None, "yes": True}
-    write_cell(tmp_path / "cell.json", {"a": 0.1}, values)
+    write_text(tmp_path / "cell.json", cell_text({"a": 0.1}, values))
     cell = read_cell(tmp_path / "cell.json")
     assert cell.parameters == {"a": 0.1}
     assert cell.results["x"][0] == 1 / 3 and np.isnan(cell.results["x"][1]) and cell.results["nothing"] is None

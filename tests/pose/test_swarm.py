@@ -32,7 +32,7 @@ from hmc.pose.spectral.skeleton import equally_spaced
 from hmc.pose.spectral.volume import FARTHEST_M, observe_volume
 from hmc.pose.steps.swarm.fit import STAGES, FitSettings, fit_flat, fit_hierarchical, rest_state, torso_moves
 from hmc.pose.steps.swarm.heading import facing_evidence, heading_of, spin_towards
-from hmc.pose.steps.swarm.temporal import SwarmSettings, is_upright, start_fits, swarm_step
+from hmc.pose.steps.swarm.temporal import RestartSettings, SwarmSettings, is_upright, start_fits, swarm_step
 from hmc.search.swarm import PsoSettings, pso_init, pso_run, pso_step
 
 MODEL = model_of_height(1.75)
@@ -261,7 +261,7 @@ def read(capsules):
 
 
 def test_a_person_is_found_followed_and_not_found_where_there_is_none():
-    quick = SwarmSettings(fit=FitSettings())
+    quick = SwarmSettings(fit=FitSettings(), restart=RestartSettings())
     state, info = swarm_step(np.random.default_rng(0), MODEL, None, read(BODY), 30.0, None, quick)
     assert info.status == "fitted" and info.started and info.error_m < 0.1 and info.cost_m < 0.05
     points = skeleton_landmarks(MODEL, state.state)
@@ -368,7 +368,8 @@ def test_nobody_begins_on_the_head():
 
 def test_a_pose_that_is_too_far_from_the_curves_is_no_fit():
     state, _ = swarm_step(np.random.default_rng(0), MODEL, None, read(BODY), 30.0)
-    after, info = swarm_step(np.random.default_rng(1), MODEL, state, read(BODY), 30.0, None, SwarmSettings(lost_m=0.001))
+    lost = SwarmSettings(restart=RestartSettings(lost_m=0.001))
+    after, info = swarm_step(np.random.default_rng(1), MODEL, state, read(BODY), 30.0, None, lost)
     assert info.status == "no fit: the nearest pose is too far from the curves" and after.missed == 1
     np.testing.assert_array_equal(after.state, state.state)
 
@@ -383,7 +384,7 @@ def test_who_is_followed_badly_is_started_anew_and_not_where_the_fit_is_good():
     bad[3:6] = bad[:3] + 0.5 * MODEL.torso * np.array([0.8, 0.0, 0.6])
     costs = {}
     for doubt_m in (0.02, 9.0):
-        settings = SwarmSettings(**still, lost_m=1.0, doubt_m=doubt_m)
+        settings = SwarmSettings(**still, restart=RestartSettings(lost_m=1.0, doubt_m=doubt_m))
         _, info = swarm_step(np.random.default_rng(1), MODEL, replace(good, state=bad), reading, 30.0, None, settings)
         costs[info.started] = info.cost_m
     assert costs[True] < 0.6 * costs[False]

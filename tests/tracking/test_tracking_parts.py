@@ -1,4 +1,4 @@
-"""Parts of the trackers: regions, features of blobs, ghosts, headings."""
+"""Parts of the trackers: regions, features of blobs, ghosts."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 from scipy import ndimage
 
 from hmc.tracking.blobs import blob_features, observe
-from hmc.tracking.heading import arm_reach, facing_hypotheses, shoulder_axis, walking_direction
 from hmc.tracking.likeness import looks_like_person
 from hmc.tracking.region import person_radii, region_distance
 from hmc.tracking.rules.ghosts import real_people
@@ -88,59 +87,3 @@ def test_one_of_two_sets_at_one_place_is_enough(ring):
     grid = VoxelGrid(np.array([-1.0, -1.0, 0.0]), 0.05, (40, 40, 40))
     points = observe(grid, carve(make_tables(grid, ring), masks)).points
     assert real_people(FrameViews(ring, masks), np.zeros((0, 3)), [points, points[::2]], 0.05).sum() == 1
-
-
-def body(angle, reach=0.0, rng=None):
-    """Points in a trunk that is wider than deep, turned to `angle`, with an arm that reaches forwards so far."""
-    rng = np.random.default_rng(0) if rng is None else rng
-    points = rng.uniform((-0.12, -0.22, 0.0), (0.12, 0.22, 1.5), (4000, 3))
-    head = rng.uniform((-0.1, -0.1, 1.5), (0.1, 0.1, 1.8), (400, 3))
-    arm = rng.uniform((0.12, 0.1, 1.0), (0.12 + reach, 0.2, 1.1), (300 if reach else 0, 3))
-    turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
-    return np.concatenate([points, head, arm]) @ turn.T
-
-
-def wrapped(angle):
-    return abs((angle + np.pi) % (2 * np.pi) - np.pi)
-
-
-@settings(deadline=None)
-@given(st.floats(-np.pi, np.pi))
-def test_the_shoulders_axis_is_at_right_angles_to_the_facing(angle):
-    axis, sure = shoulder_axis(body(angle))
-    assert abs(np.cos(axis - angle)) < 0.1
-    assert 0 <= axis < np.pi and 0.5 < sure < 1
-
-
-@settings(deadline=None)
-@given(st.floats(-np.pi, np.pi))
-def test_arms_tell_where_somebody_who_stands_faces(angle):
-    angles, weights = facing_hypotheses(body(angle, reach=0.4), np.zeros(3))
-    assert wrapped(angles[weights.argmax()] - angle) < 0.15
-    assert weights.sum() == pytest.approx(1) and weights[2] == 0
-    assert np.linalg.norm(arm_reach(body(angle, reach=0.4))) > 0.1
-
-
-@settings(deadline=None)
-@given(st.floats(-np.pi, np.pi))
-def test_who_walks_faces_where_they_go(angle):
-    angles, weights = facing_hypotheses(body(angle), 1.2 * np.array([np.cos(angle + 0.2), np.sin(angle + 0.2), 0]))
-    assert wrapped(angles[weights.argmax()] - angle) < 0.15
-    assert wrapped(angles[2] - angle - 0.2) < 1e-9
-    assert (angles > -np.pi).all() and (angles <= np.pi).all()
-
-
-def test_walking_direction_of_many():
-    angle, sure = walking_direction(np.array([[0, 2.0, 0.1], [0, 0, 1.0], [-0.5, 0, 0]]))
-    assert angle[[0, 2]] == pytest.approx([np.pi / 2, np.pi])
-    assert sure == pytest.approx([1, 0, 0.5])
-
-
-def test_headings_of_nobody_and_of_a_round_body():
-    assert shoulder_axis(np.zeros((0, 3))) == (0.0, 0.0)
-    assert not arm_reach(np.zeros((0, 3))).any()
-    angles, weights = facing_hypotheses(np.zeros((0, 3)), np.zeros(3))
-    assert np.isfinite(angles).all() and weights == pytest.approx([0.5, 0.5, 0])
-    rng = np.random.default_rng(0)
-    disc = rng.normal(size=(20000, 3)) * (0.1, 0.1, 0) + (0, 0, 1) + rng.uniform(0, 0.6, (20000, 1)) * (0, 0, 1)
-    assert shoulder_axis(disc)[1] < 0.1

@@ -18,7 +18,7 @@ from hmc.errors import InputError
 from hmc.experiments.engine.experiment import Cell, Experiment
 from hmc.io.files import atomic_write
 
-__all__ = ["cell_key", "cell_path", "cell_rng", "cell_text", "digest", "read_cell", "write_cell", "write_text"]
+__all__ = ["cell_key", "cell_path", "cell_rng", "cell_text", "digest", "read_cell", "write_text"]
 
 
 def digest(value: Any, length: int = 24) -> str:
@@ -56,17 +56,6 @@ def cell_text(parameters: Mapping[str, Any], results: Mapping[str, Any]) -> str:
         When a result is no plain value.
     """
     return _canonical({"parameters": dict(parameters), "results": dict(results)}, indent=1) + "\n"
-
-
-def write_cell(path: Path, parameters: Mapping[str, Any], results: Mapping[str, Any]) -> None:
-    """Store a cell.
-
-    Raises
-    ------
-    InputError
-        When a result is no plain value, or the file cannot be written.
-    """
-    write_text(path, cell_text(parameters, results))
 
 
 def write_text(path: Path, text: str) -> None:

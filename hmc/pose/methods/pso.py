@@ -8,19 +8,18 @@ from functools import partial
 
 import numpy as np
 
-from hmc.body.inverse import fit_landmarks
-from hmc.body.model import neutral_state
 from hmc.body.spin_skeleton import model_of_body, skeleton_landmarks, thesis_body
 from hmc.pose.legs import LegSettings, TellLegs
 from hmc.pose.method import Capture, FrameRng, PoseMethod, StartPose
 from hmc.pose.recovery import Recovery
 from hmc.pose.spectral.reading import BodyReading
+from hmc.pose.starts.spectral import body_state
 from hmc.pose.starts.window import WindowStart, estimate_height
 from hmc.pose.steps.polish import polished
 from hmc.pose.steps.presets import PosePreset
 from hmc.pose.steps.proposal import as_proposed
 from hmc.pose.steps.swarm.step import SwarmPreset, read_view, swarm_memory, swarm_subject, swarmed, swarmed_near
-from hmc.pose.steps.swarm.temporal import SwarmSettings, swarm_step
+from hmc.pose.steps.swarm.temporal import RestartSettings, SwarmSettings, swarm_step
 from hmc.pose.views.person_view import PersonView
 
 __all__ = ["SWARM_PRESETS", "ReadingStart", "pso_method"]
@@ -32,7 +31,7 @@ NEEDS = frozenset({"hulls", "voxels"})
 #: `hsiao2008` has limits as printed, curves alone, and a start tried beside every frame's fit; in `default` the voxels count too.
 SWARM_PRESETS: dict[str, SwarmPreset] = {
     "default": SwarmPreset(),
-    "hsiao2008": SwarmPreset(swarm=SwarmSettings(always_check=True, voxels=False), thesis=True),
+    "hsiao2008": SwarmPreset(swarm=SwarmSettings(restart=RestartSettings(always=True), voxels=False), thesis=True),
 }
 
 
@@ -71,11 +70,7 @@ class ReadingStart:
         if not found:
             return None
         _, anchor, best = min(found, key=lambda one: one[0])
-        start = neutral_state("down", body.limits)
-        points = skeleton_landmarks(model, best.state)
-        across = points[9] - points[12] + points[3] - points[6]
-        start[:3], start[3] = points[0], np.arctan2(-across[0], across[1])
-        state, _ = fit_landmarks(body, points, start)
+        state = body_state(body, skeleton_landmarks(model, best.state))
         return StartPose(swarm_subject(body, capture, self.preset), anchor, state, swarm_memory(best))
 
 

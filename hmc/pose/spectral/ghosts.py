@@ -54,10 +54,6 @@ class GhostReport:
     ----------
     pieces : tuple of ndarray of int, shape (n, 3)
         Voxels of each piece at the height of the shanks, the largest first.
-    needed : ndarray of bool, shape (n_pieces,)
-        Whether some silhouette needs the piece.
-    color_spread : ndarray, shape (n_pieces,)
-        How much the colors of a piece differ between the cameras that see it, grey levels; NaN where fewer than two see it.
     ghosts : ndarray of bool, shape (n_pieces,)
         Pieces that can be removed.
     text : str
@@ -65,8 +61,6 @@ class GhostReport:
     """
 
     pieces: tuple[np.ndarray, ...]
-    needed: np.ndarray
-    color_spread: np.ndarray
     ghosts: np.ndarray
     text: str
 
@@ -84,9 +78,8 @@ def check_ghosts(voxels: np.ndarray, grid: VoxelGrid, views: Views, settings: Gh
     settings : GhostSettings, optional
     """
     settings = settings or GhostSettings()
-    nothing = GhostReport((), np.zeros(0, bool), np.zeros(0), np.zeros(0, bool), "")
     if len(voxels) == 0:
-        return nothing
+        return GhostReport((), np.zeros(0, bool), "")
     low, high = voxels[:, 2].min(), voxels[:, 2].max() + 1
     first, last = low + settings.lowest_share * (high - low), low + settings.highest_share * (high - low)
     occupied = np.zeros(grid.shape, bool)
@@ -97,7 +90,7 @@ def check_ghosts(voxels: np.ndarray, grid: VoxelGrid, views: Views, settings: Gh
     blobs = components(legs, grid, max(1, int(settings.least_m3 / grid.voxel_size_m**3)))
     pieces = tuple(blobs.of(k) for k in range(len(blobs)))
     if len(pieces) <= 2:
-        return GhostReport(pieces, np.ones(len(pieces), bool), np.full(len(pieces), np.nan), np.zeros(len(pieces), bool), "")
+        return GhostReport(pieces, np.zeros(len(pieces), bool), "")
     needed = np.array([_is_needed(piece, voxels, grid, views, settings) for piece in pieces])
     spread = np.array([_color_spread(piece, occupied, grid, views) for piece in pieces])
     best = np.nanmin(spread) if np.isfinite(spread).any() else np.nan
@@ -111,7 +104,7 @@ def check_ghosts(voxels: np.ndarray, grid: VoxelGrid, views: Views, settings: Gh
     text = f"{len(pieces)} legs in the hull"
     text += f"; {int(ghosts.sum())} removed by their colors" if ghosts.any() else ""
     text += "; which of them are real, colors do not tell: use more cameras" if left > 2 else ""
-    return GhostReport(pieces, needed, spread, ghosts, text)
+    return GhostReport(pieces, ghosts, text)
 
 
 def remove_ghosts(voxels: np.ndarray, grid: VoxelGrid, report: GhostReport) -> np.ndarray:

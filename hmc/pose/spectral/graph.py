@@ -19,6 +19,10 @@ from hmc.voxels.grid import VoxelGrid
 __all__ = ["GraphSettings", "VoxelGraph", "adjacency", "build_graph", "color_votes", "core_nodes", "face_neighbours"]
 
 
+#: A camera votes for an edge when the colors at its two ends are nearer than this (Eq. 3-13), grey levels.
+LIKE_COLORS = 40.0
+
+
 @dataclass(frozen=True)
 class GraphSettings:
     """Weights of the edges.
@@ -29,8 +33,6 @@ class GraphSettings:
         Width of the heat kernel (Eq. 3-10) on positions, metres; its square is the thesis's k.
     kernel_color : float
         Width of the heat kernel on colors, grey levels; 0 leaves colors out of the kernel.
-    color_distance : float
-        A camera votes for an edge when the colors at its two ends are nearer than this (Eq. 3-13), grey levels.
     color_bonus : float
         What is added to an edge for which all cameras vote (Eq. 3-15); half of it where at least half do. At most 1.
     color_penalty : float
@@ -43,7 +45,6 @@ class GraphSettings:
 
     kernel_m: float = 0.05
     kernel_color: float = 0.0
-    color_distance: float = 40.0
     color_bonus: float = 0.5
     color_penalty: float = 0.8
     shrink: float = 2.0
@@ -95,7 +96,7 @@ def face_neighbours(voxels: np.ndarray) -> np.ndarray:
 
 
 def color_votes(
-    edges: np.ndarray, voxels: np.ndarray, grid: VoxelGrid, rig: Rig, images: Sequence[np.ndarray | None], distance: float
+    edges: np.ndarray, voxels: np.ndarray, grid: VoxelGrid, rig: Rig, images: Sequence[np.ndarray | None], distance: float = LIKE_COLORS
 ) -> tuple[np.ndarray, np.ndarray]:
     """How many cameras see like colors at both ends of each edge (Eqs. 3-13 and 3-15).
 

@@ -20,18 +20,22 @@ from hmc.pose.objectives.residuals import residual_rows
 from hmc.pose.objectives.symmetric import Symmetric, body_points
 from hmc.search.gauss_newton import damped, movable
 
-__all__ = ["FitBodyInfo", "fit_body"]
+__all__ = ["WORTH_IT", "FitBodyInfo", "fit_body", "with_known_stature"]
+
+#: Deviation of the stature's logarithm where the stature was given.
+KNOWN_STATURE = 0.015
+#: A fitted body is taken where it lowers the cost to this share at most.
+WORTH_IT = 0.97
 
 Coordinates = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True)
 class FitBodyInfo:
-    """Mean cost a frame (square metres) before and after, and whether the fitted body is the one returned."""
+    """Mean cost a frame (square metres) before and after."""
 
     cost_before: float
     cost_after: float
-    accepted: bool
 
 
 @dataclass(frozen=True)
@@ -51,6 +55,11 @@ class _Prior:
     anchors: np.ndarray
     hold: np.ndarray
     precision: np.ndarray
+
+
+def with_known_stature(settings: FitBodySettings, known: bool = True) -> FitBodySettings:
+    """Settings by which the fit changes the stature little, where it is known."""
+    return replace(settings, scale_deviation=KNOWN_STATURE) if known else settings
 
 
 def fit_body(
@@ -121,7 +130,7 @@ def fit_body(
         damping = max(0.3 * damping, 1e-3)
         if gain < 3e-3:
             break
-    return reshaped(body, shape), states, FitBodyInfo(before, after, True)
+    return reshaped(body, shape), states, FitBodyInfo(before, after)
 
 
 def _gauss_newton(frames, shape: np.ndarray, states: np.ndarray, prior: _Prior, damping: float, limits: JointLimits):

@@ -7,11 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hmc.body.dimensions import FitBodySettings
 from hmc.body.flesh import surface_coordinates
 from hmc.body.model import BodyModel
 from hmc.pose.method import Capture, make_subject
-from hmc.pose.starts.fit_body import fit_body
+from hmc.pose.starts.fit_body import WORTH_IT, fit_body, with_known_stature
 from hmc.pose.steps.descent.tracker import SmdPreset, SmdTracker, TrackState, make_tracker, track_init, track_step
 from hmc.pose.steps.polish import fine_objective
 from hmc.pose.steps.presets import PRESETS
@@ -24,10 +23,6 @@ __all__ = ["FirstPose", "begin", "fitted_body"]
 SETTLE = 4
 #: The body is fitted to at most so many frames, and needs at least so many.
 FIT_FRAMES, LEAST_FRAMES = 6, 3
-#: Deviation of the stature's logarithm where the stature was given.
-KNOWN_STATURE = 0.015
-#: A fitted body is taken where it lowers the cost by this factor at least.
-WORTH_IT = 0.97
 
 
 @dataclass(frozen=True)
@@ -39,14 +34,11 @@ class FirstPose:
     place : int
     body : BodyModel
     state : ndarray, shape (27,)
-    is_fitted : bool
-        The body has the person's own dimensions already.
     """
 
     place: int
     body: BodyModel
     state: np.ndarray
-    is_fitted: bool = False
 
 
 def begin(
@@ -77,8 +69,6 @@ def begin(
     """
     tracker = make_tracker(first.body, preset)
     state = _settled(rng, tracker, first.state, observed[first.place])
-    if first.is_fitted:
-        return tracker, state
     states, hulls, now = [], [], state
     for one, target in zip(observed[first.place :], targets[first.place :], strict=True):
         now, info = track_step(rng, tracker, now, one)
@@ -113,7 +103,7 @@ def fitted_body(
         return None
     picks = np.unique(np.linspace(0, len(states) - 1, FIT_FRAMES).round().astype(int))
     objectives = [fine_objective(rng, subject, targets[k], preset.polish) for k in picks]
-    settings: FitBodySettings = replace(preset.fit_body, scale_deviation=KNOWN_STATURE) if height_known else preset.fit_body
+    settings = with_known_stature(preset.fit_body, height_known)
     coordinates = surface_coordinates(body, preset.surface_samples)
     found, _, info = fit_body(objectives, np.array([states[k] for k in picks]), coordinates, settings)
     return found if info.cost_after < WORTH_IT * info.cost_before else None

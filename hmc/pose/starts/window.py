@@ -21,7 +21,7 @@ from hmc.body.model import BodyModel, neutral_state
 from hmc.body.proportions import canton_body, default_body
 from hmc.pose.method import Capture, FrameRng, PoseStep, StartPose, StepInfo, Subject, Tracked, begin_tracking
 from hmc.pose.objectives.objective import Objective, cost_at
-from hmc.pose.starts.fit_body import FitBodyInfo, fit_body
+from hmc.pose.starts.fit_body import WORTH_IT, FitBodyInfo, fit_body, with_known_stature
 from hmc.pose.starts.spectral import spectral_poses
 from hmc.pose.starts.templates import first_poses
 from hmc.pose.steps.annealed import annealed, annealed_subject
@@ -50,10 +50,6 @@ ADULT_M, CHILD_M = 1.45, 0.9
 ADULT_MEAN_M = 1.7
 #: A child is believed where its cost is below this share of an adult's who sits, kneels or bends.
 CHILD_GAIN = 0.9
-#: Deviation of the stature's logarithm where the stature was given.
-KNOWN_STATURE = 0.015
-#: A fitted body is taken where it lowers the cost of frames that it was not fitted to by this factor at least.
-FIT_GAIN = 0.97
 #: With which candidates are followed.
 QUICK = AnnealedSettings(layers=2, particles=60, survival_rate=0.1, spread=0.5)
 
@@ -383,9 +379,13 @@ def _fit(
     picks = sorted({rest[round(q * (len(rest) - 1))] for q in np.linspace(0, 1, settings.body_frames)})
     held_out = held_out[:: max(1, len(held_out) // 8)]
     objectives = {k: fine_objective(window.frame_rng(k), subject, window.target(k), preset.polish) for k in {*picks, *held_out}}
-    fit_settings = replace(preset.fit_body, scale_deviation=KNOWN_STATURE) if height_known else preset.fit_body
     coordinates = surface_coordinates(subject.body, preset.surface_samples)
-    body, _, info = fit_body([objectives[k] for k in picks], np.array([path[k][0].state for k in picks]), coordinates, fit_settings)
+    body, _, info = fit_body(
+        [objectives[k] for k in picks],
+        np.array([path[k][0].state for k in picks]),
+        coordinates,
+        with_known_stature(preset.fit_body, height_known),
+    )
     fitted = annealed_subject(body, subject.capture, preset)
     before, after = (
         [
@@ -394,5 +394,5 @@ def _fit(
         ]
         for one in (subject, fitted)
     )
-    accepted = bool(np.mean(after) < FIT_GAIN * np.mean(before))
-    return (fitted if accepted else subject), replace(info, accepted=accepted)
+    # Of frames that it was not fitted to.
+    return (fitted, info) if np.mean(after) < WORTH_IT * np.mean(before) else (subject, None)

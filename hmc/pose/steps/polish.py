@@ -55,7 +55,7 @@ MakeObjective = Callable[[np.random.Generator, Subject, PersonView], Objective]
 
 def polish(
     rng: np.random.Generator, objective: Objective, starts: Sequence[np.ndarray], anchor: np.ndarray, settings: PolishSettings
-) -> tuple[np.ndarray, float, list[str], int]:
+) -> tuple[np.ndarray, float, int]:
     """The best of several starts, refined, with limbs that the hulls contradict looked for.
 
     Parameters
@@ -72,7 +72,6 @@ def polish(
     state : ndarray, shape (27,)
     cost : float
         Square metres.
-    searched : list of str
     evaluations : int
     """
     # Each to the end: a start that has moved a limb across costs more than one that has lost it until late in the refinement.
@@ -80,12 +79,11 @@ def polish(
     evaluations = sum(info.evaluations for _, info in trials)
     estimate, info = min(trials, key=lambda trial: trial[1].cost_after)
     cost = info.cost
-    searched: list[str] = []
     if settings.search is not None and info.misfit is not None:
         searched = lost_limbs(rng, info.misfit, settings.search)
         estimate, cost, more = search_limbs(rng, objective, (estimate, cost), searched, settings.refine, settings.search)
         evaluations += more
-    return estimate, cost, searched, evaluations
+    return estimate, cost, evaluations
 
 
 def polished(propose: Propose, settings: PolishSettings, make_objective: MakeObjective | None = None) -> PoseStep:
@@ -109,11 +107,9 @@ def polished(propose: Propose, settings: PolishSettings, make_objective: MakeObj
             objective: Objective = fine_objective(rng, tracked.subject, view.target, settings)
         else:
             objective = make_objective(rng, tracked.subject, view)
-        estimate, cost, searched, more = polish(rng, objective, starts, tracked.state, settings)
+        estimate, cost, more = polish(rng, objective, starts, tracked.state, settings)
         after = Tracked(tracked.subject, estimate, estimate - tracked.state, found.memory)
         evaluations = found.evaluations + more
-        return after, StepInfo(
-            "fitted", cost, evaluations, tuple(searched), annealed=found.annealed, levels=found.levels, details=found.details
-        )
+        return after, StepInfo("fitted", cost, evaluations, annealed=found.annealed, levels=found.levels, details=found.details)
 
     return step

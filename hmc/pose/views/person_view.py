@@ -35,8 +35,6 @@ IMAGES_FOR = frozenset({"skin", "voxels"})
 #: Of so few cameras, hulls in which one or two may miss are mostly no person: they count only where silhouettes ask for them. Of more, they
 #: are little fatter than the strict one, and hold what furniture hides without silhouettes that would ask for it.
 FEW_CAMERAS = 4
-#: Colors vote for edges between voxels of one color up to so many grey levels apart.
-VOTE_LEVELS = 40.0
 
 
 @dataclass(frozen=True)
@@ -161,6 +159,6 @@ def _voxels_and_skin(recording, grid, hull, strict, tolerant, needs) -> tuple[Sk
         occupied = hull.strict if own is strict else hull.tolerant
         skin = observe_voxels(grid, recording.rig, occupied, own, hull.images, hull.masks)
     if len(own) and "voxels" in needs:
-        votes = color_votes(face_neighbours(own), own, grid, recording.rig, hull.images, VOTE_LEVELS)
+        votes = color_votes(face_neighbours(own), own, grid, recording.rig, hull.images)
         voxels = VoxelView(own, grid.centres(own), grid.voxel_size_m, votes)
     return skin, voxels

@@ -105,7 +105,7 @@ def swarmed_near(preset: SwarmPreset) -> Propose:
         model: SkeletonModel = subject.extras[_SKELETON]
         found = fit_near(rng, model, before, reading, subject.capture.fps, preset.swarm)
         state, _ = fit_landmarks(subject.body, skeleton_landmarks(model, found.state), tracked.state)
-        details = {"error_m": found.error_m, "started": False, "turned": False, "doubts": "; ".join(reading.segmentation.doubts)}
+        details = {"error_m": found.error_m, "doubts": "; ".join(reading.segmentation.doubts)}
         return Proposal(state, state, found.error_m, found.evaluations, details=details)
 
     return propose
@@ -127,7 +127,7 @@ def _before(tracked: Tracked) -> SwarmState:
     model, body = tracked.subject.extras[_SKELETON], tracked.subject.body
     now, last = (skeleton_state(model, landmarks(body, one), one) for one in (tracked.state, tracked.state - tracked.velocity))
     memory: Mapping[str, np.ndarray] = tracked.memory
-    usual, facing, missed = memory[_NAME].tolist() if _NAME in memory else (SwarmSettings().doubt_m, 0.0, 0)
+    usual, facing, missed = memory[_NAME].tolist() if _NAME in memory else (0.0, 0.0, 0)
     return SwarmState(now, now - last, usual, facing, int(missed))
 
 

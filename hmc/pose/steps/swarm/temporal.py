@@ -25,9 +25,38 @@ from hmc.pose.steps.swarm.fit import (
 )
 from hmc.pose.steps.swarm.heading import facing_evidence, heading_of, spin_towards
 
-__all__ = ["SwarmInfo", "SwarmSettings", "SwarmState", "fit_near", "is_upright", "missed", "start_fits", "swarm_step"]
+__all__ = ["RestartSettings", "SwarmInfo", "SwarmSettings", "SwarmState", "fit_near", "is_upright", "missed", "start_fits", "swarm_step"]
 
 FAR = "the nearest pose is too far from the curves"
+
+
+@dataclass(frozen=True)
+class RestartSettings:
+    """When a new start takes the place of the pose that was followed, and when a frame has no fit (Figure 3-22).
+
+    Parameters
+    ----------
+    always : bool
+        Try a start in every frame, as the thesis does.
+    doubt_m, doubt_ratio : float
+        Else one is tried when the cost is larger than the first, metres, and than the second times the cost that was usual.
+    margin_m : float
+        The start is taken when its cost is smaller by this, metres.
+    backwards : float
+        A skeleton is turned about when the evidence for its heading falls below this; two feet that point backwards are -2 a frame.
+    last_weight : float
+        How much the last pose counts in a new start (`Prior`).
+    lost_m : float
+        A frame whose cost is larger has no fit, metres.
+    """
+
+    always: bool = False
+    doubt_m: float = 0.055
+    doubt_ratio: float = 1.4
+    margin_m: float = 0.012
+    backwards: float = -2.5
+    last_weight: float = 0.02
+    lost_m: float = 0.15
 
 
 @dataclass(frozen=True)
@@ -46,25 +75,14 @@ class SwarmSettings:
         The constraint is not tighter than this in any frame.
     particles, iterations : int
         Of the temporal swarm.
-    doubt_m, doubt_ratio : float
-        A start is tried beside the temporal fit when its cost is larger than the first, metres, and than the second times the cost that
-        was usual.
-    margin_m : float
-        The start is taken when its cost is smaller by this, metres.
     facing_m : float
-        By how much facing straight backwards raises an error, metres.
-    backwards : float
-        A skeleton is turned about when the evidence for its heading falls below this; two feet that point backwards are -2 a frame.
+        By how much facing straight backwards raises the error of a start, metres.
     farthest_m : float
         A curve that is farther than this from every part of the last pose is not taken for one, metres.
-    lost_m : float
-        A frame whose cost is larger has no fit, metres.
-    last_weight : float
-        How much the last pose counts in a new start (`Prior`).
     spin_weight : float
         How much a change of the spin from one frame to the next counts, metres a radian.
-    always_check : bool
-        Try a start in every frame, as the thesis does.
+    restart : RestartSettings or None
+        None: every frame has the fit near the last pose; for methods that recover in another way.
     voxels : bool
         Whether the voxels count beside their curves; the thesis fits curves alone, and has no fit where they are not those of a body.
     """
@@ -77,16 +95,10 @@ class SwarmSettings:
     least_reach_rad: float = 0.35
     particles: int = 36
     iterations: int = 15
-    doubt_m: float = 0.055
-    doubt_ratio: float = 1.4
-    margin_m: float = 0.012
     facing_m: float = 0.02
-    backwards: float = -2.5
     farthest_m: float = 0.25
-    lost_m: float = 0.15
-    last_weight: float = 0.02
     spin_weight: float = 0.01
-    always_check: bool = False
+    restart: RestartSettings | None = None
     voxels: bool = True
 
 
@@ -124,7 +136,7 @@ class SwarmInfo:
     error_m : float
         Mean distance of corresponding nodes, metres; NaN without a fit.
     started : bool
-        Whether the pose is a new start, or one found anew in the last one's place, and not the followed one.
+        Whether the pose is a new start and not the followed one.
     turned : bool
         Whether the skeleton was turned about, because it had faced backwards.
     evaluations : int
@@ -162,14 +174,14 @@ def start_fits(
         As from `hmc.pose.steps.swarm.heading.heading_of`.
     settings : SwarmSettings
     last : ndarray, shape (23,), optional
-        The last pose: it is what is likely where curves are missing.
+        The last pose: it is what is likely where curves are missing, as much as `settings.restart` says.
     """
     observed = observe_curves(model, curves_of(reading), settings.nodes, volume=reading.volume if settings.voxels else None)
     trunk = reading.curves["trunk"]
     rest = rest_state(model, trunk.mean(0), trunk[-1] - trunk[0])
     weight = 0.004
     if last is not None:
-        rest[6:], weight = last[6:], settings.last_weight
+        rest[6:], weight = last[6:], (settings.restart or RestartSettings()).last_weight
         spins = [last[6], last[6] + np.pi]
     elif heading is not None:
         towards = spin_towards(rest, heading)
@@ -213,13 +225,15 @@ def swarm_step(
     velocity : ndarray, shape (3,), optional
         Of the person's track, metres a second.
     settings : SwarmSettings, optional
+        By default with a restart where the fit is doubtful.
 
     Returns
     -------
     state : SwarmState or None
     info : SwarmInfo
     """
-    settings = settings or SwarmSettings()
+    settings = settings or SwarmSettings(restart=RestartSettings())
+    restart = settings.restart
     segmentation = reading.segmentation
     doubts = (*segmentation.doubts, *(f"{one} touch" for one in segmentation.touching), *reading.left_out)
     volume = reading.volume if settings.voxels else None
@@ -238,23 +252,23 @@ def swarm_step(
     facing = state.facing + facing_evidence(found.state, heading)
     started = turned = False
     spent = 0
-    backwards = facing < settings.backwards and facing_evidence(found.state, heading) < 0
+    backwards = restart is not None and facing < restart.backwards and facing_evidence(found.state, heading) < 0
     whole = segmentation.whole and reading.status == "read"
     # Parts that were left out because they are far away count here, where the frame shows everything.
     cost_m = found.cost_m
     if whole:
         cost_m = float(fit_cost(model, found.state[None], observe_curves(model, curves_of(reading), settings.nodes, volume=volume))[0])
-    doubtful = cost_m > max(settings.doubt_m, settings.doubt_ratio * state.usual_m)
-    if reading.status == "read" and (((doubtful or backwards) and whole) or settings.always_check):
+    doubtful = restart is not None and cost_m > max(restart.doubt_m, restart.doubt_ratio * state.usual_m)
+    if restart is not None and reading.status == "read" and (((doubtful or backwards) and whole) or restart.always):
         trial = start_fits(rng, model, reading, heading, settings, None if backwards else state.state)[0]
         spent = trial.evaluations
-        margin = -settings.facing_m if backwards and facing_evidence(trial.state, heading) > 0 else settings.margin_m
+        margin = -settings.facing_m if backwards and facing_evidence(trial.state, heading) > 0 else restart.margin_m
         if trial.cost_m < cost_m - margin:
             found, started, turned = trial, True, backwards
             facing = facing_evidence(trial.state, heading)
         elif backwards:
             facing = 0.0
-    if found.cost_m > settings.lost_m:
+    if restart is not None and found.cost_m > restart.lost_m:
         read = reading.status == "read"
         why = FAR if read else reading.status
         error_m = found.error_m if read else np.nan
