@@ -20,4 +20,4 @@ def propose(rng, tracked, view):
 
 
 method = replace(hmc.pose_method("apf"), name="no-search", source="docs", step=polished(propose, HOUSE.polish), settings=HOUSE)
-hmc.register(method, "the last pose, refined")
+hmc.register_method(method, "the last pose, refined")

@@ -33,4 +33,4 @@ def propose(rng, tracked, view):
 
 settings = {"draws": DRAWS, "spreads": list(SPREADS), "house": HOUSE}
 method = replace(hmc.pose_method("apf"), name="random-search", source="docs", step=polished(propose, HOUSE.polish), settings=settings)
-hmc.register(method, "random search about the last pose")
+hmc.register_method(method, "random search about the last pose")

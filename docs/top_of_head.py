@@ -65,4 +65,6 @@ def make_objective(rng, subject, view):
 
 
 step = polished(annealed(HOUSE), HOUSE.polish, make_objective)
-hmc.register(replace(hmc.pose_method("apf"), name="apf-top", source="docs", step=step, settings=(HOUSE, WEIGHT)), "with the head's height")
+hmc.register_method(
+    replace(hmc.pose_method("apf"), name="apf-top", source="docs", step=step, settings=(HOUSE, WEIGHT)), "with the head's height"
+)

@@ -7,8 +7,8 @@
 (8, 15, 3)
 
 These names will stay: `open_recording`, `check`, `silhouettes`, `hulls`, `track`, `views`, `pose`, `evaluate`, `view`; the records
-`Recording`, `Rig`, `Camera`, `TrackTable`, `PoseTable`, `PosedPeople`; `METHODS` and `TRACKERS`, `pose_method`, `PoseMethod` and `register`
-to add a method; and `InputError`. What is in the modules below may move.
+`Recording`, `Rig`, `Camera`, `TrackTable`, `PoseTable`, `PosedPeople`; `METHODS` and `TRACKERS`, `pose_method`, `PoseMethod`,
+`register_method` and `register_tracker` to add to them; and `InputError`. What is in the modules below may move.
 """
 
 from __future__ import annotations
@@ -34,7 +34,8 @@ _WHERE = {
     "hulls": "hmc.api",
     "open_recording": "hmc.io.recording",
     "pose_method": "hmc.pose.registry",
-    "register": "hmc.pose.registry",
+    "register_method": "hmc.pose.registry",
+    "register_tracker": "hmc.tracking.trackers",
     "silhouettes": "hmc.api",
     "track": "hmc.api",
     "views": "hmc.api",

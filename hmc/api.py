@@ -9,7 +9,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from hmc.errors import InputError
 from hmc.io.masks import MaskStep
@@ -19,6 +19,7 @@ from hmc.voxels.hulls import HullStep, stream_hulls, stream_masks
 
 if TYPE_CHECKING:
     from hmc.check import Finding
+    from hmc.io.detections import DetectionTable
     from hmc.metrics.mot import MotScores
     from hmc.metrics.scores.poses import PoseEvaluation
     from hmc.pose.follow import PosedPeople
@@ -172,8 +173,9 @@ def pose(
     tracks: TrackTable | None = None,
     method: str | PoseMethod = "apf",
     seed: int = 0,
-    height_m: float | None = None,
+    height_m: float | Literal["auto"] | None = None,
     smooth_s: float = 0.0,
+    detections: DetectionTable | None = None,
     on_frame: Callable[[int, int], None] | None = None,
 ) -> PosedPeople:
     """The pose of every person in every frame.
@@ -187,10 +189,12 @@ def pose(
         A key of `hmc.METHODS`, or a method, such as ``hmc.pose_method("smd", preset="kehl2006")``.
     seed : int
         The same seed gives the same result.
-    height_m : float, optional
-        Stature of every person; where left out what the recording says of a single person, else estimated for each.
+    height_m : float or "auto", optional
+        Stature of every person; "auto": estimated for each; where left out what the recording says of a single person, else "auto".
     smooth_s : float
         Time over which finished poses are smoothed, seconds; 0: they are not.
+    detections : DetectionTable, optional
+        Of markers (`hmc.io.detections.read_detections`), for the methods that need them; without hulls they need no tracks.
     on_frame : callable, optional
         Called with the number of frames that are done and that of all.
 
@@ -216,9 +220,7 @@ def pose(
     from hmc.pose.smoothing import smooth_people
 
     recording, method = _opened(recording), pose_method(method) if isinstance(method, str) else method
-    if "detections" in method.needs:
-        raise InputError(f"method {method.name} works on detections; use `hmc.pose.follow.follow`, or `hmc pose` from the command line")
-    height_m = recording.known_height_m if height_m is None else height_m
+    height = None if height_m == "auto" else recording.known_height_m if height_m is None else height_m
 
     def counted(steps: Iterable[HullStep], total: int) -> Iterator[HullStep]:
         for n, step in enumerate(steps, start=1):
@@ -228,11 +230,11 @@ def pose(
 
     with tempfile.TemporaryDirectory() as folder:
         masks = None
-        if tracks is None:
+        if tracks is None and method.needs_tracks:
             masks = Path(folder) / "masks"
             tracks = _tracked(recording, "sparse", seed, TRACK_VOXEL_M, masks)
         run = RunOptions(masks=masks, key=_KEY, progress=counted)
-        people = follow(recording, tracks, method, FollowOptions(POSE_VOXEL_M, seed, height_m), run)
+        people = follow(recording, tracks, method, FollowOptions(POSE_VOXEL_M, seed, height, detections), run)
     return smooth_people(people, method.limits, recording.fps, smooth_s) if smooth_s else people
 
 

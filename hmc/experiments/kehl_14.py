@@ -52,7 +52,7 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     fastest = max(row["largest_turn_deg_per_frame"] for row in rows)
     claims = (
         Claim(f"turns of {PAPER_DEG:.0f} degrees and more between frames", fastest >= PAPER_DEG, f"{fastest:.0f} degrees"),
-        Claim("everybody is still followed at the end", max(row["last_tenth_mm"] for row in rows) < LOST_MM, detail),
+        Claim("the dancer is still followed at the end", max(row["last_tenth_mm"] for row in rows) < LOST_MM, detail),
     )
     caption = "Fast motion; the turn is that of the right upper arm. The paper: Kehl, Figure 14."
     return Report((Table("kehl-14", caption, rows),), {"kehl-14": figure}, claims)

@@ -87,7 +87,7 @@ SWITCHES: dict[str, Callable[[PosePreset], Way]] = {
     "limb search": _preset(search=None),
     "body fit": _preset(fit_body=None),
     "several starts": _preset(start="neutral"),
-    "legs told apart": _method(legs=None, choose=None),
+    "legs told apart": _method(legs=None, alternatives=None),
 }
 
 
@@ -149,7 +149,7 @@ def change_hulls(change: Callable[[HullStep], HullStep] | None) -> Progress | No
 
 
 def run_method(seen: TrackedRecording, method: PoseMethod, options: FollowOptions, progress: Progress | None = None) -> PosedPeople:
-    """Everybody's poses in a tracked recording by any method.
+    """The poses of all persons in a tracked recording by any method.
 
     Parameters
     ----------

@@ -76,7 +76,7 @@ def grid(plan: Plan) -> list[dict]:
 
 
 def hidden(step: HullStep, first: int, last: int) -> HullStep:
-    """A frame as it is, or, from frame `first` to before `last`, with nobody in any silhouette."""
+    """A frame as it is, or, from frame `first` to before `last`, with no person in any silhouette."""
     if not first <= step.index < last:
         return step
     nothing = np.zeros_like(step.strict)

@@ -111,7 +111,7 @@ def style_of(tracker: str, color: bool) -> dict[str, str]:
 
 
 def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Results:
-    """Follow everybody through a recording and score it."""
+    """Follow all persons through a recording and score it."""
     label = parameters["recording"]
     truth = read_centroids(inputs.truth(label))
     tracks, timing, fps = follow(parameters, inputs, int(rng.integers(2**31)))

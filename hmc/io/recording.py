@@ -134,6 +134,13 @@ def open_recording(path: str | Path, cameras: Sequence[str] | None = None, start
     ------
     InputError
         When something essential is missing or wrong; the message says which file and what to do.
+
+    Examples
+    --------
+    >>> import hmc
+    >>> recording = hmc.open_recording("data/synthetic/tiny", cameras=["cam_00", "cam_02"], frames=10)
+    >>> recording.n_frames, recording.rig.names, recording.fps
+    (10, ('cam_00', 'cam_02'), 15.0)
     """
     path = Path(path)
     if not path.is_dir():

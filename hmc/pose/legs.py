@@ -15,7 +15,7 @@ from hmc.body.exchange import swapped_pose
 from hmc.body.kinematics import landmarks
 from hmc.body.limbs import LIMBS
 from hmc.body.model import BodyModel
-from hmc.pose.method import Alternatives, Stepped, Subject
+from hmc.pose.method import Alternatives, StepResult, Subject
 from hmc.pose.objectives.objective import cost_at
 from hmc.pose.steps.polish import PolishSettings, fine_objective
 from hmc.pose.steps.refine import refine
@@ -100,7 +100,7 @@ def no_alternatives(state: np.ndarray, n: int = 2) -> Alternatives:
 
 @dataclass(frozen=True)
 class TellLegs:
-    """What offers the pose with exchanged legs beside that of any step: a `hmc.pose.method.Choose`.
+    """What offers the pose with exchanged legs beside that of any step: a `hmc.pose.method.FindAlternatives`.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ class TellLegs:
 
     polish: PolishSettings
 
-    def __call__(self, rng: np.random.Generator, stepped: Stepped, view: PersonView) -> Alternatives:
+    def __call__(self, rng: np.random.Generator, stepped: StepResult, view: PersonView) -> Alternatives:
         """The pose and the one with exchanged legs; twice the pose in a frame without a fit, or where a leg is missing."""
         tracked, info = stepped
         tells = info.status == "fitted" and (info.missing is None or not info.missing[LEG_DOFS].any())

@@ -25,7 +25,7 @@ from hmc.search.filters import AnnealedInfo, ParticleState
 __all__ = [
     "Alternatives",
     "Capture",
-    "Choose",
+    "FindAlternatives",
     "FrameRng",
     "PoseMethod",
     "PoseStep",
@@ -33,7 +33,7 @@ __all__ = [
     "Start",
     "StartPose",
     "StepInfo",
-    "Stepped",
+    "StepResult",
     "Subject",
     "Tracked",
     "begin_tracking",
@@ -195,7 +195,7 @@ PoseStep = Callable[[np.random.Generator, Tracked, PersonView], tuple[Tracked, S
 
 
 #: One frame on: the pose, and what is told of it.
-Stepped = tuple[Tracked, StepInfo]
+StepResult = tuple[Tracked, StepInfo]
 
 
 class Recover(Protocol):
@@ -204,12 +204,12 @@ class Recover(Protocol):
     def first(self, costs: np.ndarray) -> Mapping[str, np.ndarray]:
         """Entries of the memory after a person's first frames, of these costs, shape (n,)."""
 
-    def __call__(self, rng: np.random.Generator, before: Tracked, stepped: Stepped, view: PersonView) -> Stepped:
+    def __call__(self, rng: np.random.Generator, before: Tracked, stepped: StepResult, view: PersonView) -> StepResult:
         """The step's pose, or another in its place."""
 
 
 #: Other poses of a frame, between which later frames decide.
-Choose = Callable[[np.random.Generator, Stepped, PersonView], Alternatives]
+FindAlternatives = Callable[[np.random.Generator, StepResult, PersonView], Alternatives]
 
 
 @dataclass(frozen=True)
@@ -266,8 +266,8 @@ class PoseMethod:
         ``equip(body, capture)`` makes the `Subject` that the step takes.
     recover : callable or None
         ``recover(rng, before, (tracked, info), view)`` notices a pose that got lost and finds it anew (`hmc.pose.recovery`).
-    choose : callable or None
-        ``choose(rng, (tracked, info), view)`` gives the frame's `Alternatives`; None: those of the step, if any.
+    alternatives : callable or None
+        ``alternatives(rng, (tracked, info), view)`` gives the frame's `Alternatives`; None: those of the step, if any.
     legs : LegSettings or None
         How the frames around decide between alternatives (`hmc.pose.legs`); None: the pose stays as the step has it.
     limits : JointLimits
@@ -287,7 +287,7 @@ class PoseMethod:
     needs: frozenset[str] = frozenset({"hulls"})
     equip: Callable[[BodyModel, Capture], Subject] = make_subject
     recover: Recover | None = None
-    choose: Choose | None = None
+    alternatives: FindAlternatives | None = None
     legs: Any = None
     limits: JointLimits = field(default_factory=default_limits)
     window_s: float = 1.5

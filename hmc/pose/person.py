@@ -204,8 +204,8 @@ def _start(task: PoseTask, person: PersonTrack, state: PersonState) -> PersonSta
 
 
 def _followed(task: PoseTask, rng: np.random.Generator, tracked: Tracked, info: StepInfo, view: PersonView) -> FollowedFrame:
-    choose = task.method.choose
-    found = info.alternatives if choose is None else choose(rng, (tracked, info), view)
+    find = task.method.alternatives
+    found = info.alternatives if find is None else find(rng, (tracked, info), view)
     return FollowedFrame(view.frame, tracked, info, found or Alternatives(tracked.state[None], np.array([info.cost])))
 
 

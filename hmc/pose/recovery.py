@@ -17,7 +17,7 @@ from dataclasses import astuple, dataclass, field, replace
 import numpy as np
 
 from hmc.body.exchange import swapped_pose
-from hmc.pose.method import StepInfo, Stepped, Tracked, other_rng
+from hmc.pose.method import StepInfo, StepResult, Tracked, other_rng
 from hmc.pose.objectives.objective import cost_at
 from hmc.pose.starts.window import StartSettings, candidates, search_all, walk_factor
 from hmc.pose.steps.polish import fine_objective
@@ -133,7 +133,7 @@ class Recovery:
         """Entries of the memory after a person's first frames, of these costs, shape (n,); NaN where there is none."""
         return _entry(loss_init(costs, self.settings))
 
-    def __call__(self, rng: np.random.Generator, before: Tracked, stepped: Stepped, view: PersonView) -> Stepped:
+    def __call__(self, rng: np.random.Generator, before: Tracked, stepped: StepResult, view: PersonView) -> StepResult:
         """The step's pose, or a fresh one where it was lost; what is known of that goes on in its memory.
 
         Parameters
@@ -200,6 +200,6 @@ class Recovery:
         return [(as_it_is, cost_at(objective, as_it_is)), search_all(rng, objective, turned, polish)]
 
 
-def _placed(tracked: Tracked, info: StepInfo, state: np.ndarray, cost: float) -> Stepped:
+def _placed(tracked: Tracked, info: StepInfo, state: np.ndarray, cost: float) -> StepResult:
     """A person put into another pose, at rest."""
     return replace(tracked, state=state, velocity=np.zeros_like(state)), replace(info, cost=cost)

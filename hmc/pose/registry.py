@@ -1,4 +1,4 @@
-"""The pose methods by name. A new method is one file and one line here; a stranger's is added with `register`.
+"""The pose methods by name. A new method is one file and one line here; a stranger's is added with `register_method`.
 
 Nothing heavy is imported until a method is made, so that the command line can list the names.
 
@@ -20,7 +20,7 @@ from hmc.plugins import load_plugins
 if TYPE_CHECKING:
     from hmc.pose.method import PoseMethod
 
-__all__ = ["BUILT_IN", "INITS", "METHODS", "MethodChoice", "MethodEntry", "pose_method", "register"]
+__all__ = ["BUILT_IN", "INITS", "METHODS", "MethodChoice", "MethodEntry", "pose_method", "register_method"]
 
 #: Where a start takes its candidates from.
 Init = Literal["hypotheses", "spectral"]
@@ -87,6 +87,12 @@ def pose_method(name: str, preset: str = "default", models: Sequence[str] = (), 
     ------
     InputError
         When there is no such method or preset, or the method has no use for what is said.
+
+    Examples
+    --------
+    >>> import hmc
+    >>> hmc.pose_method("pso", preset="hsiao2008").source
+    'Hsiao (2008)'
     """
     load_plugins()
     if name not in METHODS:
@@ -103,8 +109,10 @@ def pose_method(name: str, preset: str = "default", models: Sequence[str] = (), 
     return entry.make(MethodChoice(preset, models, cast("Init | None", init), skin))
 
 
-def register(method: PoseMethod, help: str = "") -> None:
+def register_method(method: PoseMethod, help: str = "") -> None:
     """Add a method under its name: from then on it is used by that name from Python, the command line and the experiments.
+
+    One that was added under the same name before is replaced.
 
     Parameters
     ----------
@@ -115,9 +123,17 @@ def register(method: PoseMethod, help: str = "") -> None:
     Raises
     ------
     InputError
-        When there is a method of this name.
+        When the package has a method of this name.
+
+    Examples
+    --------
+    >>> import hmc
+    >>> from dataclasses import replace
+    >>> hmc.register_method(replace(hmc.pose_method("apf"), name="apf-without-recovery", recover=None), "loses poses for good")
+    >>> hmc.METHODS.pop("apf-without-recovery").help
+    'loses poses for good'
     """
-    if method.name in METHODS:
+    if method.name in BUILT_IN:
         raise InputError(f"there is a pose method named {method.name!r} already; choose another name")
     METHODS[method.name] = MethodEntry(method.name, help or method.source, ("default",), lambda choice: method)
 

@@ -12,25 +12,42 @@ from hmc.plugins import load_plugins
 from hmc.tracking import naive, particle, sparse
 from hmc.tracking.method import Tracker, TrackerMethod
 
-__all__ = ["DEFAULT", "TRACKERS", "Tracker", "TrackerMethod", "make_tracker", "register"]
+__all__ = ["BUILT_IN", "DEFAULT", "TRACKERS", "Tracker", "TrackerMethod", "make_tracker", "register_tracker"]
 
 #: By name, in the order of Canton's tables.
 TRACKERS: dict[str, TrackerMethod] = {method.name: method for method in (naive.METHOD, sparse.METHOD, particle.METHOD)}
+#: Of these, the ones that come with the package.
+BUILT_IN = frozenset(TRACKERS)
 DEFAULT = "sparse"
 
 
-def register(method: TrackerMethod) -> TrackerMethod:
-    """The method, which can be chosen by its name from now on; one of the same name is replaced.
+def register_tracker(method: TrackerMethod) -> None:
+    """Add a tracker under its name: from then on it is used by that name from Python, the command line and the experiments.
+
+    One that was added under the same name before is replaced.
+
+    Parameters
+    ----------
+    method : TrackerMethod
 
     Raises
     ------
     InputError
-        When it has no preset "default".
+        When the package has a tracker of this name, or when it has no preset "default".
+
+    Examples
+    --------
+    >>> import hmc
+    >>> from dataclasses import replace
+    >>> hmc.register_tracker(replace(hmc.TRACKERS["naive"], name="centroids", summary="what fills the last place"))
+    >>> hmc.TRACKERS.pop("centroids").summary
+    'what fills the last place'
     """
+    if method.name in BUILT_IN:
+        raise InputError(f"there is a tracker named {method.name!r} already; choose another name")
     if "default" not in method.presets:
         raise InputError(f"the tracker `{method.name}` has no preset `default`; give it one")
     TRACKERS[method.name] = method
-    return method
 
 
 def make_tracker(name: str = DEFAULT, *, color: bool | None = None, particles: int | None = None, preset: str = "default") -> Tracker:

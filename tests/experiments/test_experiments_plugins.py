@@ -30,7 +30,7 @@ from dataclasses import replace
 import numpy as np
 
 from hmc.pose.method import PoseMethod, StepInfo, Tracked, unseen
-from hmc.pose.registry import register
+from hmc.pose.registry import register_method
 from hmc.pose.starts.window import StartSettings, WindowStart
 from hmc.pose.steps.polish import fine_objective
 from hmc.pose.steps.presets import PRESETS
@@ -53,7 +53,7 @@ def step(rng, tracked, view):
 
 # Few candidates and the usual proportions: a start that takes a second.
 START = WindowStart(replace(HOUSE, fit_body=None), StartSettings(anchors=1, candidates=2, follow_s=0.2))
-register(PoseMethod("random-search", "nobody (2026)", START, step))
+register_method(PoseMethod("random-search", "nobody (2026)", START, step))
 """
 #: The table of all methods, with one method's rows alone.
 EXPERIMENT = """

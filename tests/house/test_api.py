@@ -9,15 +9,17 @@ import pytest
 
 import hmc
 import hmc.api
+from hmc.pose import registry
+from hmc.tracking import trackers
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
 def examples() -> list:
     finder, found = doctest.DocTestFinder(recurse=False), []
-    for name in ("__init__", *hmc.api.__all__):
-        found += finder.find(hmc if name == "__init__" else getattr(hmc.api, name), f"hmc.{name}", globs={})
-    return found
+    for name in ("__init__", *hmc.api.__all__, "open_recording", "pose_method", "register_method", "register_tracker"):
+        found += finder.find(hmc if name == "__init__" else getattr(hmc.api, name, None) or getattr(hmc, name), f"hmc.{name}", globs={})
+    return found + finder.find(registry, "hmc.pose.registry") + finder.find(trackers, "hmc.tracking.trackers")
 
 
 @pytest.mark.parametrize("example", examples(), ids=lambda example: example.name)
@@ -54,7 +56,7 @@ def test_what_cannot_be_done_is_said(tmp_path):
     recording = hmc.open_recording(ROOT / "data" / "synthetic" / "tiny", frames=2)
     with pytest.raises(hmc.InputError, match="no pose method named 'magic'; there are apf"):
         hmc.pose(recording, method="magic")
-    with pytest.raises(hmc.InputError, match="works on detections"):
+    with pytest.raises(hmc.InputError, match="needs detections"):
         hmc.pose(recording, method="marker-apf")
     tracks = hmc.track(recording)
     with pytest.raises(hmc.InputError, match=r"must end in \.png"):

@@ -359,7 +359,7 @@ def test_legs_that_a_step_exchanged_are_told(case):
 
     assert errors().max() < 0.15
     if case == QUICK[0]:
-        assert errors(choose=None, legs=None)[4] > 0.4
+        assert errors(alternatives=None, legs=None)[4] > 0.4
 
 
 @each(HOUSE)

@@ -24,7 +24,7 @@ from hmc.pose.method import (
     unseen,
     with_particles,
 )
-from hmc.pose.registry import METHODS, pose_method, register
+from hmc.pose.registry import METHODS, pose_method, register_method
 from hmc.pose.steps.polish import PolishSettings, polished
 from hmc.pose.steps.presets import PRESETS
 from hmc.pose.steps.proposal import LEAST_SURFACE, Proposal, as_proposed
@@ -157,15 +157,16 @@ def still(name: str) -> PoseMethod:
     return PoseMethod(name, "made up", start=lambda *given: None, step=lambda rng, tracked, view: (tracked, StepInfo()))
 
 
-def test_a_registered_method_is_found_by_its_name_and_a_second_one_of_it_refused(monkeypatch):
+def test_a_registered_method_is_found_by_its_name_and_replaces_none_of_the_packages(monkeypatch):
     monkeypatch.setattr(registry, "METHODS", dict(METHODS))
     method = still("mine")
-    register(method, "does nothing")
+    register_method(method, "does nothing")
     assert pose_method("mine") is method and registry.METHODS["mine"].help == "does nothing"
-    for name in ("mine", "apf"):
-        with pytest.raises(InputError, match=f"'{name}' already"):
-            register(still(name))
-    assert pose_method("mine") is method
+    with pytest.raises(InputError, match="'apf' already"):
+        register_method(still("apf"))
+    again = still("mine")
+    register_method(again)
+    assert pose_method("mine") is again and pose_method("apf").settings is not None
     with pytest.raises(InputError, match="no preset named 'other' of method mine"):
         pose_method("mine", "other")
 
@@ -181,7 +182,7 @@ def test_the_papers_presets_recover_nothing_and_decide_over_no_alternatives():
     for name, entry in METHODS.items():
         for preset in entry.presets[1:]:
             method = pose_method(name, preset)
-            assert (method.recover, method.legs, method.choose) == (None, None, None), (name, preset)
+            assert (method.recover, method.legs, method.alternatives) == (None, None, None), (name, preset)
 
 
 def test_people_are_tracked_unless_detections_are_all_that_is_read():

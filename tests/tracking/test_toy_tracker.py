@@ -18,7 +18,7 @@ from hmc.io.recording import open_recording
 from hmc.io.results import TrackTable, read_run, read_tracks, write_tracks
 from hmc.tracking import resumable
 from hmc.tracking.method import TrackerMethod
-from hmc.tracking.trackers import TRACKERS, make_tracker, register
+from hmc.tracking.trackers import TRACKERS, make_tracker, register_tracker
 
 FRAMES, N = 24, 15  # later the two touch
 #: Each component goes to the person expected nearest to it, at constant velocity; what is left begins a person.
@@ -30,7 +30,7 @@ import numpy as np
 from hmc.tracking.method import TrackerMethod
 from hmc.tracking.settings import FollowingSettings
 from hmc.tracking.state import TrackerInfo, TrackRow
-from hmc.tracking.trackers import register
+from hmc.tracking.trackers import register_tracker
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ def step(rng, state, frame, observation, settings):
     return replace(state, arrays={"places": places, "speeds": speeds}), TrackerInfo(tuple(rows))
 
 
-register(TrackerMethod("toy", "these tests", "nearest components", step, {"default": ToySettings(), "near": ToySettings(0.1)}))
+register_tracker(TrackerMethod("toy", "these tests", "nearest components", step, {"default": ToySettings(), "near": ToySettings(0.1)}))
 """
 
 
@@ -141,6 +141,11 @@ def test_an_experiment_takes_it_by_name(toy, folder, tmp_path):
     assert results["objects"] == 2 * N and results["matches"] == 2 * N and results["mismatches"] == 0
 
 
+def test_a_tracker_of_the_package_is_not_replaced(toy):
+    with pytest.raises(InputError, match="'naive' already"):
+        register_tracker(TrackerMethod("naive", "", "", toy.step, toy.presets))
+
+
 def test_a_method_without_its_default_preset_is_refused(toy):
     with pytest.raises(InputError, match="no preset `default`"):
-        register(TrackerMethod("half", "", "", toy.step, {"other": toy.presets["default"]}))
+        register_tracker(TrackerMethod("half", "", "", toy.step, {"other": toy.presets["default"]}))

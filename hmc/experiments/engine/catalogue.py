@@ -39,7 +39,7 @@ _CLEAR, _HUMANEVA = "CLEAR 2007", "HumanEva-I"
 _OWN_VIDEOS = "recordings of the author's own"
 
 _SMALL_MEETING = (
-    "In the rendered meetings every tracker follows everybody: what tells them apart in the thesis are probably losses and false people, "
+    "In the rendered meetings every tracker follows all persons: what tells them apart in the thesis are probably losses and false people, "
     "and creation and deletion, which all trackers share, leave none here. With the parameters as printed, samples do not move on with who "
     "walks."
 )

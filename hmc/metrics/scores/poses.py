@@ -126,7 +126,7 @@ def evaluate_pose(estimate: PoseTable, truth: PoseTable, thresholds_m: Sequence[
         "person_frames": with_truth,
         "person_frames_estimated": covered,
         "coverage": covered / with_truth if with_truth else float("nan"),
-        "person_frames_of_nobody": int(unmatched.sum()),
+        "person_frames_unmatched": int(unmatched.sum()),
         "initialisation_mean_mm": _mean_mm(np.array(first)),
         "tracking_mean_mm": _mean_mm(np.concatenate(later)) if later else float("nan"),
         "sides_exchanged_mean_mm": _mean_mm(np.concatenate([_frame_means(_with_sides_exchanged(person)) for person in persons])),

@@ -52,7 +52,7 @@ def annealed_method(preset: PosePreset, name: str = "apf") -> PoseMethod:
         step=annealed_pose_step(preset),
         equip=partial(annealed_subject, preset=preset),
         recover=Recovery(preset) if refines else None,
-        choose=TellLegs(preset.polish) if refines else None,
+        alternatives=TellLegs(preset.polish) if refines else None,
         legs=LegSettings() if refines else None,
         limits=canton_limits() if preset.body == "canton" else default_limits(),
         settings=preset,

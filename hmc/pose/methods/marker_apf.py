@@ -13,7 +13,7 @@ from hmc.body.model import BodyModel
 from hmc.body.proportions import canton_body, default_body
 from hmc.errors import InputError
 from hmc.pose.legs import LegSettings
-from hmc.pose.method import Capture, FrameRng, PoseMethod, StartPose, Stepped, Tracked, begin_tracking, make_subject, other_rng
+from hmc.pose.method import Capture, FrameRng, PoseMethod, StartPose, StepResult, Tracked, begin_tracking, make_subject, other_rng
 from hmc.pose.objectives.marker_points import find_points
 from hmc.pose.steps.marker_filter import TIPS, MarkerPreset, marker_frame, on_markers, with_tips
 from hmc.pose.steps.marker_search import LEAST_POINTS, left_over, start_poses
@@ -153,7 +153,7 @@ class MarkerRecovery:
         """Nothing is lost."""
         return {_LOST: np.zeros(1)}
 
-    def __call__(self, rng: np.random.Generator, before: Tracked, stepped: Stepped, view: PersonView) -> Stepped:
+    def __call__(self, rng: np.random.Generator, before: Tracked, stepped: StepResult, view: PersonView) -> StepResult:
         """The step's pose, or a first one of this frame, from which the next goes on."""
         tracked, info = stepped
         lost = 0.0 if info.status == "fitted" else float(before.memory.get(_LOST, np.zeros(1))[0]) + 1

@@ -104,7 +104,7 @@ def pso_method(preset: SwarmPreset, house: PosePreset | None = None) -> PoseMeth
         needs=NEEDS,
         equip=equip,
         recover=Recovery(house),
-        choose=TellLegs(house.polish),
+        alternatives=TellLegs(house.polish),
         legs=LegSettings(),
         settings={"swarm": preset, "house": house},
     )

@@ -48,12 +48,12 @@ class DaVinciStart:
     Parameters
     ----------
     preset : SmdPreset
-    otherwise : PosePreset
-        Whose start is used where no frame shows that. The paper says nothing of it: this is ours.
+    otherwise : WindowStart
+        Where no frame shows that. The paper says nothing of it: this is ours.
     """
 
     preset: SmdPreset
-    otherwise: PosePreset = field(default_factory=lambda: replace(PRESETS["default"], start="spectral"))
+    otherwise: WindowStart = field(default_factory=lambda: WindowStart(replace(PRESETS["default"], start="spectral")))
 
     def __call__(
         self, frame_rng: FrameRng, views: Sequence[PersonView], capture: Capture, height_m: float | None = None
@@ -67,7 +67,7 @@ class DaVinciStart:
             seen, targets = [one.skin for one in views], [one.target for one in views]
             tracker, settled = begin(other_rng(frame_rng(k), SETTLING), self.preset, first, seen, targets, height_m is not None)
             return StartPose(make_subject(tracker.body.skeleton, capture), k, settled.state, with_colors(settled.colors))
-        started = WindowStart(self.otherwise)(frame_rng, views, capture, height_m)
+        started = self.otherwise(frame_rng, views, capture, height_m)
         if started is None:
             return None
         state = started.state.copy()
@@ -88,7 +88,7 @@ def smd_method(preset: SmdPreset, house: PosePreset | None = None) -> PoseMethod
     equip = partial(solid_subject, preset=preset)
     if house is None:
         start = DaVinciStart(preset)
-        settings = {"descent": preset, "without_da_vinci": start.otherwise}
+        settings = {"descent": preset, "without_da_vinci": start.otherwise.preset}
         return PoseMethod("smd", "Kehl and Van Gool (2006)", start, as_proposed(descended()), NEEDS, equip, settings=settings)
     return PoseMethod(
         "smd",
@@ -98,7 +98,7 @@ def smd_method(preset: SmdPreset, house: PosePreset | None = None) -> PoseMethod
         needs=NEEDS,
         equip=equip,
         recover=Recovery(house),
-        choose=TellLegs(house.polish),
+        alternatives=TellLegs(house.polish),
         legs=LegSettings(),
         settings={"descent": preset, "house": house},
     )

@@ -14,7 +14,7 @@ import numpy as np
 
 from hmc.body.model import BodyModel
 
-__all__ = ["Linearised", "Misfit", "Objective", "Sum", "cost_at"]
+__all__ = ["Linearisation", "Misfit", "Objective", "Sum", "cost_at"]
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Misfit:
     distance: np.ndarray
 
 
-class Linearised(Protocol):
+class Linearisation(Protocol):
     """An objective at one state.
 
     Attributes
@@ -73,7 +73,7 @@ class Objective(Protocol):
     def by_part(self, states: np.ndarray) -> np.ndarray | None:
         """The share of each of `hmc.body.model.PARTS` in the cost, shape (n, n_parts); None where it cannot be told."""
 
-    def linearise(self, state: np.ndarray, near: Any = None) -> Linearised:
+    def linearise(self, state: np.ndarray, near: Any = None) -> Linearisation:
         """Residuals at a state (27,), with what it takes to tell how they change."""
 
     def coarser(self, rng: np.random.Generator, n: int) -> Objective:
@@ -84,7 +84,7 @@ class Objective(Protocol):
 class _SummedAt:
     """Several objectives at one state."""
 
-    parts: tuple[Linearised, ...]
+    parts: tuple[Linearisation, ...]
 
     @property
     def residuals(self) -> np.ndarray:
@@ -138,7 +138,7 @@ class Sum:
         told = [share for share in shares if share is not None]
         return np.sum(told, axis=0) if len(told) == len(shares) else None
 
-    def linearise(self, state: np.ndarray, near: Any = None) -> Linearised:
+    def linearise(self, state: np.ndarray, near: Any = None) -> Linearisation:
         """The residuals of all, one after the other."""
         before = near or (None,) * len(self.parts)
         return _SummedAt(tuple(one.linearise(state, other) for one, other in zip(self.parts, before, strict=True)))

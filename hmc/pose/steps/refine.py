@@ -10,12 +10,12 @@ import numpy as np
 
 from hmc.body.joints import N_DOF
 from hmc.body.kinematics import landmarks
-from hmc.pose.objectives.objective import Linearised, Misfit, Objective
+from hmc.pose.objectives.objective import Linearisation, Misfit, Objective
 from hmc.search.gauss_newton import GaussNewtonSettings, GaussNewtonState, LeastSquares, gauss_newton_init, gauss_newton_run
 
 __all__ = ["RefineInfo", "RefineSettings", "refine", "refine_all", "refine_best"]
 
-_Trial: TypeAlias = GaussNewtonState[Linearised]
+_Trial: TypeAlias = GaussNewtonState[Linearisation]
 
 
 @dataclass(frozen=True)
@@ -177,7 +177,7 @@ def refine_all(
 
 def _problem(
     objective: Objective, settings: RefineSettings, free: np.ndarray | None = None, deviation: np.ndarray | None = None
-) -> LeastSquares[Linearised]:
+) -> LeastSquares[Linearisation]:
     """All angles free, and held by .1 m and .5 rad, where nothing else is said."""
     deviation = np.r_[np.full(3, 0.1), np.full(N_DOF - 3, 0.5)] if deviation is None else deviation
     limits = objective.body.limits
