@@ -215,9 +215,10 @@ def pose(
     >>> list(people.to_frame().columns)
     ['frame', 'person', 'joint', 'x', 'y', 'z']
     """
-    from hmc.pose.follow import FollowOptions, RunOptions, follow
+    from hmc.pose.follow import FollowOptions, follow
     from hmc.pose.registry import pose_method
     from hmc.pose.smoothing import smooth_people
+    from hmc.voxels.run_options import RunOptions
 
     recording, method = _opened(recording), pose_method(method) if isinstance(method, str) else method
     height = None if height_m == "auto" else recording.known_height_m if height_m is None else height_m
@@ -311,6 +312,7 @@ def _opened(recording: Recording | str | Path) -> Recording:
 def _tracked(recording: Recording, tracker: str | Tracker, seed: int, voxel_size_m: float, masks: Path | None = None) -> TrackTable:
     from hmc.tracking.resumable import track_recording
     from hmc.tracking.trackers import make_tracker
+    from hmc.voxels.run_options import RunOptions
 
     chosen = make_tracker(tracker) if isinstance(tracker, str) else tracker
-    return track_recording(recording, voxel_size_m, chosen, seed=seed, masks=masks, key=_KEY)
+    return track_recording(recording, voxel_size_m, chosen, seed, RunOptions(masks=masks, key=_KEY))

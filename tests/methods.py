@@ -11,7 +11,7 @@ from hmc.camera.model import project
 from hmc.io.detections import DetectionTable
 from hmc.io.recording import Recording, open_recording
 from hmc.io.results import TrackTable, read_centroids, read_joints
-from hmc.pose.follow import FollowOptions, PosedPeople, RunOptions, follow
+from hmc.pose.follow import FollowOptions, PosedPeople, follow
 from hmc.pose.method import PoseMethod
 from hmc.pose.methods import pso, smd
 from hmc.pose.recovery import Recovery
@@ -26,6 +26,7 @@ from hmc.pose.views.person_view import PersonView, views_of
 from hmc.search.filters import AnnealedSettings
 from hmc.tracking.resumable import person_grid
 from hmc.voxels.hulls import HullStep, stream_hulls
+from hmc.voxels.run_options import RunOptions
 
 TINY = Path(__file__).resolve().parents[1] / "data" / "synthetic" / "tiny"
 VOXEL_M, HEIGHT_M, MOST_FRAMES = 0.05, 1.76, 7

@@ -98,10 +98,11 @@ def run(args: argparse.Namespace) -> int:
     from hmc.io.files import to_toml
     from hmc.io.fits import write_fits
     from hmc.io.results import write_joints, write_pose, write_run, write_tracks
-    from hmc.pose.follow import FollowOptions, RunOptions, follow
+    from hmc.pose.follow import FollowOptions, follow
     from hmc.pose.smoothing import smooth_people
-    from hmc.tracking.resumable import person_grid
+    from hmc.tracking.resumable import person_grid, track_recording
     from hmc.voxels.hulls import FrontendSettings
+    from hmc.voxels.run_options import RunOptions
 
     plugins = load_given_plugins(args)
     method = pose_method(args.method, args.preset, args.model, args.init, args.markers == "skin")
@@ -139,23 +140,17 @@ def run(args: argparse.Namespace) -> int:
         return 0
 
     problems: list[str] = [*recording.problems]
-    masks = args.out / MASKS if tracked else None
-    tracks = _track(args, recording, (tracker, frontend), key, problems) if tracked else None
+
+    def kept(journal: str, what: str) -> RunOptions:
+        """The run of a stage; the tracker leaves its silhouettes for the poses."""
+        masks = args.out / MASKS if tracked else None
+        return RunOptions(
+            frontend, args.out / journal, masks, key, problems.append, lambda steps, total: progress(steps, total, what, args.quiet)
+        )
+
+    tracks = track_recording(recording, args.track_voxel, tracker, args.seed, kept(JOURNAL, "track")) if tracked else None
     detections = None if markers is None else markers.table(args, key, problems)
-    people = follow(
-        recording,
-        tracks,
-        method,
-        FollowOptions(args.voxel, args.seed, height, detections),
-        RunOptions(
-            frontend=frontend,
-            journal=args.out / POSE_JOURNAL,
-            masks=masks,
-            key=key,
-            on_problem=problems.append,
-            progress=lambda steps, total: progress(steps, total, "pose", args.quiet),
-        ),
-    )
+    people = follow(recording, tracks, method, FollowOptions(args.voxel, args.seed, height, detections), kept(POSE_JOURNAL, "pose"))
     if markers is not None:
         markers.refuse_nothing(people)
     if args.smooth:
@@ -173,25 +168,6 @@ def run(args: argparse.Namespace) -> int:
     _tell(people, recording, paths["joints.csv"])
     print_problems(problems)
     return 0
-
-
-def _track(args: argparse.Namespace, recording, how, key: str, problems: list[str]):
-    """The tracks, with the silhouettes kept for the poses."""
-    from hmc.tracking.resumable import track_recording
-
-    tracker, frontend = how
-    return track_recording(
-        recording,
-        args.track_voxel,
-        tracker,
-        frontend,
-        seed=args.seed,
-        journal=args.out / JOURNAL,
-        masks=args.out / MASKS,
-        key=key,
-        on_problem=problems.append,
-        progress=lambda steps, total: progress(steps, total, "track", args.quiet),
-    )
 
 
 def _pelvis_tracks(people):

@@ -85,6 +85,7 @@ def run(args: argparse.Namespace) -> int:
     from hmc.io.results import read_tracks, write_run, write_tracks
     from hmc.tracking.resumable import Timing, track_recording
     from hmc.voxels.hulls import FrontendSettings
+    from hmc.voxels.run_options import RunOptions
 
     plugins, recording = load_given_plugins(args), open_selected(args)
     tracker, frontend = selected_tracker(args), FrontendSettings()
@@ -112,18 +113,14 @@ def run(args: argparse.Namespace) -> int:
 
     problems: list[str] = [*recording.problems]
     timings: list[Timing] = []
-    table = track_recording(
-        recording,
-        args.voxel,
-        tracker,
+    run = RunOptions(
         frontend,
-        seed=args.seed,
-        journal=journal,
+        journal,
         key=key,
         on_problem=problems.append,
-        on_timing=timings.append,
         progress=lambda steps, total: progress(steps, total, "track", args.quiet),
     )
+    table = track_recording(recording, args.voxel, tracker, args.seed, run, timings.append)
     write_tracks(tracks_path, table)
     speed = {name: value for timing in timings for name, value in _speed(timing, recording.fps).items()}
     write_run(run_path, tracker.name, parameters, args.seed, **source, problems=list(dict.fromkeys(problems)), speed=speed)

@@ -17,13 +17,14 @@ from hmc.experiments.five_actions import ACTIONS, ACTORS, action_name
 from hmc.experiments.truth import estimate_of, first_truth
 from hmc.io.recording import Recording, open_recording
 from hmc.io.results import TrackTable, read_tracks, write_tracks
-from hmc.pose.follow import FollowOptions, PosedPeople, RunOptions, follow
+from hmc.pose.follow import FollowOptions, PosedPeople, follow
 from hmc.pose.method import PoseMethod
 from hmc.pose.methods.annealed import annealed_method
 from hmc.pose.steps.presets import PRESETS, PosePreset
 from hmc.pose.steps.refine import RefineSettings
 from hmc.tracking.resumable import track_recording
 from hmc.voxels.hulls import FrontendSettings, HullStep
+from hmc.voxels.run_options import RunOptions
 
 __all__ = [
     "EVERYTHING", "FAMILY", "FRONTEND", "MASKS_KEY", "SWITCHES", "TRACK_VOXEL_M", "VOXEL_M", "TrackedRecording", "Way",
@@ -112,9 +113,8 @@ def tracked(inputs: Inputs, label: str, cameras: int) -> TrackedRecording:
 
     def make(part: Path) -> None:
         part.mkdir()
-        tracks = track_recording(
-            recording, TRACK_VOXEL_M, frontend=FRONTEND, masks=part / "masks", key=MASKS_KEY, on_problem=lambda line: None
-        )
+        run = RunOptions(FRONTEND, masks=part / "masks", key=MASKS_KEY, on_problem=lambda line: None)
+        tracks = track_recording(recording, TRACK_VOXEL_M, run=run)
         write_tracks(part / "tracks.csv", tracks)
 
     folder = once(inputs.folder / label / f"tracks-{len(recording.rig)}-cameras", make)

@@ -6,10 +6,9 @@ in memory. Records of what is decided go to a journal, so that a run that was st
 
 from __future__ import annotations
 
-import logging
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -30,11 +29,10 @@ from hmc.pose.views.person_view import IMAGES_FOR, PersonView, check_needs, view
 from hmc.tracking.resumable import WARM_UP_FRAMES, person_grid
 from hmc.tracking.tracks import velocities
 from hmc.voxels.grid import VoxelGrid
-from hmc.voxels.hulls import FrontendSettings, HullStep, stream_hulls
+from hmc.voxels.hulls import HullStep, stream_hulls
+from hmc.voxels.run_options import RunOptions
 
-__all__ = ["FollowOptions", "PosedPeople", "RunOptions", "follow", "only_person", "persons_of", "unfitted_notes"]
-
-logger = logging.getLogger("hmc")
+__all__ = ["FollowOptions", "PosedPeople", "follow", "only_person", "persons_of", "unfitted_notes"]
 
 
 @dataclass(frozen=True)
@@ -124,33 +122,6 @@ class FollowOptions:
     detections: DetectionTable | None = None
 
 
-@dataclass(frozen=True)
-class RunOptions:
-    """How a run is kept and told of.
-
-    Parameters
-    ----------
-    frontend : FrontendSettings or None
-    journal : path, optional
-        File in which the run is kept, and from which it goes on.
-    masks : path, optional
-        File in which silhouettes were kept under the same key; where it lacks any that are needed, they are made again.
-    key : str
-        Says what the run depends on. A journal with another key is begun anew.
-    on_problem : callable, optional
-        Called with one line for everything that was survived.
-    progress : callable, optional
-        ``progress(steps, total)`` passes the frames on and may show how far they are.
-    """
-
-    frontend: FrontendSettings | None = None
-    journal: str | Path | None = None
-    masks: str | Path | None = None
-    key: str = ""
-    on_problem: Callable[[str], None] = field(default=logger.warning)
-    progress: Callable[[Iterable, int], Iterable] | None = None
-
-
 def follow(
     recording: Recording,
     tracks: TrackTable | None,
@@ -191,7 +162,7 @@ def follow(
         states[decided.person] = resumed(task, states[decided.person], decided)
     left = {number: person.frames[person.frames > states[number].done_to] for number, person in persons.items()}
     first = min((int(frames[0]) for frames in left.values() if len(frames)), default=None)
-    for views in () if first is None else _views_from(recording, tracks, method, (options, run), first):
+    for views in () if first is None else _views_from(recording, tracks, method, options, run, first):
         for number, view in views.items():
             before = states[number].done_to
             if view.frame <= before:
@@ -205,10 +176,9 @@ def follow(
 
 
 def _views_from(
-    recording: Recording, tracks: TrackTable, method: PoseMethod, how: tuple[FollowOptions, RunOptions], first: int
+    recording: Recording, tracks: TrackTable, method: PoseMethod, options: FollowOptions, run: RunOptions, first: int
 ) -> Iterator[dict[int, PersonView]]:
     """What each frame shows of every person, from the first that one still needs to the end of the selection."""
-    options, run = how
     end = recording.start + recording.n_frames
     if not method.needs_tracks:
         frames: Iterable = range(first, end)

@@ -219,13 +219,19 @@ def arms_by_hands(skeleton: Skeleton, targets: np.ndarray, frame: str = "chest",
 def pelvis_height(
     skeleton: Skeleton, pelvis_xy: np.ndarray, yaw: np.ndarray, feet: Feet, slack: float = 0.996, smooth: float = 2.0
 ) -> np.ndarray:
-    """As high as the legs allow: the height of the pelvis at which the more stretched leg is straight to a fraction ``slack``, (n,).
+    """As high as the legs allow: the height of the pelvis, (n,), metres.
 
     Parameters
     ----------
+    skeleton : Skeleton
     pelvis_xy : ndarray, shape (n, 2)
+        Metres.
     yaw : ndarray, shape (n,)
         Heading of the pelvis, radians.
+    feet : Feet
+        Where the ankles are.
+    slack : float
+        To this fraction of its length the more stretched leg is straight.
     smooth : float
         Standard deviation of the smoothing over frames.
     """

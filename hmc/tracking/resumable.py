@@ -9,7 +9,6 @@ without a stop; later on the background has adapted to the last frames only, whi
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable, Iterable
 from dataclasses import astuple, dataclass, field, replace
 from pathlib import Path
@@ -29,11 +28,10 @@ from hmc.tracking.trackers import Tracker, make_tracker
 from hmc.tracking.tracks import frame_rng, table_of
 from hmc.tracking.views import FrameViews
 from hmc.voxels.grid import VoxelGrid
-from hmc.voxels.hulls import FrontendSettings, HullStep, stream_hulls
+from hmc.voxels.hulls import HullStep, stream_hulls
+from hmc.voxels.run_options import RunOptions
 
 __all__ = ["WARM_UP_FRAMES", "Timing", "observe_step", "person_grid", "track_recording"]
-
-logger = logging.getLogger("hmc")
 
 CHECKPOINT_FRAMES = 25
 WARM_UP_FRAMES = 300
@@ -45,15 +43,9 @@ def track_recording(
     recording: Recording,
     voxel_size_m: float = 0.05,
     tracker: Tracker | None = None,
-    frontend: FrontendSettings | None = None,
-    *,
     seed: int = 0,
-    journal: str | Path | None = None,
-    masks: str | Path | None = None,
-    key: str = "",
-    on_problem: Callable[[str], None] | None = None,
+    run: RunOptions | None = None,
     on_timing: Callable[[Timing], None] | None = None,
-    progress: Callable[[Iterable[HullStep], int], Iterable[HullStep]] | None = None,
 ) -> TrackTable:
     """The tracks of all persons in the selection.
 
@@ -63,21 +55,11 @@ def track_recording(
     voxel_size_m : float
     tracker : Tracker, optional
         By default as `hmc.tracking.trackers.make_tracker`.
-    frontend : FrontendSettings, optional
     seed : int
         Of the tracker's random numbers.
-    journal : path, optional
-        File in which the run is kept, and from which it goes on.
-    masks : path, optional
-        File in which all silhouettes are kept for a later pass (`hmc.io.masks`).
-    key : str
-        Says what the run depends on. A journal with another key is begun anew.
-    on_problem : callable, optional
-        Called with one line for everything that was survived.
+    run : RunOptions, optional
     on_timing : callable, optional
         Called at the end with the time that was spent.
-    progress : callable, optional
-        ``progress(steps, total)`` passes the steps on and may show how far they are.
 
     Returns
     -------
@@ -89,27 +71,26 @@ def track_recording(
     InputError
         When the voxels are too coarse, or too many for the memory.
     """
-    tracker = make_tracker() if tracker is None else tracker
+    tracker, run = tracker or make_tracker(), run or RunOptions()
     grid = person_grid(recording, voxel_size_m)
-    done = _resumed(journal, key, recording)
+    done = _resumed(run.journal, run.key, recording)
     state, rows, problems = done.state, list(done.rows), list(done.problems)
-    report = on_problem or logger.warning
 
     def note(line: str) -> None:
         problems.append(line)
-        report(line)
+        run.on_problem(line)
 
     for line in problems:
-        report(line)
+        run.on_problem(line)
     if len(recording.rig) < 2:
-        report("one camera does not tell how far away people are; two at least are needed to find them, better four")
+        run.on_problem("one camera does not tell how far away people are; two at least are needed to find them, better four")
     end = recording.start + recording.n_frames
-    stream = stream_hulls(recording, grid, frontend, first=done.next_frame, warm_up=WARM_UP_FRAMES, on_problem=note)
-    if masks is not None:
-        stream = keep_masks(masks, key, done.next_frame, stream, note)
+    stream = stream_hulls(recording, grid, run.frontend, first=done.next_frame, warm_up=WARM_UP_FRAMES, on_problem=note)
+    if run.masks is not None:
+        stream = keep_masks(run.masks, run.key, done.next_frame, stream, note)
     hulls: Iterable[HullStep] = stream if done.next_frame < end else ()
     timing, before = done.timing, perf_counter()
-    for hull in progress(hulls, end - done.next_frame) if progress else hulls:
+    for hull in run.progress(hulls, end - done.next_frame) if run.progress else hulls:
         observation = observe_step(recording, grid, hull, images=tracker.color)
         begun = thread_time()
         state, info = tracker.step(frame_rng(seed, hull.index), state, hull.index, observation)
@@ -119,9 +100,9 @@ def track_recording(
         before = now
         rows += info.rows
         n_frames = hull.index + 1 - recording.start
-        if journal is not None and (n_frames % CHECKPOINT_FRAMES == 0 or n_frames == recording.n_frames):
+        if run.journal is not None and (n_frames % CHECKPOINT_FRAMES == 0 or n_frames == recording.n_frames):
             now_done = CompletedFrames(hull.index + 1, state, tuple(rows), tuple(problems), timing)
-            append_journal(journal, _record(now_done, since=done))
+            append_journal(run.journal, _record(now_done, since=done))
             done, before = now_done, perf_counter()
     rows += finish(state, recording.n_frames, tracker.following)
     if on_timing is not None:

@@ -199,7 +199,7 @@ def test_library_neither_prints_nor_asserts():
     assert not printing + asserting
 
 
-def test_random_numbers_come_from_a_generator_that_is_given():
+def test_no_random_numbers_without_a_seed():
     made = [
         where(path, node)
         for path, tree in trees(but=("cli",))

@@ -36,12 +36,13 @@ from hmc.io.masks import keep_masks
 from hmc.io.recording import open_recording
 from hmc.io.results import TrackTable
 from hmc.landmarks import landmark_index
-from hmc.pose.follow import FollowOptions, PosedPeople, RunOptions, follow
+from hmc.pose.follow import FollowOptions, PosedPeople, follow
 from hmc.pose.method import Capture, begin_tracking
 from hmc.pose.recovery import LossSettings
 from hmc.pose.registry import METHODS
 from hmc.tracking.resumable import person_grid
 from hmc.voxels.hulls import stream_hulls, stream_masks
+from hmc.voxels.run_options import RunOptions
 
 APF, CANTON, MARKERS = ("apf", "default"), ("apf", "canton2009"), ("marker-apf", "default")
 FRAMES = MOST_FRAMES

@@ -19,6 +19,7 @@ from hmc.io.results import TrackTable, read_run, read_tracks, write_tracks
 from hmc.tracking import resumable
 from hmc.tracking.method import TrackerMethod
 from hmc.tracking.trackers import TRACKERS, make_tracker, register_tracker
+from hmc.voxels.run_options import RunOptions
 
 FRAMES, N = 24, 15  # later the two touch
 #: Each component goes to the person expected nearest to it, at constant velocity; what is left begins a person.
@@ -114,9 +115,10 @@ def test_a_stopped_run_takes_its_arrays_from_the_journal(toy, folder, tmp_path, 
 
     tracker, journal = replace(toy, step=dying).tracker(), tmp_path / "journal"
     whole = resumable.track_recording(open_recording(folder), 0.08, toy.tracker())
+    run = RunOptions(journal=journal)
     with pytest.raises(KeyboardInterrupt):
-        resumable.track_recording(open_recording(folder), 0.08, tracker, journal=journal)
-    assert same(resumable.track_recording(open_recording(folder), 0.08, tracker, journal=journal), whole)
+        resumable.track_recording(open_recording(folder), 0.08, tracker, run=run)
+    assert same(resumable.track_recording(open_recording(folder), 0.08, tracker, run=run), whole)
     assert [calls.count(frame) for frame in (0, 9, 10, 12, 14)] == [1, 1, 2, 2, 1]
 
 

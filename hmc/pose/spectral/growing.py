@@ -36,6 +36,8 @@ class GrowSettings:
         When branches meet.
     outlier_error, most_outliers : float, int
         OT2, in median distances of all nodes from the origin, and OT1, nodes of a branch.
+    reach : float
+        How far a step looks for the next nodes of a branch, as a share of its first node's distance from the origin.
     most_branches, least_nodes : int
         How many branches Sundaresan's method takes, and how small they may be.
     """

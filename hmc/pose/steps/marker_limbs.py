@@ -44,7 +44,7 @@ REFINE_STEPS = 12
 _EXCHANGES: tuple[Literal["legs", "arms"], ...] = ("legs", "arms")
 #: A pose with exchanged legs or arms that strains more than the present one times this is not refined.
 EXCHANGE_RATIO = 1.3
-#: What an angle one spread (`hmc.pose.objectives.symmetric.posture_spread`) away from rest costs, square metres.
+#: What an angle one spread (`hmc.body.prior.posture_spread`) away from rest costs, square metres.
 POSTURE_WEIGHT = 1e-5
 
 

@@ -1,6 +1,7 @@
 """What one frame shows of one person: everything that a pose method may read of a frame, in crops around the person.
 
-A frame is labelled once and its voxels are shared out among the people once (`views_of`); what each method needs is made of that.
+A frame of hulls is labelled once and its voxels are shared out among the people once (`views_of`), by the rule of the trackers' `default`
+whichever tracker found the people; what each method needs is made of that.
 """
 
 from __future__ import annotations

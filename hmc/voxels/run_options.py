@@ -1,0 +1,40 @@
+"""How a run over a whole recording is kept and told of: what trackers and pose methods share."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from hmc.voxels.hulls import FrontendSettings
+
+__all__ = ["RunOptions"]
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """How a run is kept and told of.
+
+    Parameters
+    ----------
+    frontend : FrontendSettings or None
+    journal : path, optional
+        File in which the run is kept, and from which it goes on.
+    masks : path, optional
+        File of silhouettes (`hmc.io.masks`): a tracker keeps all of them there; poses use those that were kept under the same key, and
+        make what is lacking again.
+    key : str
+        Says what the run depends on. A journal with another key is begun anew.
+    on_problem : callable, optional
+        Called with one line for everything that was survived.
+    progress : callable, optional
+        ``progress(steps, total)`` passes the frames on and may show how far they are.
+    """
+
+    frontend: FrontendSettings | None = None
+    journal: str | Path | None = None
+    masks: str | Path | None = None
+    key: str = ""
+    on_problem: Callable[[str], None] = field(default=logging.getLogger("hmc").warning)
+    progress: Callable[[Iterable, int], Iterable] | None = None
