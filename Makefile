@@ -3,6 +3,7 @@
 #   make test    the quick tests           make test-all  all tests, the slow ones too (real kills, whole chains, notebooks)
 #   make lint    style and types
 #   make bench   measured speed            make docs    pages of the functions and of the notebooks, in out/pages
+#   make figures tables of the pages, from results/
 #   make clean   remove what the others made
 
 PYTHON ?= python3
@@ -18,7 +19,7 @@ export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help setup demo test test-all lint bench docs clean
+.PHONY: help setup demo test test-all lint bench docs figures clean
 help:
 	@sed -n 's/^#   //p' Makefile
 
@@ -56,6 +57,9 @@ lint: $(READY)
 
 bench: $(READY)
 	@for file in benchmarks/bench_*.py; do echo "== $$file"; $(PY) $$file || exit 1; done
+
+figures: $(READY)
+	$(PY) docs/make_tables.py
 
 docs: $(READY)
 	@$(PY) -m pip install -qq --root-user-action=ignore -e ".[docs]"

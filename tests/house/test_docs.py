@@ -3,6 +3,8 @@
 import importlib
 import re
 import shlex
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -78,6 +80,12 @@ def test_tests_that_pages_name_are_there():
     tests = {(page, code) for page, code in named if code.startswith("test_")}
     assert len(tests) > 10
     assert not sorted((page, code) for page, code in tests if code not in there)
+
+
+def test_tables_are_those_of_the_stored_results():
+    done = subprocess.run([sys.executable, "docs/make_tables.py", "--check"], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "<!-- table: all-methods -->\n| `--method` |" in README.read_text(encoding="utf-8")
 
 
 def anchor_of(heading):
