@@ -13,11 +13,11 @@ from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.ticker import LogLocator
 
 from hmc.experiments.by_action import pose_scores
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs
-from hmc.experiments.engine.style import COLORS
 from hmc.experiments.five_actions import action_title
 from hmc.experiments.markerless_runs import VOXEL_M, action_sources, pose_results, run_method, tracked
 from hmc.experiments.truth import stature_m
@@ -163,15 +163,20 @@ def _scores(cells: Sequence[Cell]) -> dict[str, Any]:
 
 
 def _draw(rows: Sequence[dict[str, Any]]) -> plt.Figure:
-    """Mean error and frames a second, a mark an action."""
-    figure, axes = plt.subplots(figsize=(5.2, 3.4))
-    colors = list(dict.fromkeys(COLORS.values()))
-    for k, name in enumerate(dict.fromkeys(row["method"] for row in rows)):
+    """Mean error and frames a second, a mark an action: a color a method, crosses for the papers' presets."""
+    figure, axes = plt.subplots(figsize=(6.4, 3.4))
+    colors: dict[str, Any] = {}
+    for name in dict.fromkeys(row["method"] for row in rows):
         own = [row for row in rows if row["method"] == name and row["frames_per_s"]]
+        method, _, preset = name.partition(" ")
+        color = colors.setdefault(method, plt.get_cmap("tab10")(len(colors)))
         speed, error = [row["frames_per_s"] for row in own], [row["mean_mm"] for row in own]
-        axes.scatter(speed, error, s=18, color=colors[k % len(colors)], label=name)
-    axes.set(xlabel="frames a second", ylabel="mean error (mm)", xscale="log", yscale="log")
-    axes.legend(fontsize=7)
+        axes.scatter(speed, error, s=18, marker="x" if preset else "o", color=color, label=name)
+    axes.set(xlabel="frames a second", ylabel="mean error (mm)", yscale="log", xlim=(0, None))
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axes.minorticks_off()
+    axes.legend(fontsize=7, loc="center left", bbox_to_anchor=(1, 0.5))
     return figure
 
 
