@@ -123,7 +123,7 @@ def test_every_switch_changes_one_thing_only():
     def told(way):
         """What a way is made of; functions that differ have other settings."""
         method = way.method
-        return method.settings, method.legs, method.recover, method.choose, way.change
+        return method.settings, method.legs, method.recover, method.alternatives, way.change
 
     whole = told(markerless_runs.SWITCHES[markerless_runs.EVERYTHING](preset))
     assert whole[0] == preset and whole[-1] is None
