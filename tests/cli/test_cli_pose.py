@@ -80,7 +80,7 @@ def test_what_a_method_tells_of_each_frame_stands_beside_the_poses(tmp_path, mon
     assert {path.name for path in tmp_path.iterdir()} == {"fits.csv", "joints.csv", "pose.npz", "run.toml", "tracks.csv"}
     with open(tmp_path / "fits.csv", newline="") as file:
         rows = list(csv.DictReader(file))
-    assert list(rows[0]) == ["frame", "person", "status", "error_m", "started", "turned", "doubts"]
+    assert list(rows[0]) == ["frame", "person", "status", "error_m", "doubts"]
     joints = read_joints(tmp_path / "joints.csv")
     fitted = [int(row["frame"]) for row in rows if row["status"] == "fitted"]
     assert [int(row["frame"]) for row in rows] == list(range(5)) and fitted == sorted(set(joints.frames.tolist()))
