@@ -50,8 +50,6 @@ def assign_voxels(
     distance = np.where(claims[observation.labels], distance, np.inf)
     owners = distance.argmin(axis=1)
     owners[distance.min(axis=1) > settings.reach**2] = -1
-    if settings.exclusion == "remove":
-        owners[inside.sum(axis=1) > 1] = -1
     return owners, shared
 
 

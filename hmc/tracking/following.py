@@ -14,7 +14,7 @@ import numpy as np
 
 from hmc.errors import InputError
 from hmc.tracking.blobs import Observation
-from hmc.tracking.rules import RULES
+from hmc.tracking.rules import RULE_SETS
 from hmc.tracking.rules.birth import confirm
 from hmc.tracking.settings import FollowingSettings
 from hmc.tracking.state import TrackerInfo, TrackerState, TrackRow
@@ -50,7 +50,7 @@ def advance(
     observation: Observation | None,
     settings: FollowingSettings,
     filter: Filter | None = None,
-    rules: Iterable[Rule] = RULES,
+    rules: Iterable[Rule] | None = None,
 ) -> tuple[TrackerState, TrackerInfo]:
     """The state after a frame, and what was found in it.
 
@@ -65,12 +65,13 @@ def advance(
     filter : callable, optional
         Says where each person is. Where left out, each is at the centroid of the voxels that they own.
     rules : iterable of callable
-        What is done with the frame, in this order.
+        What is done with the frame, in this order; where left out, as the settings say.
     """
     if observation is None:
         waiting = tuple(replace(track, last_frame=track.last_frame + 1, velocity=track.velocity * WAITING) for track in state.tracks)
         return replace(state, tracks=waiting), TrackerInfo(())
-    update = reduce(lambda update, rule: rule(update, settings), rules, begin_update(state, frame, observation, filter))
+    chosen = RULE_SETS[settings.rules] if rules is None else rules
+    update = reduce(lambda update, rule: rule(update, settings), chosen, begin_update(state, frame, observation, filter))
     return update.after(), update.info()
 
 

@@ -1,9 +1,9 @@
 """The naive tracker: each person is at the centroid of the voxels in the region of influence around where they should be.
 
-Source: Canton (2009), section 4.3.1, Eq. 4.4-4.7. Three points differ from the text. The region is placed at the position predicted
-from the smoothed velocity instead of the last one. Voxels in the regions of several persons go to the nearest (Eq. 4.7 takes them
-from all; ``exclusion="remove"`` does so). And once the region has told which component a person is, the whole component within
-reach counts, not the part inside the ellipsoid only, so that stretched arms are in the centroid.
+Source: Canton (2009), section 4.3.1, Eq. 4.4-4.7, which the preset `canton2009` follows (`hmc.tracking.rules.printed`). By default three
+points differ. The region is placed at the position predicted from the smoothed velocity instead of the last one. Voxels in the regions of
+several persons go to the nearest, where Eq. 4.7 takes them from all. And once the region has told which component a person is, the whole
+component within reach counts, not the part inside the ellipsoid only, so that stretched arms are in the centroid.
 """
 
 from __future__ import annotations

@@ -107,8 +107,8 @@ class FollowingSettings:
     ----------
     enlarge_xy, enlarge_z : float
         Canton's alpha and beta (section 4.3.1).
-    exclusion : {"nearest", "remove"}
-        What becomes of voxels in several regions.
+    rules : {"default", "canton2009"}
+        By which a frame becomes tracks (`hmc.tracking.rules.RULE_SETS`): ours, or those of the thesis and no others.
     reach : float
         Voxels of a person's component count up to this distance, in radii of the region.
     velocity_time_s : float
@@ -124,7 +124,7 @@ class FollowingSettings:
 
     enlarge_xy: float = 1.5
     enlarge_z: float = 1.2
-    exclusion: str = "nearest"
+    rules: str = "default"
     reach: float = 2.0
     velocity_time_s: float = 0.3
     shared_gain: float = 0.5
@@ -133,11 +133,11 @@ class FollowingSettings:
     lifecycle: LifecycleSettings = field(default_factory=LifecycleSettings)
 
     def __post_init__(self) -> None:
-        if self.exclusion not in ("nearest", "remove"):
-            raise InputError(f"`exclusion` must be 'nearest' or 'remove'; got {self.exclusion!r}")
+        if self.rules not in ("default", "canton2009"):
+            raise InputError(f"`rules` must be 'default' or 'canton2009'; got {self.rules!r}")
 
 
-#: As Canton (2009) prints it, Eq. 4.7.
-CANTON_2009 = FollowingSettings(exclusion="remove")
+#: As Canton (2009) prints it: sections 4.2.3 and 4.3.1.
+CANTON_2009 = FollowingSettings(rules="canton2009")
 #: For people who are dressed alike: where they share a component, filters tell them apart less surely.
 ALIKE = FollowingSettings(filter_gain=0.5)

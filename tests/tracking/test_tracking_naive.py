@@ -219,17 +219,6 @@ def test_owners_match_a_loop_over_voxels():
         assert owner == int(np.argmin(distances))
 
 
-def test_removing_shared_voxels_as_in_the_thesis():
-    observation = observe(GRID, person(-0.2, 0) | person(0.25, 0.1))
-    positions = np.array([[-0.2, 0, 0.87], [0.25, 0.1, 0.87]])
-    owners, _ = assign_voxels(observation, positions, FollowingSettings(exclusion="remove"))
-    radii = np.array([0.45, 0.45, 1.2 * 0.87])
-    inside = [(((observation.points - p) / radii) ** 2).sum(axis=1) <= 1 for p in positions]
-    assert (owners[inside[0] & inside[1]] == -1).all() and (owners[inside[0] & ~inside[1]] == 0).all()
-    with pytest.raises(ValueError, match="`exclusion` must be"):
-        FollowingSettings(exclusion="none")
-
-
 def test_person_voxels_on_a_finer_grid():
     fine = VoxelGrid(GRID.origin, 0.04, (125, 100, 60))
     centres = fine.centres()

@@ -12,6 +12,15 @@ from hmc.tracking.rules.ghosts import reject_ghosts
 from hmc.tracking.rules.handover import hand_over_tracks
 from hmc.tracking.rules.identity import exchange_identities, learn_appearance, reidentify
 from hmc.tracking.rules.measurement import measure_tracks
+from hmc.tracking.rules.printed import (
+    adapt_histograms,
+    begin_tracks,
+    claim_regions,
+    end_tracks,
+    filter_in_place,
+    measure_regions,
+    move_tracks,
+)
 from hmc.tracking.rules.pushed_objects import release_pushed_objects
 from hmc.tracking.rules.separation import separate_detections, separate_tracks
 from hmc.tracking.rules.state_update import update_tracks
@@ -19,7 +28,7 @@ from hmc.tracking.rules.static_objects import hide_static_objects, learn_static_
 from hmc.tracking.rules.unseen_by_one import reject_unsolid
 from hmc.tracking.update import Rule
 
-__all__ = ["RULES"]
+__all__ = ["PRINTED", "RULES", "RULE_SETS"]
 
 RULES: tuple[Rule, ...] = (
     hide_static_objects,
@@ -46,3 +55,15 @@ RULES: tuple[Rule, ...] = (
     learn_static_objects,
     reidentify,
 )
+#: Those of Canton (2009), and no others.
+PRINTED: tuple[Rule, ...] = (
+    filter_in_place,
+    claim_regions,
+    measure_regions,
+    move_tracks,
+    adapt_histograms,
+    begin_tracks,
+    end_tracks,
+)
+#: By the name in `FollowingSettings.rules`.
+RULE_SETS = {"default": RULES, "canton2009": PRINTED}

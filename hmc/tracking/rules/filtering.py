@@ -14,14 +14,17 @@ from hmc.tracking.settings import FollowingSettings
 from hmc.tracking.state import Track
 from hmc.tracking.update import FilterEstimate, FrameUpdate
 
-__all__ = ["filter_tracks", "predict"]
+__all__ = ["filter_at", "filter_tracks", "predict"]
 
 
 def filter_tracks(update: FrameUpdate, settings: FollowingSettings) -> FrameUpdate:
     """The update with predicted positions and the filter's estimate."""
-    begun = thread_time()
-    state = update.state
-    predicted = predict(state.tracks, state.fps)
+    return filter_at(update, predict(update.state.tracks, update.state.fps))
+
+
+def filter_at(update: FrameUpdate, predicted: np.ndarray) -> FrameUpdate:
+    """The update with the filter's estimate of persons who should be at the given places, shape (k, 3)."""
+    begun, state = thread_time(), update.state
     if update.filter is None:
         estimate = FilterEstimate(predicted, np.zeros(len(predicted), bool))
     else:
