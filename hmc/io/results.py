@@ -6,13 +6,11 @@ Nothing here is pickled, so loading a result never runs code; every file appears
 
 from __future__ import annotations
 
-import platform
 import tomllib
 import zipfile
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -20,11 +18,12 @@ import numpy as np
 
 from hmc.errors import InputError
 from hmc.io.files import atomic_write, write_toml
+from hmc.io.provenance import code_state, library_versions
 from hmc.io.tables import integer_column, read_columns
 from hmc.landmarks import LANDMARKS
 
 __all__ = [
-    "PoseStates", "PoseTable", "TrackTable", "library_versions", "read_centroids", "read_joints", "read_pose", "read_run",
+    "PoseStates", "PoseTable", "TrackTable", "read_centroids", "read_joints", "read_pose", "read_run",
     "read_tracks", "run_selection", "write_joints", "write_pose", "write_run", "write_tracks",
 ]  # fmt: skip
 
@@ -300,19 +299,8 @@ def read_pose(path: str | Path) -> PoseStates:
         raise InputError(f"{path}: not a pose file of this program ({error})") from error
 
 
-def library_versions() -> dict[str, str]:
-    """Versions of Python, of this package and of the libraries that its numbers depend on."""
-    versions = {"python": platform.python_version()}
-    for name in ("hmc", "numpy", "scipy", "scikit-learn", "opencv-python-headless"):
-        try:
-            versions[name] = version(name)
-        except PackageNotFoundError:  # run from a source tree, or OpenCV built by hand
-            continue
-    return versions
-
-
 def write_run(path: str | Path, method: str, parameters: Mapping[str, Any], seed: int | None, **more: Any) -> None:
-    """Write how a result came about: `method`, `seed`, a table of every parameter, the versions of the libraries.
+    """Write how a result came about: `method`, `seed`, a table of every parameter, the versions of the libraries, and which code it was.
 
     Parameters
     ----------
@@ -325,7 +313,7 @@ def write_run(path: str | Path, method: str, parameters: Mapping[str, Any], seed
     **more
         Further values or tables, as `recording="..."`, `report={...}`.
     """
-    run = {"method": method, "seed": seed, **more, "parameters": parameters, "versions": library_versions()}
+    run = {"method": method, "seed": seed, **more, "parameters": parameters, "versions": library_versions() | code_state()}
     write_toml(path, run)
 
 

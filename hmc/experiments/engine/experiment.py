@@ -59,10 +59,11 @@ class Plan:
 
 @dataclass(frozen=True)
 class Cell:
-    """One computed cell: what it was computed with, and what came out; plain values both."""
+    """One computed cell: what it was computed with, what came out, and by which code (`hmc.io.provenance`); plain values all."""
 
     parameters: Parameters
     results: Results
+    made: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

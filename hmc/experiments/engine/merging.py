@@ -23,7 +23,7 @@ class MergeReport:
     copied : int
         Cells that were not here.
     same : int
-        Cells that were here with the same bytes.
+        Cells that were here with the same results.
     different : tuple of Path
         Cells that were here with other results; ours stay. Measured times differ, anything else means that the code did.
     old : tuple of Path
@@ -82,11 +82,20 @@ def merge_stores(out: Path, others: Sequence[Path]) -> MergeReport:
         elif not target.exists():
             write_text(target, text)
             copied += 1
-        elif target.read_text(encoding="utf-8", errors="replace") == text:
+        elif _results_of(target) == cell.results:
             same += 1
         else:
             different.append(path)
     return MergeReport(copied, same, tuple(different), tuple(old), tuple(damaged))
+
+
+def _results_of(path: Path) -> object:
+    """The results of a cell that is here; None where it is damaged."""
+    try:
+        cell = read_cell(path)
+    except InputError:
+        return None
+    return None if cell is None else cell.results
 
 
 def _pairs(out: Path, others: Iterable[Path]) -> Iterable[tuple[Path, Path]]:

@@ -47,15 +47,16 @@ def cell_path(out: Path, experiment: Experiment, key: str) -> Path:
     return out / "cells" / experiment.store_name / f"{key}.json"
 
 
-def cell_text(parameters: Mapping[str, Any], results: Mapping[str, Any]) -> str:
-    """What the file of a cell holds; numbers keep their full precision.
+def cell_text(parameters: Mapping[str, Any], results: Mapping[str, Any], made: Mapping[str, str] | None = None) -> str:
+    """What the file of a cell holds; numbers keep their full precision, and `made` says by which code.
 
     Raises
     ------
     InputError
         When a result is no plain value.
     """
-    return _canonical({"parameters": dict(parameters), "results": dict(results)}, indent=1) + "\n"
+    content = {"parameters": dict(parameters), "results": dict(results)} | ({"made": dict(made)} if made else {})
+    return _canonical(content, indent=1) + "\n"
 
 
 def write_text(path: Path, text: str) -> None:
@@ -80,7 +81,7 @@ def read_cell(path: Path) -> Cell | None:
     """
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
-        return Cell(content["parameters"], content["results"])
+        return Cell(content["parameters"], content["results"], content.get("made", {}))
     except FileNotFoundError:
         return None
     except (ValueError, KeyError, TypeError, OSError) as error:

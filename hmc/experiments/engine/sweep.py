@@ -24,6 +24,7 @@ from hmc.experiments.engine.experiment import Cell, Experiment, Plan, Report
 from hmc.experiments.engine.inputs import Inputs, source_of
 from hmc.experiments.engine.library import find_experiment
 from hmc.experiments.engine.store import cell_key, cell_path, cell_rng, cell_text, read_cell, write_text
+from hmc.io.provenance import code_state, machine
 from hmc.plugins import add_plugins, plugin_files
 
 __all__ = ["Outcome", "compute_cells", "plan_for", "plan_of", "run_experiment", "stored_cells"]
@@ -211,7 +212,7 @@ def _compute_cell(name: str, shared: _Shared, parameters: dict[str, Any]) -> tup
     try:
         with threadpool_limits(1):
             results = experiment.cell(parameters, Inputs(shared.out / "inputs", shared.folders), cell_rng(key))
-        return path, cell_text(parameters, results), ""
+        return path, cell_text(parameters, results, code_state() | {"machine": machine()}), ""
     except InputError:
         raise
     except Exception:
