@@ -11,6 +11,7 @@ from pathlib import Path
 from hmc.errors import InputError
 from hmc.experiments.engine.experiment import Experiment, Plan
 from hmc.experiments.engine.library import EXPERIMENTS, find_experiment
+from hmc.experiments.engine.selection import changed_plan, grid_of, read_settings
 from hmc.experiments.engine.sweep import plan_for, plan_of, run_experiment, stored_cells
 from hmc.experiments.engine.writing import write_report
 from hmc.plugins import add_plugins
@@ -75,6 +76,13 @@ def _make_parser() -> argparse.ArgumentParser:
         action.add_argument(
             "--recordings", type=Path, nargs="+", default=[], metavar="FOLDER", help="your recordings in place of rendered ones"
         )
+        action.add_argument("--seeds", type=_count, metavar="N", help="so many seeds of every cell that draws at random")
+        action.add_argument("--frames", type=_count, metavar="N", help="the first N frames of every recording")
+        action.add_argument("--cameras", type=_count, metavar="N", help="N cameras of every recording, evenly spread")
+        action.add_argument("--actions", nargs="+", default=[], metavar="NAME", help="rendered recordings of these actions, as walk box")
+        action.add_argument(
+            "--set", action="append", default=[], metavar="KEY=VALUE", help="a parameter that all cells are to have, as layers=6"
+        )
     dataset = actions.add_parser("humaneva", help="make recordings of a copy of HumanEva-I")
     dataset.add_argument("root", type=Path, metavar="FOLDER", help="the dataset, with S1, S2 and so on in it, or one of these")
     dataset.add_argument("--out", type=Path, default=Path("recordings"), metavar="DIR", help="where the recordings go")
@@ -94,7 +102,7 @@ def _list(args: argparse.Namespace) -> int:
 def _run(args: argparse.Namespace) -> int:
     if (args.backend == "dask") != (args.scheduler is not None):
         raise InputError("--backend dask and --scheduler ADDRESS go together: the address is what `dask scheduler` prints")
-    asked = plan_of(args.quick, args.recordings)
+    asked = _plan(args)
     out = _folder(args.out)
     names = _names(args.ids)
     experiments = {name: find_experiment(name) for name in names}  # wrong ids are told before anything is computed
@@ -146,11 +154,11 @@ def _run_one(name: str, experiment: Experiment, out: Path, asked: Plan, args: ar
 
 
 def _status(args: argparse.Namespace) -> int:
-    asked = plan_of(args.quick, args.recordings)
+    asked = _plan(args)
     for name in _names(args.ids or ["all"]):
         experiment = find_experiment(name)
         plan = plan_for(experiment, asked)
-        cells = stored_cells(experiment, args.out, experiment.grid(plan))
+        cells = stored_cells(experiment, args.out, grid_of(experiment, plan))
         done = sum(cell is not None for cell in cells)
         _tell(f"{experiment.id:10} {done:5} of {len(cells):5} cells")
     return 0
@@ -200,6 +208,12 @@ def _humaneva(args: argparse.Namespace) -> int:
         folder = convert_take(takes[name], _folder(args.out), args.frames, lambda line: _tell(f"note: {line}", sys.stderr))
         _tell(f"wrote {folder}")
     return 0
+
+
+def _plan(args: argparse.Namespace) -> Plan:
+    """The plan that the options ask for."""
+    frames, cameras = (None if value is None else (name, value) for name, value in (("frames", args.frames), ("cameras", args.cameras)))
+    return changed_plan(plan_of(args.quick, args.recordings), args.seeds, args.actions, (frames, cameras, *read_settings(args.set)))
 
 
 def _cells(n: int) -> str:

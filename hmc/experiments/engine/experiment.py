@@ -51,10 +51,24 @@ class Plan:
         A small grid that shows the shape, in minutes.
     recordings : tuple of Source
         The user's recordings, in place of the rendered ones; empty: the rendered ones.
+    seeds : int or None
+        So many seeds of every cell that has any; None: as many as the experiment has by itself.
+    actions : tuple of str
+        Of the rendered recordings those of these actions alone; empty: all.
+    settings : tuple of (str, value)
+        Parameters that all cells have otherwise, as ``("frames", 60)``.
     """
 
     quick: bool = False
     recordings: tuple[Source, ...] = ()
+    seeds: int | None = None
+    actions: tuple[str, ...] = ()
+    settings: tuple[tuple[str, Any], ...] = ()
+
+    @property
+    def changed(self) -> bool:
+        """Whether other seeds, actions or parameters are asked for than the experiment has by itself."""
+        return self.seeds is not None or bool(self.actions or self.settings)
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,7 @@ from hmc.experiments.engine.cluster import spread
 from hmc.experiments.engine.experiment import Cell, Experiment, Plan, Report
 from hmc.experiments.engine.inputs import Inputs, source_of
 from hmc.experiments.engine.library import find_experiment
+from hmc.experiments.engine.selection import grid_of
 from hmc.experiments.engine.store import cell_key, cell_path, cell_rng, cell_text, read_cell, write_text
 from hmc.io.provenance import code_state, machine
 from hmc.plugins import add_plugins, plugin_files
@@ -69,7 +70,7 @@ def plan_of(quick: bool = False, recordings: list[Path] | None = None) -> Plan:
 def plan_for(experiment: Experiment, plan: Plan) -> Plan:
     """The plan, without the user's recordings where the experiment is computed on none and they would change nothing."""
     bare = replace(plan, recordings=())
-    return bare if plan.recordings and experiment.grid(bare) == experiment.grid(plan) else plan
+    return bare if plan.recordings and grid_of(experiment, bare) == grid_of(experiment, plan) else plan
 
 
 def run_experiment(
@@ -109,7 +110,7 @@ def run_experiment(
         When there is no such experiment, a recording is not what the experiment needs, or nothing can be written.
     """
     experiment, plan = find_experiment(name), plan or Plan()
-    grid = experiment.grid(plan)
+    grid = grid_of(experiment, plan)
     missing = grid if again else [p for p, cell in zip(grid, stored_cells(experiment, out, grid), strict=True) if cell is None]
     failures = []
     done = len(grid) - len(missing)
@@ -128,7 +129,14 @@ def run_experiment(
     cells = [cell for cell in stored_cells(experiment, out, grid) if cell is not None]
     if len(cells) < len(grid):
         raise InputError(f"{out}: cells vanished while the experiment ran; start it again")
-    return Outcome(experiment.report(cells, plan), len(missing), found)
+    try:
+        return Outcome(experiment.report(cells, plan), len(missing), found)
+    except (KeyError, IndexError, StopIteration, ValueError) as error:
+        if not plan.changed:
+            raise
+        raise InputError(
+            f"{experiment.id}: the cells are computed and kept, but its report needs what was left out ({type(error).__name__} {error})"
+        ) from error
 
 
 def stored_cells(experiment: Experiment, out: Path, grid: list[dict[str, Any]]) -> list[Cell | None]:

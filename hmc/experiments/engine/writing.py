@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from hmc.experiments.engine.experiment import Experiment, Plan, Report, Table
+from hmc.experiments.engine.selection import grid_of
 from hmc.experiments.engine.store import cell_key
 from hmc.io.files import atomic_write
 from hmc.io.results import write_run
@@ -21,8 +22,8 @@ _METADATA = {"png": {"Software": None}, "pdf": {"CreationDate": None, "Producer"
 
 
 def report_folder(out: Path, experiment: Experiment, plan: Plan) -> Path:
-    """Where an experiment's report goes: a quick one and one on the user's recordings never replace the full one."""
-    suffix = ("-quick" if plan.quick else "") + ("-own" if plan.recordings else "")
+    """Where an experiment's report goes: a quick one, one on the user's recordings and one of other cells never replace the full one."""
+    suffix = ("-quick" if plan.quick else "") + ("-own" if plan.recordings else "") + ("-other" if plan.changed else "")
     return out / f"{experiment.id}{suffix}"
 
 
@@ -59,7 +60,7 @@ def write_report(out: Path, experiment: Experiment, plan: Plan, report: Report) 
             with atomic_write(folder / f"{name}.{kind}", "wb") as file:
                 figure.savefig(file, format=kind, metadata=metadata)
         plt.close(figure)
-    grid = experiment.grid(plan)
+    grid = grid_of(experiment, plan)
     parameters: dict[str, Any] = {
         "title": experiment.title,
         "source": experiment.source,

@@ -1,0 +1,89 @@
+"""Other seeds, frames, cameras and actions than an experiment has by itself."""
+
+import json
+
+import pytest
+
+from hmc.errors import InputError
+from hmc.experiments import EXPERIMENTS, Experiment, Plan, find_experiment
+from hmc.experiments.__main__ import main
+from hmc.experiments.engine.selection import changed_plan, grid_of, read_settings
+from hmc.experiments.engine.writing import report_folder
+
+NAMES = ("walk_man", "walk_woman", "box_man", "walker")
+
+
+def toy_grid(plan):
+    return [
+        {"recording": f"{name}@12", "layers": n, "frames": 0, "repeat": k}
+        for name in NAMES
+        for n in (1, 2)
+        for k in range(1 if plan.quick else 2)
+    ]
+
+
+TOY = Experiment("toy", "", "", toy_grid, lambda *given: {}, lambda cells, plan: None)
+
+
+def test_without_changes_it_is_the_experiments_own_grid():
+    for name in EXPERIMENTS:
+        experiment = find_experiment(name)
+        assert grid_of(experiment, Plan(quick=True)) == experiment.grid(Plan(quick=True))
+
+
+def test_seeds_go_up_and_down():
+    for seeds in (1, 2, 5):
+        grid = grid_of(TOY, changed_plan(Plan(), seeds))
+        assert len(grid) == len(NAMES) * 2 * seeds == len({json.dumps(cell) for cell in grid})
+        assert {cell["repeat"] for cell in grid} == set(range(seeds))
+    # What the experiment has by itself keeps its names, so that what is computed is found.
+    assert all(cell in grid_of(TOY, changed_plan(Plan(), 5)) for cell in TOY.grid(Plan()))
+
+
+def test_parameters_are_the_same_for_all_cells_and_equal_cells_are_one():
+    grid = grid_of(TOY, changed_plan(Plan(), settings=(None, ("frames", 60), ("layers", 4))))
+    assert {(cell["frames"], cell["layers"]) for cell in grid} == {(60, 4)} and len(grid) == len(NAMES) * 2
+
+
+def test_actions_are_whole_words():
+    assert {cell["recording"] for cell in grid_of(TOY, changed_plan(Plan(), actions=("walk",)))} == {"walk_man@12", "walk_woman@12"}
+    assert {cell["recording"] for cell in grid_of(TOY, changed_plan(Plan(), actions=("box", "walker")))} == {"box_man@12", "walker@12"}
+
+
+def test_values_are_toml_or_words():
+    assert read_settings(["layers=6", "rate = .5", "a=0.5", "way=strong", 'b="x y"', "gone=[1, 2.5]", "yes=true"]) == (
+        ("layers", 6), ("rate", ".5"), ("a", 0.5), ("way", "strong"), ("b", "x y"), ("gone", [1, 2.5]), ("yes", True),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"settings": (("particle", 9),)}, "toy has no parameter 'particle'; its cells have recording, layers"),
+        ({"actions": ("jog",)}, "no recording of the action 'jog'; there are walk_man"),
+    ],
+)
+def test_what_an_experiment_does_not_have_is_told(changes, message):
+    with pytest.raises(InputError, match=message):
+        grid_of(TOY, changed_plan(Plan(), **changes))
+
+
+def test_experiments_without_seeds_or_recordings_say_so():
+    plan = find_experiment("fig-7.8")
+    with pytest.raises(InputError, match="leave --seeds out"):
+        grid_of(plan, changed_plan(Plan(), 3))
+    with pytest.raises(InputError, match="leave --actions out"):
+        grid_of(plan, changed_plan(Plan(), actions=("walk",)))
+
+
+def test_from_the_command_line_and_beside_the_full_report(tmp_path, capsys):
+    assert (
+        main(["status", "fig-6.18", "--out", str(tmp_path), "--seeds", "2", "--frames", "30", "--actions", "walk", "--set", "density=1.0"])
+        == 0
+    )
+    assert "0 of     4 cells" in capsys.readouterr().out  # one walk, two ways of annealing
+    assert main(["status", "fig-6.18", "--out", str(tmp_path), "--set", "density"]) == 2
+    assert "write a parameter and its value" in capsys.readouterr().err
+    experiment = find_experiment("fig-6.18")
+    folders = {report_folder(tmp_path, experiment, plan) for plan in (Plan(), Plan(quick=True), changed_plan(Plan(), 5))}
+    assert len(folders) == 3
