@@ -9,7 +9,7 @@ import traceback
 from pathlib import Path
 
 from hmc.errors import InputError
-from hmc.experiments.engine.experiment import Experiment, Plan
+from hmc.experiments.engine.experiment import Cell, Experiment, Plan
 from hmc.experiments.engine.library import EXPERIMENTS, find_experiment
 from hmc.experiments.engine.selection import changed_plan, grid_of, read_settings
 from hmc.experiments.engine.sweep import plan_for, plan_of, run_experiment, stored_cells
@@ -95,7 +95,10 @@ def _make_parser() -> argparse.ArgumentParser:
 def _list(args: argparse.Namespace) -> int:
     for name in EXPERIMENTS:
         experiment = find_experiment(name)
-        _tell(f"{name:10} {experiment.title} ({experiment.source})")
+        full, quick = (experiment.grid(Plan(quick)) for quick in (False, True))
+        names = dict.fromkeys(cell["recording"].rpartition("@")[0] for cell in full if "recording" in cell)
+        what = f"on {', '.join(names)}" if names else "on no recording"
+        _tell(f"{name:14} {experiment.title} ({experiment.source}): {len(full)} cells, quick {len(quick)}, {what}")
     return 0
 
 
@@ -159,8 +162,8 @@ def _status(args: argparse.Namespace) -> int:
         experiment = find_experiment(name)
         plan = plan_for(experiment, asked)
         cells = stored_cells(experiment, args.out, grid_of(experiment, plan))
-        done = sum(cell is not None for cell in cells)
-        _tell(f"{experiment.id:10} {done:5} of {len(cells):5} cells")
+        done = [cell for cell in cells if cell is not None]
+        _tell(f"{experiment.id:14} {len(done):5} of {len(cells):5} cells{_left(done, len(cells))}")
     return 0
 
 
@@ -208,6 +211,14 @@ def _humaneva(args: argparse.Namespace) -> int:
         folder = convert_take(takes[name], _folder(args.out), args.frames, lambda line: _tell(f"note: {line}", sys.stderr))
         _tell(f"wrote {folder}")
     return 0
+
+
+def _left(done: list[Cell], total: int) -> str:
+    """How long the rest takes with one worker, by the cells that are there; empty where there are none, or all."""
+    seconds = [float(cell.made["seconds"]) for cell in done if "seconds" in cell.made]
+    if not seconds or len(done) == total:
+        return ""
+    return f", about {(total - len(done)) * sum(seconds) / len(seconds) / 60:.0f} min of one worker left"
 
 
 def _plan(args: argparse.Namespace) -> Plan:

@@ -73,11 +73,11 @@ class Plan:
 
 @dataclass(frozen=True)
 class Cell:
-    """One computed cell: what it was computed with, what came out, and by which code (`hmc.io.provenance`); plain values all."""
+    """One computed cell: what it was computed with, what came out, and by which code and in how many seconds; plain values all."""
 
     parameters: Parameters
     results: Results
-    made: Mapping[str, str] = field(default_factory=dict)
+    made: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -47,8 +47,8 @@ def cell_path(out: Path, experiment: Experiment, key: str) -> Path:
     return out / "cells" / experiment.store_name / f"{key}.json"
 
 
-def cell_text(parameters: Mapping[str, Any], results: Mapping[str, Any], made: Mapping[str, str] | None = None) -> str:
-    """What the file of a cell holds; numbers keep their full precision, and `made` says by which code.
+def cell_text(parameters: Mapping[str, Any], results: Mapping[str, Any], made: Mapping[str, Any] | None = None) -> str:
+    """What the file of a cell holds; numbers keep their full precision, and `made` says by which code and in how many seconds.
 
     Raises
     ------

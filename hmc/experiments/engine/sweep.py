@@ -218,9 +218,11 @@ def _compute_cell(name: str, shared: _Shared, parameters: dict[str, Any]) -> tup
     key = cell_key(experiment, parameters)
     path = cell_path(shared.out, experiment, key)
     try:
+        begun = time.perf_counter()
         with threadpool_limits(1):
             results = experiment.cell(parameters, Inputs(shared.out / "inputs", shared.folders), cell_rng(key))
-        return path, cell_text(parameters, results, code_state() | {"machine": machine()}), ""
+        made = code_state() | {"machine": machine(), "seconds": round(time.perf_counter() - begun, 1)}
+        return path, cell_text(parameters, results, made), ""
     except InputError:
         raise
     except Exception:
