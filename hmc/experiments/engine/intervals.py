@@ -1,0 +1,125 @@
+"""How sure a figure is: confidence intervals over clips and seeds, and paired comparisons of methods.
+
+Figures of a study are ratios of sums over many clips and seeds (a mean error is a sum of errors over a number of landmarks), and clips
+differ far more than seeds do. So clips are drawn with replacement, and of each clip drawn its seeds; two methods are compared on the same
+draws.
+
+References
+----------
+Davison and Hinkley (1997), Bootstrap Methods and their Application, section 3.8: hierarchical data.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hmc.errors import InputError
+
+__all__ = ["DRAWS", "LEVEL", "Interval", "difference", "interval"]
+
+#: Draws of an interval, and the share of them that it holds.
+DRAWS, LEVEL = 2000, 0.95
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A figure and between which values it lies, by `LEVEL`.
+
+    Attributes
+    ----------
+    value, low, high : float
+        NaN where there is nothing to say; low and high are infinite with one clip and one seed.
+    """
+
+    value: float
+    low: float
+    high: float
+
+    @property
+    def above_zero(self) -> bool:
+        """Whether all of it is above 0."""
+        return bool(self.low > 0)
+
+    def __str__(self) -> str:
+        return f"{self.value:.1f} [{self.low:.1f}, {self.high:.1f}]"
+
+
+def interval(clips: Sequence[str], sums: np.ndarray, counts: np.ndarray, draws: int = DRAWS) -> Interval:
+    """A ratio of sums and its interval.
+
+    Parameters
+    ----------
+    clips : sequence of str, length n
+        Of which clip each run is; runs of one clip are its seeds.
+    sums, counts : array, shape (n,)
+        Of each run.
+    draws : int
+
+    Returns
+    -------
+    Interval
+        Of ``sum(sums) / sum(counts)``.
+
+    Raises
+    ------
+    InputError
+        When the lengths differ.
+    """
+    picked = _draws(_by_clip(clips, len(sums)), draws)
+    sums, counts = np.asarray(sums, float), np.asarray(counts, float)
+    return _interval(float(_ratio(sums.sum(), counts.sum())), _ratio(picked @ sums, picked @ counts))
+
+
+def difference(
+    clips: Sequence[str],
+    first: tuple[np.ndarray, np.ndarray],
+    second: tuple[np.ndarray, np.ndarray],
+    draws: int = DRAWS,
+) -> Interval:
+    """By how much a ratio of sums is larger in the first of two methods, on the same clips and seeds.
+
+    Parameters
+    ----------
+    clips : sequence of str, length n
+        As for `interval`; run k of both methods is of clip k.
+    first, second : (sums, counts), each array, shape (n,)
+    draws : int
+    """
+    picked = _draws(_by_clip(clips, len(first[0])), draws)
+    value, drawn = 0.0, np.zeros(draws)
+    for sign, (sums, counts) in ((1, first), (-1, second)):
+        sums, counts = np.asarray(sums, float), np.asarray(counts, float)
+        value += sign * float(_ratio(sums.sum(), counts.sum()))
+        drawn = drawn + sign * _ratio(picked @ sums, picked @ counts)
+    return _interval(value, drawn)
+
+
+def _by_clip(clips: Sequence[str], n: int) -> list[np.ndarray]:
+    if len(clips) != n:
+        raise InputError(f"there are {len(clips)} names of clips and {n} runs")
+    names = np.array(list(clips), str)
+    return [np.flatnonzero(names == name) for name in dict.fromkeys(clips)]
+
+
+def _draws(groups: list[np.ndarray], draws: int) -> np.ndarray:
+    """How often each run is in each draw, shape (draws, n); the same for the same groups."""
+    rng = np.random.default_rng([len(groups), sum(map(len, groups))])
+    picked = np.zeros((draws, sum(map(len, groups))))
+    for group, times in zip(groups, rng.multinomial(len(groups), np.full(len(groups), 1 / len(groups)), draws).T, strict=True):
+        picked[:, group] = rng.multinomial(times * len(group), np.full(len(group), 1 / len(group)))
+    return picked
+
+
+def _ratio(sums: np.ndarray, counts: np.ndarray) -> np.ndarray:
+    return np.divide(sums, counts, out=np.full(np.shape(sums), np.nan), where=np.asarray(counts) > 0)
+
+
+def _interval(value: float, drawn: np.ndarray) -> Interval:
+    known = drawn[np.isfinite(drawn)]
+    if not len(known) or np.ptp(known) == 0:  # one run, or runs that are all the same, tell nothing of others
+        return Interval(value, -np.inf, np.inf)
+    low, high = np.quantile(known, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
+    return Interval(value, float(low), float(high))
