@@ -1,0 +1,91 @@
+"""Scores of poses with their intervals, and methods compared on the same clips and seeds (`hmc.experiments.engine.intervals`)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from hmc.errors import InputError
+from hmc.experiments.by_action import MATCHED_MM, NEAR_MM
+from hmc.experiments.engine.experiment import Cell
+from hmc.experiments.engine.intervals import Interval, difference, interval
+from hmc.experiments.truth import estimates
+from hmc.metrics.landmarks import landmark_errors
+
+__all__ = ["SCORES", "is_followed", "score_difference", "score_interval"]
+
+#: As `hmc.experiments.by_action.pose_scores` calls them.
+SCORES = ("mean_mm", "MMTP_mm", "MMTA_percent", "MMTA_50_percent")
+
+
+def score_interval(cells: Sequence[Cell], score: str) -> Interval:
+    """A score of some cells together, and its interval over clips and seeds.
+
+    Parameters
+    ----------
+    cells : sequence of Cell
+        Of one method, with ``estimate_m`` and ``truth_m``.
+    score : str
+        One of `SCORES`.
+    """
+    return interval([_clip(one) for one in cells], *_sums(cells, score))
+
+
+def score_difference(first: Sequence[Cell], second: Sequence[Cell], score: str, but: Sequence[str] = ("method",)) -> Interval:
+    """By how much the first group's score is larger than the second's, and its interval, on the cells that both have.
+
+    Parameters
+    ----------
+    first, second : sequence of Cell
+        Of one method each, or of one number of cameras, and so on.
+    score : str
+        One of `SCORES`.
+    but : sequence of str
+        Parameters in which the groups differ: cells that agree in all others are compared.
+
+    Raises
+    ------
+    InputError
+        When no two cells agree.
+    """
+    one, other = ({_without(cell, but): cell for cell in cells} for cells in (first, second))
+    shared = [key for key in one if key in other]
+    if not shared:
+        raise InputError(f"groups are compared cell by cell, and no two of these agree in all but {', '.join(but)}")
+    clips = [_clip(one[key]) for key in shared]
+    pairs = ([cells[key] for key in shared] for cells in (one, other))
+    return difference(clips, *(_sums(cells, score) for cells in pairs))
+
+
+def is_followed(cells: Sequence[Cell], least_percent: float = 50.0) -> bool:
+    """Whether people are followed at all: the interval of MMTA at 100 mm is above so much. Nothing is claimed of runs that are lost."""
+    return score_interval(cells, "MMTA_percent").low > least_percent
+
+
+def _clip(one: Cell) -> str:
+    return str(one.parameters["recording"])
+
+
+def _without(one: Cell, but: Sequence[str]) -> str:
+    return repr(sorted((name, value) for name, value in one.parameters.items() if name not in but))
+
+
+def _sums(cells: Sequence[Cell], score: str) -> tuple[np.ndarray, np.ndarray]:
+    """Numerator and denominator of a score, one a cell."""
+    if score not in SCORES:
+        raise InputError(f"no interval of {score!r}; there are {', '.join(SCORES)}")
+    parts = [_parts(1000 * landmark_errors(*estimates(one)), score) for one in cells]
+    sums, counts = np.array(parts, float).reshape(-1, 2).T
+    return sums, counts
+
+
+def _parts(errors: np.ndarray, score: str) -> tuple[float, float]:
+    if score == "mean_mm":  # of each frame the mean of what is estimated in it (Canton, Eq. 5.1, 5.2)
+        there = np.isfinite(errors)
+        means = np.where(there, errors, 0.0).sum(axis=1)[there.any(axis=1)] / there.sum(axis=1)[there.any(axis=1)]
+        return float(means.sum()), float(len(means))
+    matched = errors <= (NEAR_MM if score == "MMTA_50_percent" else MATCHED_MM)
+    if score == "MMTP_mm":
+        return float(errors[matched].sum()), float(matched.sum())
+    return 100 * float(matched.sum()), float((~np.isnan(errors)).sum())

@@ -1,0 +1,67 @@
+"""Intervals of pose scores: their middle is the score itself, and a difference is found where there is one."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hmc.errors import InputError
+from hmc.experiments.by_action import pose_scores
+from hmc.experiments.engine.experiment import Cell
+from hmc.experiments.pose_intervals import SCORES, is_followed, score_difference, score_interval
+
+
+def cells(scatter_m, rng, clips=6, seeds=3, lost=0.0, frames=12):
+    """Runs whose landmarks are off by normal errors, of which a share is lost altogether; clips are differently hard."""
+    made = []
+    for clip in range(clips):
+        truth = rng.normal(size=(frames, 15, 3))
+        for seed in range(seeds):
+            estimate = truth + rng.normal(0, scatter_m * (1 + 0.5 * clip), truth.shape)
+            estimate[rng.random((frames, 15)) < lost] = np.nan
+            made.append(Cell({"recording": f"clip{clip}@1", "repeat": seed}, {"estimate_m": estimate, "truth_m": truth}))
+    return made
+
+
+@pytest.mark.parametrize("lost", [0.0, 0.2])
+def test_the_middle_is_the_score_itself(lost):
+    some = cells(0.02, np.random.default_rng(0), lost=lost)
+    scores = pose_scores(some)
+    for name in SCORES:
+        found = score_interval(some, name)
+        assert found.value == pytest.approx(scores[name], rel=1e-9)
+        assert found.low < found.value < found.high
+
+
+def test_a_better_method_is_told_and_equal_ones_are_not():
+    rng = np.random.default_rng(1)
+    good, same, bad = cells(0.02, rng), cells(0.02, rng), cells(0.024, rng)
+    assert score_difference(bad, good, "mean_mm").above_zero and score_difference(good, bad, "MMTA_50_percent").above_zero
+    equal = score_difference(same, good, "mean_mm")
+    assert equal.low < 0 < equal.high
+    assert score_difference(good[::-1], good, "mean_mm").value == 0  # by clip and seed, not by order
+
+
+def test_only_what_both_have_is_compared():
+    some = cells(0.02, np.random.default_rng(2))
+    alone = score_difference(some[:4], some, "MMTP_mm")
+    assert alone.value == 0
+    with pytest.raises(InputError, match="no two of these agree in all but method"):
+        score_difference(some[:3], some[3:], "MMTP_mm")
+    with pytest.raises(InputError, match="no interval of 'angle_deg'"):
+        score_interval(some, "angle_deg")
+
+
+def test_what_differs_is_left_out_of_what_must_agree():
+    rng = np.random.default_rng(3)
+    few, many = (
+        [replace(one, parameters=one.parameters | {"cameras": n}) for one in cells(scatter, rng)] for n, scatter in ((3, 0.03), (7, 0.02))
+    )
+    with pytest.raises(InputError, match="no two"):
+        score_difference(few, many, "mean_mm")
+    assert score_difference(few, many, "mean_mm", ("cameras",)).above_zero
+
+
+def test_noise_is_not_followed():
+    rng = np.random.default_rng(4)
+    assert is_followed(cells(0.02, rng)) and not is_followed(cells(2.0, rng))
