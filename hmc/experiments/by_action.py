@@ -13,7 +13,7 @@ from hmc.experiments.truth import estimates
 from hmc.metrics.angles import angular_errors, score_angles
 from hmc.metrics.landmarks import landmark_errors, score
 
-__all__ = ["AVERAGE", "COLUMNS", "action_rows", "pose_scores"]
+__all__ = ["AVERAGE", "COLUMNS", "action_cells", "action_rows", "pose_scores"]
 
 AVERAGE = "Average"
 #: What the thesis prints, in its order.
@@ -33,6 +33,11 @@ def pose_scores(cells: Sequence[Cell]) -> dict[str, float]:
     values = (far.mean, far.deviation, far.mmtp, 100 * far.mmta, angles.mean, angles.deviation)
     scores = {name: float(value) for name, value in zip(COLUMNS, values, strict=True)}
     return scores | {"MMTP_50_mm": float(near.mmtp), "MMTA_50_percent": float(100 * near.mmta)}
+
+
+def action_cells(cells: Sequence[Cell], title: str) -> list[Cell]:
+    """Those of one action, by what the thesis calls it."""
+    return [one for one in cells if action_title(one.parameters["recording"]) == title]
 
 
 def action_rows(cells: Sequence[Cell], method: str, paper: Mapping[str, Sequence[float]]) -> list[dict[str, Any]]:

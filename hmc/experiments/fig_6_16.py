@@ -8,11 +8,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import matplotlib.pyplot as plt
-import numpy as np
 
 from hmc.experiments import filter_runs as runs
-from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
+from hmc.experiments.engine.experiment import Cell, Experiment, Plan, Report, Table
 from hmc.experiments.filter_grids import LAYERS, PARTICLES, filter_grid, grouped_rows, layer_map, matrix, mmta_bar
+from hmc.experiments.pose_intervals import ahead
 
 __all__ = ["EXPERIMENT"]
 
@@ -40,23 +40,26 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     figure, panels = plt.subplots(len(runs.ANNEALING), len(DATA), figsize=(8.4, 2.6 * len(runs.ANNEALING)), sharex=True, sharey=True)
     claims = []
     for annealing, line in zip(runs.ANNEALING, panels, strict=True):
-        means = []
         for (cameras, voxel), axes in zip(DATA, line, strict=True):
             own = [row for row in rows if (row["annealing"], row["cameras"], row["voxel_mm"]) == (annealing, cameras, voxel)]
             values = matrix(own, layers, particles)
-            means.append(float(np.mean(values)))
             layer_map(axes, values, layers, particles)
             axes.set(
                 title=f"{cameras or 'all'} cameras, {voxel / 10:g} cm\n{annealing} annealing", xlabel="particles a layer", ylabel="layers"
             )
-        detail = ", ".join(f"{c or 'all'} cameras {v / 10:g} cm: {mean:.1f} %" for (c, v), mean in zip(DATA, means, strict=True))
+        few, coarse, fine = (_chosen(cells, annealing, *data) for data in DATA)
         claims += [
-            Claim(f"{annealing} annealing: more cameras are better", means[1] > means[0], detail),
-            Claim(f"{annealing} annealing: smaller voxels are better", means[2] > means[1], detail),
+            ahead(f"{annealing} annealing: more cameras are better", coarse, few, but=("cameras", "voxel_mm")),
+            ahead(f"{annealing} annealing: smaller voxels are better", fine, coarse, but=("cameras", "voxel_mm")),
         ]
     mmta_bar(figure, panels)
     caption = "MMTA at 100 mm by cameras, voxels, layers and particles. The paper: Canton, Figure 6.16, in color without numbers."
     return Report((Table("fig-6.16", caption, rows),), {"fig-6.16": figure}, tuple(claims))
+
+
+def _chosen(cells: Sequence[Cell], annealing: str, cameras: int, voxel_mm: int) -> list[Cell]:
+    wanted = {"annealing": annealing, "cameras": cameras, "voxel_mm": voxel_mm}
+    return [one for one in cells if wanted.items() <= one.parameters.items()]
 
 
 EXPERIMENT = Experiment("fig-6.16", "cameras and voxel size", "Canton, Figure 6.16", grid, runs.cell, report, runs.FAMILY, runs.VERSION)

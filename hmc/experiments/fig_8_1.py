@@ -13,9 +13,10 @@ import matplotlib.pyplot as plt
 
 from hmc.experiments import scalable_runs as runs
 from hmc.experiments.by_action import pose_scores
-from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
+from hmc.experiments.engine.experiment import Cell, Experiment, Plan, Report, Table
 from hmc.experiments.filter_grids import STUDIED
 from hmc.experiments.filter_runs import ANNEALING
+from hmc.experiments.pose_intervals import ahead
 
 __all__ = ["EXPERIMENT"]
 
@@ -43,7 +44,6 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     claims, ways = [], WAYS[plan.quick]
     figure, panels = plt.subplots(len(ways), 2, figsize=(7.5, 2.8 * len(ways)), sharex=True, squeeze=False)
     for annealing, line in zip(ways, panels, strict=True):
-        found: dict[str, list[dict[str, Any]]] = {}
         for method in METHODS:
             own = []
             for count in COUNTS[plan.quick]:
@@ -52,20 +52,17 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
                 own.append(
                     {"annealing": annealing, "method": method, "evaluations": count} | pose_scores(chosen) | {"filter_frames_per_s": fps}
                 )
-            found[method] = own
             rows += own
             for axes, column in zip(line, ("MMTP_mm", "MMTA_percent"), strict=True):
                 axes.plot([row["evaluations"] for row in own], [row[column] for row in own], "o-", label=method)
         for axes, label in zip(line, ("MMTP (mm)", "MMTA at 100 mm (%)"), strict=True):
             axes.set(title=f"{annealing} annealing", xlabel="evaluations a frame", ylabel=label)
         for method in METHODS[1:]:
-            pairs = list(zip(found[runs.APF], found[method], strict=True))
-            for column, sign, unit in (("MMTA_percent", 1, "%"), ("MMTP_mm", -1, "mm")):
-                detail = ", ".join(f"{two['evaluations']}: {one[column]:.1f} against {two[column]:.1f} {unit}" for one, two in pairs)
-                better = all(sign * two[column] > sign * one[column] for one, two in pairs)
-                claims.append(
-                    Claim(f"{annealing} annealing: {method} better than APF in {column.partition('_')[0]} at every count", better, detail)
-                )
+            for count in COUNTS[plan.quick]:
+                groups = runs.by_method(cells, evaluations=count, annealing=annealing)
+                for score in ("MMTA_percent", "MMTP_mm"):
+                    text = f"{annealing} annealing, {count} evaluations: {method} better than APF in {score.partition('_')[0]}"
+                    claims.append(ahead(text, groups[method], groups[runs.APF], score))
     panels[0, 1].legend()
     caption = "APF and SHBM-APF by evaluations of the likelihood a frame (Canton, Figure 8.1, drawn without numbers)."
     return Report((Table("fig-8.1", caption, rows),), {"fig-8.1": figure}, tuple(claims))

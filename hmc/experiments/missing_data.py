@@ -13,7 +13,8 @@ import numpy as np
 
 from hmc.experiments import scalable_runs as runs
 from hmc.experiments.by_action import pose_scores
-from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
+from hmc.experiments.engine.experiment import Cell, Experiment, Plan, Report, Table
+from hmc.experiments.pose_intervals import ahead
 from hmc.experiments.truth import estimates
 
 __all__ = ["EXPERIMENT"]
@@ -57,15 +58,12 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
             axes.set(title=how, xlabel="silhouettes removed (%)", ylabel=label)
     panels[0, 0].legend(fontsize=7)
 
-    def mean(method: str) -> float:
-        return float(
-            np.mean([row["mean_mm"] for row in rows if row["method"] == method and row["removed"] == "limbs" and row["removed_percent"]])
-        )
-
-    claim = Claim(
+    lost = runs.by_method([one for one in cells if one.parameters["removed"] == "limbs"])
+    claim = ahead(
         "where limbs are removed, what DDM-APF estimates is nearer to the truth than what APF does",
-        mean("DDM-APF") < mean(runs.APF),
-        ", ".join(f"{method} {mean(method):.1f} mm" for method in METHODS),
+        lost["DDM-APF"],
+        lost[runs.APF],
+        "mean_mm",
     )
     return Report((Table("missing-data", "Errors by share of silhouette pixels removed.", rows),), {"missing-data": figure}, (claim,))
 

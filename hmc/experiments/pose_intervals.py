@@ -8,12 +8,12 @@ import numpy as np
 
 from hmc.errors import InputError
 from hmc.experiments.by_action import MATCHED_MM, NEAR_MM
-from hmc.experiments.engine.experiment import Cell
+from hmc.experiments.engine.experiment import Cell, Claim
 from hmc.experiments.engine.intervals import Interval, difference, interval
 from hmc.experiments.truth import estimates
 from hmc.metrics.landmarks import landmark_errors
 
-__all__ = ["SCORES", "is_followed", "score_difference", "score_interval"]
+__all__ = ["SCORES", "ahead", "is_followed", "score_difference", "score_interval"]
 
 #: As `hmc.experiments.by_action.pose_scores` calls them.
 SCORES = ("mean_mm", "MMTP_mm", "MMTA_percent", "MMTA_50_percent")
@@ -54,8 +54,28 @@ def score_difference(first: Sequence[Cell], second: Sequence[Cell], score: str, 
     if not shared:
         raise InputError(f"groups are compared cell by cell, and no two of these agree in all but {', '.join(but)}")
     clips = [_clip(one[key]) for key in shared]
-    pairs = ([cells[key] for key in shared] for cells in (one, other))
-    return difference(clips, *(_sums(cells, score) for cells in pairs))
+    sums = [_sums([cells[key] for key in shared], score) for cells in (one, other)]
+    return difference(clips, sums[0], sums[1])
+
+
+def ahead(text: str, better: Sequence[Cell], worse: Sequence[Cell], score: str = "MMTA_percent", but: Sequence[str] = ("method",)) -> Claim:
+    """The claim that one group's score is better than another's: it holds where the interval of the difference says so.
+
+    Parameters
+    ----------
+    text : str
+    better, worse : sequence of Cell
+    score : str
+        One of `SCORES`; errors are better where they are smaller.
+    but : sequence of str
+        As for `score_difference`.
+    """
+    error = score.endswith("_mm")
+    first, second = (worse, better) if error else (better, worse)
+    gain = score_difference(first, second, score, but)
+    unit = "mm" if error else "%"
+    detail = f"{score.split('_')[0]} {score_interval(better, score)} {unit} for {score_interval(worse, score)}: better by {gain}"
+    return Claim(text, gain.above_zero, detail)
 
 
 def is_followed(cells: Sequence[Cell], least_percent: float = 50.0) -> bool:

@@ -70,7 +70,7 @@ def interval(clips: Sequence[str], sums: np.ndarray, counts: np.ndarray, draws: 
     """
     picked = _draws(_by_clip(clips, len(sums)), draws)
     sums, counts = np.asarray(sums, float), np.asarray(counts, float)
-    return _interval(float(_ratio(sums.sum(), counts.sum())), _ratio(picked @ sums, picked @ counts))
+    return _interval(float(_ratio(sums.sum(), counts.sum())), _ratio(picked @ sums, picked @ counts), len(sums))
 
 
 def difference(
@@ -94,7 +94,7 @@ def difference(
         sums, counts = np.asarray(sums, float), np.asarray(counts, float)
         value += sign * float(_ratio(sums.sum(), counts.sum()))
         drawn = drawn + sign * _ratio(picked @ sums, picked @ counts)
-    return _interval(value, drawn)
+    return _interval(value, drawn, len(clips))
 
 
 def _by_clip(clips: Sequence[str], n: int) -> list[np.ndarray]:
@@ -117,9 +117,9 @@ def _ratio(sums: np.ndarray, counts: np.ndarray) -> np.ndarray:
     return np.divide(sums, counts, out=np.full(np.shape(sums), np.nan), where=np.asarray(counts) > 0)
 
 
-def _interval(value: float, drawn: np.ndarray) -> Interval:
+def _interval(value: float, drawn: np.ndarray, n: int) -> Interval:
     known = drawn[np.isfinite(drawn)]
-    if not len(known) or np.ptp(known) == 0:  # one run, or runs that are all the same, tell nothing of others
+    if not len(known) or n < 2:  # one run tells nothing of others
         return Interval(value, -np.inf, np.inf)
     low, high = np.quantile(known, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
     return Interval(value, float(low), float(high))
