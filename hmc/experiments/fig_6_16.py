@@ -30,6 +30,7 @@ def grid(plan: Plan) -> list[dict]:
             for layers in LAYERS[plan.quick]
             for particles in PARTICLES[plan.quick]
         ],
+        quick_repeats=3,
     )
 
 

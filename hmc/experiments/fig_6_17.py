@@ -32,7 +32,7 @@ COMPARED: dict[str, Any] = {"annealing": "strong", "layers": 6, "particles": 600
 def grid(plan: Plan) -> list[dict]:
     """Both likelihoods with every number of layers and particles; and in one cell of these with all actions and seeds."""
     every = _settings(LAYERS[plan.quick], PARTICLES[plan.quick])
-    cells = filter_grid(plan, every, ACTIONS)
+    cells = filter_grid(plan, every, ACTIONS, quick_repeats=REPEATS)
     return cells + [parameters for parameters in _compared(plan) if parameters not in cells]
 
 
@@ -50,7 +50,7 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     layers, particles = LAYERS[plan.quick], PARTICLES[plan.quick]
     wanted = _compared(plan)
     compared = [one for one in cells if one.parameters in wanted]
-    cells = cells[: len(filter_grid(plan, _settings(layers, particles), ACTIONS))]
+    cells = cells[: len(filter_grid(plan, _settings(layers, particles), ACTIONS, quick_repeats=REPEATS))]
     rows = grouped_rows(cells, ("annealing", "likelihood", "layers", "particles"))
     each = grouped_rows(cells, ("recording", "annealing", "likelihood", "layers", "particles"))
     figure, panels = plt.subplots(len(runs.ANNEALING), 2, figsize=(6.4, 2.6 * len(runs.ANNEALING)), sharex=True, sharey=True)

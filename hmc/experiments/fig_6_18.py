@@ -25,7 +25,7 @@ NO_LOSS, QUICKER = 5.0, 1.5
 
 def grid(plan: Plan) -> list[dict]:
     """Every density with 6 layers of 600 particles."""
-    return filter_grid(plan, [{"density": density} for density in DENSITIES[plan.quick]])
+    return filter_grid(plan, [{"density": density} for density in DENSITIES[plan.quick]], quick_repeats=3)
 
 
 def report(cells: Sequence[Cell], plan: Plan) -> Report:

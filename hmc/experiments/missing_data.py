@@ -33,7 +33,7 @@ def grid(plan: Plan) -> list[dict]:
         for share in SHARES[plan.quick]
         for how in (HOW if share else HOW[:1])
     ]
-    return runs.method_grid(plan, ACTIONS[plan.quick], settings)
+    return runs.method_grid(plan, ACTIONS[plan.quick], settings, quick_repeats=3)
 
 
 def report(cells: Sequence[Cell], plan: Plan) -> Report:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from hmc.errors import InputError
 from hmc.experiments.by_action import MATCHED_MM, NEAR_MM
 from hmc.experiments.engine.experiment import Cell, Claim
 from hmc.experiments.engine.intervals import Interval, difference, interval
+from hmc.experiments.engine.selection import REPEAT
 from hmc.experiments.truth import estimates
 from hmc.metrics.landmarks import landmark_errors
 
@@ -29,7 +30,8 @@ def score_interval(cells: Sequence[Cell], score: str) -> Interval:
     score : str
         One of `SCORES`.
     """
-    return interval([_clip(one) for one in cells], *_sums(cells, score))
+    runs = _runs(cells)
+    return interval([clip for clip, _ in runs], *_sums(runs.values(), score))
 
 
 def score_difference(first: Sequence[Cell], second: Sequence[Cell], score: str, but: Sequence[str] = ("method",)) -> Interval:
@@ -53,9 +55,9 @@ def score_difference(first: Sequence[Cell], second: Sequence[Cell], score: str, 
     shared = [key for key in one if key in other]
     if not shared:
         raise InputError(f"groups are compared cell by cell, and no two of these agree in all but {', '.join(but)}")
-    clips = [_clip(one[key]) for key in shared]
-    sums = [_sums([cells[key] for key in shared], score) for cells in (one, other)]
-    return difference(clips, sums[0], sums[1])
+    runs = [_runs([cells[key] for key in shared]) for cells in (one, other)]
+    sums = [_sums(cells.values(), score) for cells in runs]
+    return difference([clip for clip, _ in runs[0]], sums[0], sums[1])
 
 
 def ahead(text: str, better: Sequence[Cell], worse: Sequence[Cell], score: str = "MMTA_percent", but: Sequence[str] = ("method",)) -> Claim:
@@ -83,19 +85,23 @@ def is_followed(cells: Sequence[Cell], least_percent: float = 50.0) -> bool:
     return score_interval(cells, "MMTA_percent").low > least_percent
 
 
-def _clip(one: Cell) -> str:
-    return str(one.parameters["recording"])
+def _runs(cells: Sequence[Cell]) -> dict[tuple[str, int], list[Cell]]:
+    """Cells by clip and seed: what else differs was chosen, not drawn, and is taken together."""
+    found: dict[tuple[str, int], list[Cell]] = {}
+    for one in cells:
+        found.setdefault((str(one.parameters["recording"]), one.parameters.get(REPEAT, 0)), []).append(one)
+    return found
 
 
 def _without(one: Cell, but: Sequence[str]) -> str:
     return repr(sorted((name, value) for name, value in one.parameters.items() if name not in but))
 
 
-def _sums(cells: Sequence[Cell], score: str) -> tuple[np.ndarray, np.ndarray]:
-    """Numerator and denominator of a score, one a cell."""
+def _sums(runs: Iterable[Sequence[Cell]], score: str) -> tuple[np.ndarray, np.ndarray]:
+    """Numerator and denominator of a score, one a run."""
     if score not in SCORES:
         raise InputError(f"no interval of {score!r}; there are {', '.join(SCORES)}")
-    parts = [_parts(1000 * landmark_errors(*estimates(one)), score) for one in cells]
+    parts = [np.sum([_parts(1000 * landmark_errors(*estimates(one)), score) for one in cells], axis=0) for cells in runs]
     sums, counts = np.array(parts, float).reshape(-1, 2).T
     return sums, counts
 

@@ -106,7 +106,7 @@ def _is_better(name, parameters):
     if name == "fig-6.17":
         return parameters["likelihood"] == "factorised"
     if name == "fig-6.18":
-        return parameters["density"] == 2
+        return parameters["density"] in (1, 2)
     if name == "what-each-adds":
         return parameters["without"] == markerless_runs.EVERYTHING
     return parameters["cameras"] == 0 and (parameters["voxel_mm"] == 20 or parameters["particles"] == 600)
