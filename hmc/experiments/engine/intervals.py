@@ -2,11 +2,12 @@
 
 Figures of a study are ratios of sums over many clips and seeds (a mean error is a sum of errors over a number of landmarks), and clips
 differ far more than seeds do. So clips are drawn with replacement, and of each clip drawn its seeds; two methods are compared on the same
-draws.
+draws. The bootstrap of few runs is too narrow (of three it misses the truth in a quarter of all cases): intervals are widened as Student's are.
 
 References
 ----------
 Davison and Hinkley (1997), Bootstrap Methods and their Application, section 3.8: hierarchical data.
+Hesterberg (2015), What Teachers Should Know About the Bootstrap, section 3.2: narrowness of percentile intervals of few values.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import stats
 
 from hmc.errors import InputError
 
@@ -68,9 +70,10 @@ def interval(clips: Sequence[str], sums: np.ndarray, counts: np.ndarray, draws: 
     InputError
         When the lengths differ.
     """
-    picked = _draws(_by_clip(clips, len(sums)), draws)
+    groups = _by_clip(clips, len(sums))
+    picked = _draws(groups, draws)
     sums, counts = np.asarray(sums, float), np.asarray(counts, float)
-    return _interval(float(_ratio(sums.sum(), counts.sum())), _ratio(picked @ sums, picked @ counts), len(sums))
+    return _interval(float(_ratio(sums.sum(), counts.sum())), _ratio(picked @ sums, picked @ counts), groups)
 
 
 def difference(
@@ -88,13 +91,14 @@ def difference(
     first, second : (sums, counts), each array, shape (n,)
     draws : int
     """
-    picked = _draws(_by_clip(clips, len(first[0])), draws)
+    groups = _by_clip(clips, len(first[0]))
+    picked = _draws(groups, draws)
     value, drawn = 0.0, np.zeros(draws)
     for sign, (sums, counts) in ((1, first), (-1, second)):
         sums, counts = np.asarray(sums, float), np.asarray(counts, float)
         value += sign * float(_ratio(sums.sum(), counts.sum()))
         drawn = drawn + sign * _ratio(picked @ sums, picked @ counts)
-    return _interval(value, drawn, len(clips))
+    return _interval(value, drawn, groups)
 
 
 def _by_clip(clips: Sequence[str], n: int) -> list[np.ndarray]:
@@ -117,9 +121,12 @@ def _ratio(sums: np.ndarray, counts: np.ndarray) -> np.ndarray:
     return np.divide(sums, counts, out=np.full(np.shape(sums), np.nan), where=np.asarray(counts) > 0)
 
 
-def _interval(value: float, drawn: np.ndarray, n: int) -> Interval:
+def _interval(value: float, drawn: np.ndarray, groups: list[np.ndarray]) -> Interval:
     known = drawn[np.isfinite(drawn)]
+    n = len(groups) if len(groups) > 1 else sum(map(len, groups))
     if not len(known) or n < 2:  # one run tells nothing of others
         return Interval(value, -np.inf, np.inf)
-    low, high = np.quantile(known, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
+    tail = (1 + LEVEL) / 2
+    wider = stats.t.ppf(tail, n - 1) / stats.norm.ppf(tail) * np.sqrt(n / (n - 1))
+    low, high = value + wider * (np.quantile(known, [1 - tail, tail]) - value)
     return Interval(value, float(low), float(high))
