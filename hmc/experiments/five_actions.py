@@ -35,7 +35,7 @@ ACTORS = {
     ),
 }  # fmt: skip
 #: Length and rate in full; HumanEva-I has 30 frames a second.
-SECONDS, FPS = 6.0, 30.0
+SECONDS, FPS = 10.0, 30.0
 #: The quick mode's recordings: smaller images and fewer of them.
 QUICK_SUFFIX, QUICK_SECONDS, QUICK_FPS, QUICK_SIZE_PX = "_quick", 1.6, 20.0, (320, 240)
 #: The same, long enough to be lost in it and found again.
