@@ -18,7 +18,7 @@ from hmc.body.joints import DOF_NAMES, dof_index
 from hmc.body.model import PARTS
 from hmc.errors import InputError
 
-__all__ = ["MODEL_1", "MODEL_2", "UNITIVE", "UNITIVE_PIECES", "Inclusive", "Model", "Union", "Unitive"]
+__all__ = ["MODEL_1", "MODEL_2", "PRINTED_1", "PRINTED_2", "UNITIVE", "UNITIVE_PIECES", "Inclusive", "Model", "Union", "Unitive"]
 
 
 @dataclass(frozen=True)
@@ -272,7 +272,25 @@ def _shbm(name: str, first_parts: tuple[str, ...]) -> Inclusive:
     )
 
 
-#: Model 1 of Figure 7.7: whole limbs are oriented first, then bent.
+def _printed(name: str, second_parts: tuple[str, ...]) -> Inclusive:
+    """Figure 7.7 as it is drawn and told (section 7.3.2.1): the torso alone, then the limbs' directions, then all.
+
+    What the second model cannot bend is straight. Eq. 7.17 repeats an angle and lacks the waist: here the last model has the whole body's.
+    """
+    return Inclusive(
+        name,
+        (
+            Model("torso", _ROOT, ("torso",)),
+            Model("limbs", (*_ROOT, *_SECOND), second_parts),
+            Model("body", (*_ROOT, *_SECOND, *_THIRD, *_TRUNK), PARTS),
+        ),
+        held="rest",
+    )
+
+
+#: The thesis's models: in the first whole limbs, held straight, are oriented and then bent; in the second upper arms and thighs come first.
+PRINTED_1, PRINTED_2 = _printed("1, as printed", PARTS), _printed("2, as printed", _UPPER)
+#: Model 1, ours: whole limbs are oriented first, then bent.
 MODEL_1 = _shbm("1", PARTS)
 #: Model 2: upper arms and thighs first, then forearms and shanks.
 MODEL_2 = _shbm("2", _UPPER)

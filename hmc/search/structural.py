@@ -32,12 +32,14 @@ __all__ = [
 
 @dataclass(frozen=True)
 class StructuralSettings:
-    """Settings of `structural_step`; the defaults are the printed ones (Canton, 7.5.1).
+    """Settings of `structural_step`; the defaults are the printed ones (Canton, 7.5.1), but for `assigned`.
 
     Parameters
     ----------
     gamma : float
         Particles for each dimension that a model adds (Eq. 7.28).
+    assigned : tuple of int
+        Dimensions by which particles are shared out among the models (Eq. 7.21), where they are not those that each adds.
     layers : int
         Annealed layers of each model, L.
     inner : float
@@ -61,6 +63,7 @@ class StructuralSettings:
     """
 
     gamma: float = 50.0
+    assigned: tuple[int, ...] = ()
     layers: int = 2
     inner: float = 0.5
     structural: float = 0.8
@@ -83,8 +86,16 @@ class StructuralSettings:
             raise InputError(f"`crossed` must lie in 0 to 1; got {self.crossed}")
 
     def particles(self, added: np.ndarray) -> np.ndarray:
-        """Particles of each model for the dimensions that it adds (Eq. 7.28), two at least."""
-        return np.maximum(np.rint(self.gamma * np.asarray(added)).astype(int), 2)
+        """Particles of each model for the dimensions that it adds (Eq. 7.28), two at least.
+
+        Raises
+        ------
+        InputError
+            When `assigned` has not one number a model.
+        """
+        if self.assigned and len(self.assigned) != len(added):
+            raise InputError(f"`assigned` must have one number for each of {len(added)} models; got {self.assigned}")
+        return np.maximum(np.rint(self.gamma * np.asarray(self.assigned or added)).astype(int), 2)
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,7 @@ def annealed_pose_step(preset: PosePreset):
     """
     propose = structured(preset) if preset.models else annealed(preset)
     step = as_proposed(propose) if preset.refine is None else polished(propose, preset.polish)
-    return step if preset.limbs is None else with_hidden_limbs(step, preset.limbs)
+    return step if preset.limbs is None else with_hidden_limbs(step, preset.limbs, preset.hull)
 
 
 def annealed_method(preset: PosePreset, name: str = "apf") -> PoseMethod:

@@ -6,27 +6,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from hmc.body.model_file import read_hierarchy
-from hmc.body.scalable_models import MODEL_1, MODEL_2, UNITIVE_PIECES, Inclusive, Unitive
+from hmc.body.scalable_models import Inclusive, Unitive
 from hmc.errors import InputError
-from hmc.pose.steps.hidden.limbs import LimbSettings
 from hmc.pose.steps.presets import PosePreset
 
 __all__ = ["SCALABLE_METHODS", "method_preset"]
 
 SCALABLE_METHODS = ("shbm-apf", "ddm-apf", "shbm-ddm-apf")
-#: For presets that refine. Strong annealing leaves particles close together whatever the data: the spread says nothing of a tracked limb.
-_REFINED_LIMBS = LimbSettings(
-    UNITIVE_PIECES,
-    lost_spread_deg=0.0,
-    lost_occupancy=0.4,
-    lost_strict=0.7,
-    lost_closeness=0.45,
-    lost_inside=0.5,
-    found_spread_deg=8.0,
-    found_occupancy=0.7,
-    found_strict=0.4,
-)
-_SHIPPED = {"1": (MODEL_1,), "2": (MODEL_2,), "auto": (MODEL_1, MODEL_2)}
 
 
 def method_preset(preset: PosePreset, method: str, models: Sequence[str] = ()) -> PosePreset:
@@ -37,18 +23,19 @@ def method_preset(preset: PosePreset, method: str, models: Sequence[str] = ()) -
     preset : PosePreset
     method : {"apf", "shbm-apf", "ddm-apf", "shbm-ddm-apf"}
     models : sequence of str
-        "1" (the default), "2", "auto" (in every frame the one that suits the last pose), or files of hierarchies (`read_hierarchy`): at
-        most one inclusive one, for structural annealing, and one unitive one, for missing limbs.
+        "1" (the default) and "2" of the preset's `hierarchies`, "auto" (in every frame the one that suits the last pose), or files of
+        hierarchies (`read_hierarchy`): at most one inclusive one, for structural annealing, and one unitive one, for missing limbs.
 
     Raises
     ------
     InputError
         When the method has no use for a model, or two stand for the same.
     """
+    shipped = {"1": preset.hierarchies[:1], "2": preset.hierarchies[1:], "auto": preset.hierarchies}
     structural: tuple[Inclusive, ...] | None = None
     tree: Unitive | None = None
     for text in models:
-        found = _SHIPPED[text] if text in _SHIPPED else read_hierarchy(text)
+        found = shipped[text] if text in shipped else read_hierarchy(text)
         unitive = isinstance(found, Unitive)
         if method not in SCALABLE_METHODS or (unitive and "ddm" not in method) or (not unitive and "shbm" not in method):
             what = "unitive" if unitive else "inclusive"
@@ -61,8 +48,8 @@ def method_preset(preset: PosePreset, method: str, models: Sequence[str] = ()) -
         else:
             structural = (found,) if isinstance(found, Inclusive) else found
     if "shbm" in method:
-        preset = replace(preset, models=structural or _SHIPPED["1"])
+        preset = replace(preset, models=structural or shipped["1"])
     if "ddm" in method:
-        limbs = LimbSettings() if preset.refine is None else _REFINED_LIMBS
+        limbs = preset.hidden_limbs
         preset = replace(preset, limbs=limbs if tree is None else replace(limbs, tree=tree))
     return preset

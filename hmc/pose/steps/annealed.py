@@ -95,7 +95,7 @@ def frame_data(
     if target is None:
         raise ValueError("the frame has no hulls of this person")
     if preset.likelihood != "symmetric":
-        return ScoreData(score_maps(target, subject.capture.room), preset.likelihood == "global")
+        return ScoreData(score_maps(target, subject.capture.room, preset.hull), preset.likelihood == "global")
     points = points_to_cover(rng, target, preset.hull_points, preset.symmetric.ray_share)
     part = nearest_part(subject.body, tracked.state, points) if by_part else None
     return SymmetricData(target, points, preset.symmetric, part)

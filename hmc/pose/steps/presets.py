@@ -9,7 +9,7 @@ import numpy as np
 
 from hmc.body.dimensions import FitBodySettings
 from hmc.body.joints import DOF_NAMES
-from hmc.body.scalable_models import Inclusive
+from hmc.body.scalable_models import MODEL_1, MODEL_2, PRINTED_1, PRINTED_2, UNITIVE_PIECES, Inclusive
 from hmc.errors import InputError
 from hmc.pose.objectives.symmetric import SymmetricSettings
 from hmc.pose.steps.hidden.limbs import LimbSettings
@@ -72,6 +72,8 @@ class PosePreset:
         Points of the body's surface, and rays and points of the hull's, in the symmetric cost, for the particles.
     surface_samples, fine_hull_points : int
         The same in the refinement.
+    hull : {"tolerant", "strict"}
+        The voxels that the four scores read.
     density : float
         Spacing of the flesh table over the voxel size (Canton, Eq. 6.26), for the four scores.
     symmetric : SymmetricSettings
@@ -91,6 +93,10 @@ class PosePreset:
         Where there are `models`.
     limbs : LimbSettings or None
         Limbs that the data does not show are left out and looked for.
+    hierarchies : tuple of two Inclusive
+        The `models` "1" and "2" of methods that have such (`hmc.pose.methods.scalable`).
+    hidden_limbs : LimbSettings
+        The `limbs` of methods that leave some out.
     """
 
     name: str
@@ -104,6 +110,7 @@ class PosePreset:
     hull_points: int = 250
     surface_samples: int = 350
     fine_hull_points: int = 600
+    hull: Literal["tolerant", "strict"] = "tolerant"
     density: float = 1.0
     symmetric: SymmetricSettings = field(default_factory=SymmetricSettings)
     refine: RefineSettings | None = None
@@ -113,6 +120,8 @@ class PosePreset:
     models: tuple[Inclusive, ...] = ()
     structural: StructuralSettings = field(default_factory=StructuralSettings)
     limbs: LimbSettings | None = None
+    hierarchies: tuple[Inclusive, Inclusive] = (MODEL_1, MODEL_2)
+    hidden_limbs: LimbSettings = field(default_factory=LimbSettings)
 
     def __post_init__(self) -> None:
         if self.refine is None and (self.search is not None or self.fit_body is not None or self.start != "neutral"):
@@ -128,13 +137,34 @@ class PosePreset:
         return PolishSettings(self.symmetric, self.fine_hull_points, self.refine or RefineSettings(), self.search)
 
 
+#: Strong annealing leaves particles close together whatever the data: the spread says nothing of a tracked limb.
+_HIDDEN_LIMBS = LimbSettings(
+    UNITIVE_PIECES,
+    lost_spread_deg=0.0,
+    lost_occupancy=0.4,
+    lost_strict=0.7,
+    lost_closeness=0.45,
+    lost_inside=0.5,
+    found_spread_deg=8.0,
+    found_occupancy=0.7,
+    found_strict=0.4,
+    lost_frames=3,
+    found_frames=3,
+)
+
 PRESETS: dict[str, PosePreset] = {
     "canton2009": PosePreset(
         name="canton2009",
-        source="Canton (2009), 3.2.2 and 6.3 to 6.7: Tables 6.1 and 6.2, 6 layers of 600 particles, survival rate .5, neutral start",
+        source="Canton (2009), 3.2.2, 6.3 to 6.7 and 7.3 to 7.5: Tables 6.1 and 6.2, 6 layers of 600 particles, survival rate .5, neutral "
+        "start; 300, 500 and 300 particles in models of rising detail (Eq. 7.29); limbs lost at 15 degrees and .05, found at 5 and .7",
         body="canton",
         likelihood="factorised",
         annealed=AnnealedSettings(layers=6, particles=600, survival_rate=0.5, spread="survival"),
+        # "Some tolerance is permitted" (2.2.4), of no number.
+        hull="strict",
+        structural=StructuralSettings(gamma=50.0, assigned=(6, 10, 6), layers=2, inner=0.5, structural=0.8, survival_rate=0.5),
+        hierarchies=(PRINTED_1, PRINTED_2),
+        hidden_limbs=LimbSettings(lost_spread_deg=15.0, lost_occupancy=0.05, found_spread_deg=5.0, found_occupancy=0.7),
     ),
     "default": PosePreset(
         name="default",
@@ -147,5 +177,6 @@ PRESETS: dict[str, PosePreset] = {
         fit_body=FitBodySettings(),
         start="hypotheses",
         structural=StructuralSettings(gamma=11.0, layers=2, inner=0.6, survival_rate=0.3, by_limb=True),
+        hidden_limbs=_HIDDEN_LIMBS,
     ),
 }

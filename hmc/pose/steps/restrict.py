@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -220,14 +221,15 @@ class ScoreData:
         return lambda states: log_likelihood_factorised(scores(table, states, self.maps)[:, keep], variances.by_part()[keep])
 
 
-def score_maps(target: HullTarget, room: np.ndarray | None) -> ScoreMaps:
-    """The tolerant hull as the four scores read it.
+def score_maps(target: HullTarget, room: np.ndarray | None, hull: Literal["strict", "tolerant"] = "tolerant") -> ScoreMaps:
+    """A hull as the four scores read it.
 
     Parameters
     ----------
     target : HullTarget
     room : ndarray, shape (2, 3), or None
         Where a body may be, metres; for the score Out.
+    hull : {"strict", "tolerant"}
     """
     grid = VoxelGrid(target.origin - 0.5 * target.voxel_size_m, target.voxel_size_m, target.distance.shape)
-    return observe(target.tolerant, grid, room)
+    return observe(target.strict if hull == "strict" else target.tolerant, grid, room)

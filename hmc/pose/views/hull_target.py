@@ -36,8 +36,8 @@ class HullTarget:
     distance : ndarray of float32, shape (nx, ny, nz)
         How far a body's surface is from where it may be, metres: the distance to the tolerant hull plus a bounded share of that
         to the strict one, each as far as `FAR_M`; 0 inside both. Below the floor as right above it. A crop around the person.
-    tolerant : ndarray of bool, shape (nx, ny, nz)
-        The tolerant hull in the same crop.
+    strict, tolerant : ndarray of bool, shape (nx, ny, nz)
+        The strict and the tolerant hull in the same crop; the tolerant one holds the strict one.
     loose : ndarray of bool, shape (nx, ny, nz)
         Where else the person may be, in the same crop.
     origin : ndarray, shape (3,)
@@ -54,6 +54,7 @@ class HullTarget:
     """
 
     distance: np.ndarray
+    strict: np.ndarray
     tolerant: np.ndarray
     loose: np.ndarray
     origin: np.ndarray
@@ -141,7 +142,7 @@ def make_target(
         distance[..., :layer] = distance[..., layer : layer + 1]
     shell = grid.centres(surface(core) + low)
     volume_m3 = len(strict) * grid.voxel_size_m**3
-    return HullTarget(distance, occupied, maybe, grid.centres(low), grid.voxel_size_m, shell, volume_m3, floor_z)
+    return HullTarget(distance, core, occupied, maybe, grid.centres(low), grid.voxel_size_m, shell, volume_m3, floor_z)
 
 
 def _crop(volume: np.ndarray, low: np.ndarray, shape: np.ndarray) -> np.ndarray:

@@ -15,7 +15,7 @@ __all__ = ["LimbMemory", "LimbSettings", "limb_spread_deg", "look_again"]
 
 @dataclass(frozen=True)
 class LimbSettings:
-    """When a limb counts as lost and when as found again; the defaults are the printed ones.
+    """When a limb counts as lost and when as found again; the defaults are the printed ones; the scouts' numbers are not printed.
 
     Parameters
     ----------
@@ -59,8 +59,8 @@ class LimbSettings:
     found_spread_deg: float = 5.0
     found_occupancy: float = 0.7
     found_strict: float = 1.0
-    lost_frames: int = 3
-    found_frames: int = 3
+    lost_frames: int = 1
+    found_frames: int = 1
     scouts: int = 120
     scout_layers: int = 4
     scout_survival: float = 0.2

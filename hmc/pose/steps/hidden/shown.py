@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -48,9 +49,11 @@ class FleshInHulls:
     maps: ScoreMaps
 
 
-def flesh_in_hulls(table: ScoreTable, target: HullTarget, room: np.ndarray | None = None) -> FleshInHulls:
-    """Make a frame's hulls ready for the look-ups; `room`, shape (2, 3), as of `hmc.pose.steps.restrict.score_maps`."""
-    return FleshInHulls(table, target, score_maps(target, room))
+def flesh_in_hulls(
+    table: ScoreTable, target: HullTarget, room: np.ndarray | None = None, hull: Literal["strict", "tolerant"] = "tolerant"
+) -> FleshInHulls:
+    """Make a frame's hulls ready for the look-ups; `room`, shape (2, 3), and `hull` as of `hmc.pose.steps.restrict.score_maps`."""
+    return FleshInHulls(table, target, score_maps(target, room, hull))
 
 
 @dataclass(frozen=True)

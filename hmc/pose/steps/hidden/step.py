@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
 from hmc.body.joints import N_DOF
 from hmc.pose.method import PoseStep, StepInfo, Tracked, particles_of, unseen, with_particles
+from hmc.pose.objectives.four_scores import ScoreTable
 from hmc.pose.steps.hidden.limbs import LimbMemory, LimbSettings, limb_spread_deg, look_again
 from hmc.pose.steps.hidden.scouts import limb_dofs, scout
-from hmc.pose.steps.hidden.shown import covered, flesh_in_hulls, in_doubt, place_flesh
+from hmc.pose.steps.hidden.shown import FleshInHulls, covered, flesh_in_hulls, in_doubt, place_flesh
 from hmc.pose.steps.proposal import shows_enough
 from hmc.pose.steps.restrict import nearest_part, part_mask, restrict_target, restricted
 from hmc.pose.views.hull_target import HullTarget
@@ -28,7 +30,7 @@ class _There:
     dofs: np.ndarray
 
 
-def with_hidden_limbs(step: PoseStep, settings: LimbSettings) -> PoseStep:
+def with_hidden_limbs(step: PoseStep, settings: LimbSettings, hull: Literal["strict", "tolerant"] = "tolerant") -> PoseStep:
     """A step for the limbs that are there; then the tracked limbs are tested, and scouts look for the missing ones.
 
     Parameters
@@ -36,6 +38,8 @@ def with_hidden_limbs(step: PoseStep, settings: LimbSettings) -> PoseStep:
     step : callable
         `PoseStep`, of subjects whose flesh is known.
     settings : LimbSettings
+    hull : {"strict", "tolerant"}
+        In which a limb's occupancy is counted.
     """
 
     def look(rng: np.random.Generator, tracked: Tracked, view: PersonView) -> tuple[Tracked, StepInfo]:
@@ -48,7 +52,8 @@ def with_hidden_limbs(step: PoseStep, settings: LimbSettings) -> PoseStep:
         after, info = step(rng, part, replace(view, target=_asked(tracked, target, there)))
         estimate = np.where(there.dofs, after.state, tracked.state)
         after = replace(after, subject=tracked.subject)
-        memory, found, looked = _look(rng, after, target, estimate, memory, settings)
+        seen = flesh_in_hulls(_flesh(after), target, after.subject.capture.room, hull)
+        memory, found, looked = _look(rng, after, seen, estimate, memory, settings)
         particles = particles_of(after)
         particles = replace(particles, particles=np.where(found != estimate, found, particles.particles))
         # A limb that was put elsewhere has not moved there.
@@ -80,14 +85,18 @@ def _asked(tracked: Tracked, target: HullTarget, there: _There) -> HullTarget:
     return target
 
 
-def _look(
-    rng: np.random.Generator, tracked: Tracked, target: HullTarget, estimate: np.ndarray, memory: LimbMemory, limbs: LimbSettings
-) -> tuple[LimbMemory, np.ndarray, int]:
-    """Are the tracked limbs still shown, and the missing ones again? Memory, estimate with the limbs that were found, evaluations."""
-    tree, table, particles = limbs.tree, tracked.subject.flesh, particles_of(tracked)
+def _flesh(tracked: Tracked) -> ScoreTable:
+    table = tracked.subject.flesh
     if table is None:
         raise ValueError("the subject has no table of its flesh, by which limbs are looked for")
-    looked = flesh_in_hulls(table, target, tracked.subject.capture.room)
+    return table
+
+
+def _look(
+    rng: np.random.Generator, tracked: Tracked, looked: FleshInHulls, estimate: np.ndarray, memory: LimbMemory, limbs: LimbSettings
+) -> tuple[LimbMemory, np.ndarray, int]:
+    """Are the tracked limbs still shown, and the missing ones again? Memory, estimate with the limbs that were found, evaluations."""
+    tree, particles = limbs.tree, particles_of(tracked)
     weights = normalise(particles.log_weights)
     evidence = np.zeros(len(tree.limbs), bool)
     found, freed, evaluations = {}, {}, 0
