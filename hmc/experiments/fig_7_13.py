@@ -1,4 +1,4 @@
-"""Figure 7.13: SHBM-APF by particles a variable, models 1 and 2: walking asks for model 1, gestures for model 2.
+"""Figure 7.13: SHBM-APF by particles a variable, models 1 and 2: walking asks for model 1, gestures for model 2; with many, neither.
 
 Source: Canton (2009), section 7.5.1.
 """
@@ -6,55 +6,47 @@ Source: Canton (2009), section 7.5.1.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import matplotlib.pyplot as plt
 
-from hmc.body.joints import N_DOF
-from hmc.experiments import scalable_runs as runs
-from hmc.experiments.by_action import pose_scores
-from hmc.experiments.engine.experiment import Cell, Experiment, Plan, Report, Table
-from hmc.experiments.five_actions import action_title
+from hmc.experiments import filter_study as runs
+from hmc.experiments.engine.experiment import Cell, Experiment, Plan, Report
 from hmc.experiments.pose_intervals import ahead
+from hmc.experiments.study import draw_lines, runs_of, score_table, table_of
 
 __all__ = ["EXPERIMENT"]
 
 ACTIONS = ("walk", "gesture")
 #: Particles a variable.
-GAMMAS = {False: (10, 20, 30, 40, 50, 60, 80), True: (10, 50)}
-LAYERS = 2
+GAMMAS = {False: (10.0, 20.0, 30.0, 50.0, 80.0), True: (10.0, 25.0)}
+#: The model that the thesis finds better for an action, as a place in `MODELS`.
+BETTER = {"Walking": 0, "Gesture": 1}
+MODELS = runs.SHBM[:2]
 
 
 def grid(plan: Plan) -> list[dict]:
-    """Every model with every number of particles on both actions."""
-    settings = [{"method": method, "evaluations": LAYERS * gamma * N_DOF} for method in runs.SHBM for gamma in GAMMAS[plan.quick]]
-    return runs.method_grid(plan, ACTIONS, settings, quick_repeats=3)
+    """Both models with every number of particles on both actions."""
+    settings = [{"method": method, "gamma": gamma} for method in MODELS for gamma in GAMMAS[plan.quick]]
+    return runs.study_grid(plan, settings, runs.STUDY_FRAMES, ACTIONS)
 
 
 def report(cells: Sequence[Cell], plan: Plan) -> Report:
     """MMTA by particles a variable, a panel an action."""
-    actions = list(dict.fromkeys(action_title(one.parameters["recording"]) for one in cells))
-    rows: list[dict[str, Any]] = []
+    frame = runs_of(cells)
+    table = score_table(frame, ("action", "method", "gamma"))
+    actions = list(dict.fromkeys(frame.action))
     figure, panels = plt.subplots(1, len(actions), figsize=(3.6 * len(actions), 3), sharey=True, squeeze=False)
+    claims = []
     for action, axes in zip(actions, panels[0], strict=True):
-        here = [one for one in cells if action_title(one.parameters["recording"]) == action]
-        for method in runs.SHBM:
-            own: list[dict[str, Any]] = []
-            for gamma in GAMMAS[plan.quick]:
-                scores = pose_scores(runs.by_method(here, evaluations=LAYERS * gamma * N_DOF)[method])
-                own.append({"action": action, "method": method, "particles_a_variable": gamma} | scores)
-            axes.plot([row["particles_a_variable"] for row in own], [row["MMTA_percent"] for row in own], "o-", label=method)
-            rows += own
-        axes.set(title=action, xlabel="particles a variable", ylabel="MMTA at 100 mm (%)")
+        labels = {"title": action, "xlabel": "particles a variable", "ylabel": "MMTA at 100 mm (%)"}
+        draw_lines(axes, table[table.action == action], "gamma", "MMTA_percent", "method", **labels)
+        if action in BETTER:
+            own = frame[frame.action == action]
+            better, worse = (list(own[own.method == MODELS[place]].run) for place in (BETTER[action], 1 - BETTER[action]))
+            claims.append(ahead(f"{action}: model {BETTER[action] + 1} is ahead", better, worse))
     panels[0, 0].legend()
-    claims = [
-        ahead(f"{action}: model {best} is ahead", groups[runs.SHBM[best - 1]], groups[runs.SHBM[2 - best]])
-        for action, best in (("Walking", 1), ("Gesture", 2))
-        if action in actions
-        for groups in [runs.by_method([one for one in cells if action_title(one.parameters["recording"]) == action])]
-    ]
     caption = "SHBM-APF by particles a variable (Canton, Figure 7.13, drawn without numbers)."
-    return Report((Table("fig-7.13", caption, rows),), {"fig-7.13": figure}, tuple(claims))
+    return Report((table_of("fig-7.13", caption, table),), {"fig-7.13": figure}, tuple(claims))
 
 
 EXPERIMENT = Experiment(

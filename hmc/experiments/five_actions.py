@@ -11,7 +11,7 @@ from dataclasses import replace
 from hmc.synthetic.recipe import ActorRecipe, Recipe, load_recipe
 from hmc.synthetic.rigs import RigRecipe
 
-__all__ = ["ACTIONS", "ACTORS", "LONG_SUFFIX", "action_name", "action_recipes", "action_title"]
+__all__ = ["ACTIONS", "ACTORS", "LONG_SUFFIX", "action_name", "action_of", "action_recipe", "action_recipes", "action_title"]
 
 #: Actions, what the thesis calls them, and the shipped recipes that they come from.
 ACTIONS = {
@@ -47,31 +47,38 @@ def action_name(action: str, actor: str, quick: bool) -> str:
     return f"{action}_{actor}{QUICK_SUFFIX if quick else ''}"
 
 
+def action_of(source: str) -> str:
+    """The key in `ACTIONS` of a rendered recording's action; empty where the recording is no such."""
+    name = source.rpartition("@")[0].removesuffix(LONG_SUFFIX).removesuffix(QUICK_SUFFIX)
+    action, _, actor = name.rpartition("_")
+    return action if actor in ACTORS and action in ACTIONS else ""
+
+
 def action_title(source: str) -> str:
     """What the thesis calls the action of a rendered recording or of one of HumanEva-I; else the recording's own name."""
-    name = source.rpartition("@")[0].removesuffix(LONG_SUFFIX).removesuffix(QUICK_SUFFIX)
+    name = source.rpartition("@")[0]
     dataset = re.fullmatch(r"S\d+_([A-Za-z]+)_\d+", name)
-    if dataset and dataset[1] in HUMANEVA:
-        return ACTIONS[HUMANEVA[dataset[1]]][0]
-    action, _, actor = name.rpartition("_")
-    return ACTIONS[action][0] if actor in ACTORS and action in ACTIONS else name
+    action = HUMANEVA.get(dataset[1], "") if dataset else action_of(source)
+    return ACTIONS[action][0] if action else name
+
+
+def action_recipe(action: str) -> Recipe:
+    """The shipped recipe of an action, by its own actor, with the cameras of all."""
+    return replace(load_recipe(ACTIONS[action][1]), rig=RigRecipe("ring7"), seconds=SECONDS, fps=FPS)
 
 
 def action_recipes() -> list[Recipe]:
     """Every action by every actor, in full, quick, and quick but longer."""
     recipes = []
-    for action, (_, shipped) in ACTIONS.items():
-        base = load_recipe(shipped)
+    for action in ACTIONS:
+        base = action_recipe(action)
         moving = base.actors[0]
         for number, (actor, look) in enumerate(ACTORS.items()):
             who = replace(
                 look, motion=moving.motion, start_m=moving.start_m, heading_deg=moving.heading_deg, speed_m_s=moving.speed_m_s,
                 turn_radius_m=moving.turn_radius_m,
             )  # fmt: skip
-            recipe = replace(
-                base, name=action_name(action, actor, False), seed=base.seed + 100 * number, actors=(who,), rig=RigRecipe("ring7"),
-                seconds=SECONDS, fps=FPS,
-            )  # fmt: skip
+            recipe = replace(base, name=action_name(action, actor, False), seed=base.seed + 100 * number, actors=(who,))
             quick = replace(
                 recipe, name=action_name(action, actor, True), seconds=QUICK_SECONDS, fps=QUICK_FPS, background_frames=10, cell_m=0.025,
                 rig=RigRecipe("ring7", size_px=QUICK_SIZE_PX),

@@ -17,8 +17,9 @@ from hmc.camera.model import Rig
 from hmc.errors import InputError
 from hmc.experiments.engine.experiment import Parameters, Results
 from hmc.experiments.engine.inputs import Inputs
+from hmc.experiments.exploratory import action_drift, measured_truth
 from hmc.experiments.pose_runs import synthetic_detections
-from hmc.experiments.truth import HEIGHT_M, estimate_of, first_truth, standing_state, stature_m, truth_track
+from hmc.experiments.truth import HEIGHT_M, estimate_of, standing_state, stature_m, truth_track
 from hmc.io.detections import DetectionTable
 from hmc.io.recording import Recording
 from hmc.io.results import PoseTable
@@ -29,13 +30,13 @@ from hmc.pose.steps.marker_filter import MARKER_PRESETS, MarkerPreset, marker_fr
 from hmc.pose.views.markers import marker_views, seen_in_frame
 from hmc.synthetic.marker_detector import SyntheticDetector
 
-__all__ = ["FAMILY", "QUICK_FRAMES", "cell"]
+__all__ = ["FAMILY", "VERSION", "cell"]
 
 FAMILY = "markers"
+#: Of these cells.
+VERSION = 3
 #: Detections are in images of this width, about that of HumanEva-I's, whatever the recording's; pixels.
 WIDTH_PX = 640
-#: Frames of the quick mode.
-QUICK_FRAMES = 30
 
 
 def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Results:
@@ -54,14 +55,14 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
     # Errors are in pixels, so what one is worth must not depend on the recording's.
     cameras = tuple(camera.scaled(WIDTH_PX / camera.size[0]) for camera in recording.rig)
     recording = replace(recording, rig=Rig(cameras))
-    truth = first_truth(recording)
+    truth = measured_truth(recording, parameters["recording"])
     if parameters["frames"]:
         truth = truth.where(truth.frames < truth.frames[0] + parameters["frames"])
     detector = SyntheticDetector(parameters["detection_rate"], parameters["false_positives"], parameters["variance_px2"])
     table = synthetic_detections(recording, truth, detector, rng)
     seed, preset, problem = int(rng.integers(2**31)), _preset(parameters), ""
     if parameters["start"] == "true":
-        estimate = _from_the_truth(recording, truth, table, preset, rng)
+        estimate = _from_the_truth(recording, truth, table, preset, action_drift(recording, parameters["recording"]), rng)
         # The first frame is given.
         truth, estimate = truth.where(np.arange(1, len(truth.frames))), estimate[1:]
     else:
@@ -77,12 +78,12 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
 
 
 def _from_the_truth(
-    recording: Recording, truth: PoseTable, table: DetectionTable, preset: MarkerPreset, rng: np.random.Generator
+    recording: Recording, truth: PoseTable, table: DetectionTable, preset: MarkerPreset, drift: np.ndarray, rng: np.random.Generator
 ) -> np.ndarray:
-    """Landmarks of every frame, by the filter alone from the true pose of the first; (n, 15, 3), metres."""
+    """Landmarks of every frame, by the filter alone from the true pose of the first with the action's P0; (n, 15, 3), metres."""
     height = stature_m(recording) or HEIGHT_M
     body = canton_body(height) if preset.body == "canton" else default_body(height)
-    subject, views = make_subject(body, Capture(recording.fps)), marker_views(recording.rig)
+    subject, views = make_subject(body, Capture(recording.fps, drift=drift)), marker_views(recording.rig)
     state, _ = fit_landmarks(body, truth.positions[0], standing_state(body, truth.positions[0]))
     pose, estimate = begin_tracking(subject, state), [landmarks(body, state)]
     for frame in truth.frames[1:].tolist():

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from hmc.errors import InputError
-from hmc.experiments.by_action import MATCHED_MM, NEAR_MM
+from hmc.experiments.by_action import MATCHED_MM, NEAR_MM, STRICT_MM
 from hmc.experiments.engine.experiment import Cell, Claim
 from hmc.experiments.engine.intervals import Interval, difference, interval
 from hmc.experiments.engine.selection import REPEAT
@@ -17,7 +17,9 @@ from hmc.metrics.landmarks import landmark_errors
 __all__ = ["SCORES", "ahead", "is_followed", "score_difference", "score_interval"]
 
 #: As `hmc.experiments.by_action.pose_scores` calls them.
-SCORES = ("mean_mm", "MMTP_mm", "MMTA_percent", "MMTA_50_percent")
+SCORES = ("mean_mm", "MMTP_mm", "MMTA_percent", "MMTP_70_mm", "MMTA_70_percent", "MMTA_50_percent")
+#: By what a score's name says, how far a landmark may be to be matched.
+_WITHIN = {"_70_": STRICT_MM, "_50_": NEAR_MM}
 
 
 def score_interval(cells: Sequence[Cell], score: str) -> Interval:
@@ -111,7 +113,7 @@ def _parts(errors: np.ndarray, score: str) -> tuple[float, float]:
         there = np.isfinite(errors)
         means = np.where(there, errors, 0.0).sum(axis=1)[there.any(axis=1)] / there.sum(axis=1)[there.any(axis=1)]
         return float(means.sum()), float(len(means))
-    matched = errors <= (NEAR_MM if score == "MMTA_50_percent" else MATCHED_MM)
-    if score == "MMTP_mm":
+    matched = errors <= next((within for name, within in _WITHIN.items() if name in score), MATCHED_MM)
+    if score.startswith("MMTP"):
         return float(errors[matched].sum()), float(matched.sum())
     return 100 * float(matched.sum()), float((~np.isnan(errors)).sum())

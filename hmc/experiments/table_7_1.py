@@ -1,21 +1,20 @@
-"""Table 7.1: SHBM-APF action by action, models 1 and 2, and the model chosen frame by frame, which is ours.
+"""Table 7.1: SHBM-APF by action with models 1 and 2, of 1,100 particles; beside it ours, with strong annealing.
 
-Source: Canton (2009), section 7.5.1: 50 particles a variable, 2 inner layers.
+Source: Canton (2009), section 7.5.1.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from hmc.body.joints import N_DOF
-from hmc.experiments import scalable_runs as runs
+from hmc.experiments import filter_study as runs
 from hmc.experiments.by_action import AVERAGE, action_cells, action_rows
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
 from hmc.experiments.five_actions import ACTIONS
-from hmc.experiments.pose_intervals import ahead, is_followed, score_difference, score_interval
-from hmc.experiments.table_6_4 import bars
+from hmc.experiments.pose_intervals import ahead, score_interval
+from hmc.experiments.study import action_bars, runs_of
 
-__all__ = ["EVALUATIONS", "EXPERIMENT", "PAPER"]
+__all__ = ["EXPERIMENT", "PAPER", "row_name", "table_grid"]
 
 PAPER = {
     "SHBM-APF, model 1": {
@@ -28,47 +27,63 @@ PAPER = {
     },
     "SHBM-APF, model 2": {
         "Walking": (43.07, 26.12, 40.21, 82.53, 5.24, 2.98),
-        "Jog": (46.51, 27.18, 43.09, 73.85, 7.17, 2.97),
+        "Jog": (46.51, 27.18, 43.09, 73.85, 7.17, 3.41),
         "Throw/Catch": (58.85, 26.79, 50.05, 72.52, 8.74, 3.19),
         "Gesture": (48.10, 29.12, 42.91, 76.14, 6.72, 2.58),
         "Box": (55.19, 26.54, 45.31, 77.21, 5.63, 2.80),
         AVERAGE: (51.34, 28.51, 45.31, 76.42, 6.73, 2.97),
     },
 }
-#: 50 particles for each of the body's variables, in 2 layers.
-EVALUATIONS = 2 * 50 * N_DOF
+#: The thesis's two, then ours: the same two with strong annealing, and the one of them that suits the last pose.
+ROWS = (("printed", runs.SHBM[0]), ("printed", runs.SHBM[1]), *(("strong", method) for method in runs.SHBM))
+#: Actions with straight limbs, for which the thesis finds model 1 better; model 2 for the others.
+STRAIGHT = ("Walking", "Jog")
+
+
+def row_name(annealing: str, method: str) -> str:
+    """What tables call a method with a way of annealing: the thesis's own by its name alone."""
+    return method if annealing == "printed" else f"{method}, strong annealing"
+
+
+def table_grid(plan: Plan, rows: Sequence[tuple[str, str]]) -> list[dict]:
+    """Ways of annealing and methods on whole recordings of all actions by both actors, three seeds."""
+    return runs.study_grid(plan, [{"annealing": annealing, "method": method} for annealing, method in rows])
 
 
 def grid(plan: Plan) -> list[dict]:
-    """Every model on every action."""
-    return runs.method_grid(plan, tuple(ACTIONS), [{"method": method, "evaluations": EVALUATIONS} for method in runs.SHBM], quick_repeats=3)
+    """Both of the thesis's models, and ours."""
+    return table_grid(plan, ROWS)
 
 
 def report(cells: Sequence[Cell], plan: Plan) -> Report:
     """A row an action and model."""
-    groups = runs.by_method(cells)
-    rows = [row for method in runs.SHBM for row in action_rows(groups[method], method, PAPER.get(method, {}))]
-    one, two, chosen = (groups[method] for method in runs.SHBM)
-    claims = []
-    for title in ("Walking", "Jog", "Throw/Catch", "Gesture", "Box"):
-        printed = [PAPER[method][title][3] for method in runs.SHBM[:2]]
-        pair = sorted(zip(printed, (1, 2), (action_cells(one, title), action_cells(two, title)), strict=True), reverse=True)
-        (_, best, better), (_, _, worse) = pair
-        if better:
-            claims.append(ahead(f"{title}: model {best} is ahead", better, worse))
-    claims.append(
-        Claim(
-            "people are followed, and the model chosen frame by frame is no worse than the better fixed one",
-            is_followed(chosen) and max(score_difference(fixed, chosen, "MMTA_percent").low for fixed in (one, two)) <= 0,
-            f"MMTA model 1 {score_interval(one, 'MMTA_percent')}, model 2 {score_interval(two, 'MMTA_percent')}, chosen "
-            f"{score_interval(chosen, 'MMTA_percent')} %; the paper 76.9 and 76.4 %",
-        )
-    )
+    frame, rows, groups = runs_of(cells), [], {}
+    for annealing, method in ROWS:
+        name = row_name(annealing, method)
+        groups[name] = list(frame[(frame.annealing == annealing) & (frame.method == method)].run)
+        rows += action_rows(groups[name], name, PAPER.get(name, {}))
+    one, two = (groups[method] for method in PAPER)
+    claims = [_reaches(method, groups[method]) for method in PAPER]
+    for action, _ in ACTIONS.values():
+        if action in set(frame.action):
+            better, worse = (one, two) if action in STRAIGHT else (two, one)
+            text = f"{action}: model {1 if action in STRAIGHT else 2} is ahead"
+            claims.append(ahead(text, action_cells(better, action), action_cells(worse, action)))
     caption = (
-        "SHBM-APF by action and model, from the true first pose: mean, deviation, MMTP and MMTA (matched within 100 mm; also 50 mm), "
+        "SHBM-APF by action and model, from the true first pose: mean, deviation, MMTP and MMTA (within 100 mm; also 70 and 50 mm), "
         "angles. The paper: Canton, Table 7.1, on HumanEva-I; here rendered recordings or the user's."
     )
-    return Report((Table("table-7.1", caption, rows),), {"table-7.1": bars(rows, runs.SHBM, PAPER["SHBM-APF, model 2"])}, tuple(claims))
+    return Report((Table("table-7.1", caption, rows),), {"table-7.1": action_bars(rows, list(groups), PAPER)}, tuple(claims))
+
+
+def _reaches(method: str, cells: Sequence[Cell]) -> Claim:
+    """Whether the thesis's average MMTA lies in our interval, or below it."""
+    found, paper = score_interval(cells, "MMTA_percent"), PAPER[method][AVERAGE]
+    mmtp = score_interval(cells, "MMTP_mm")
+    detail = f"MMTA {found} %, MMTP {mmtp} mm; the paper {paper[3]} %, {paper[2]} mm"
+    return Claim(
+        f"{method} reaches the thesis's MMTA", bool(found.value >= paper[3] or (found.high >= paper[3] and found.low > 50)), detail
+    )
 
 
 EXPERIMENT = Experiment(

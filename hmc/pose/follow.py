@@ -114,12 +114,15 @@ class FollowOptions:
         Stature of every person; estimated for each where left out.
     detections : DetectionTable or None
         For methods that need them; one person's.
+    drift : ndarray, shape (27,), or None
+        P0 of filters, as in `hmc.pose.method.Capture`.
     """
 
     voxel_size_m: float = 0.03
     seed: int = 0
     height_m: float | None = None
     detections: DetectionTable | None = None
+    drift: np.ndarray | None = None
 
 
 def follow(
@@ -153,7 +156,7 @@ def follow(
     if "detections" in needs and options.detections is None:
         raise InputError(f"method {method.name} needs detections (frame, camera, u, v)")
     tracks = only_person(recording) if tracks is None else tracks
-    capture = Capture(recording.fps, options.voxel_size_m, recording.room, recording.rig)
+    capture = Capture(recording.fps, options.voxel_size_m, recording.room, recording.rig, options.drift)
     task, persons = PoseTask(method, capture, options.seed, options.height_m), persons_of(recording, tracks)
     states = dict.fromkeys(persons, PersonState())
     done: list[DecidedFrames] = []

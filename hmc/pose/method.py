@@ -63,12 +63,16 @@ class Capture:
     room : ndarray, shape (2, 3), or None
         Limits of the room, metres; its lowest z is the floor, 0 where left out.
     rig : Rig or None
+    drift : ndarray, shape (27,), or None
+        P0 of filters: half of the largest variation expected in one frame, metres and radians (Canton 2009, section 3.2.2); None: that of
+        everyday motion (`hmc.pose.steps.presets.drift`).
     """
 
     fps: float = 30.0
     voxel_size_m: float = 0.03
     room: np.ndarray | None = None
     rig: Rig | None = None
+    drift: np.ndarray | None = None
 
     @property
     def floor_z(self) -> float:

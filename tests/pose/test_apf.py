@@ -13,7 +13,7 @@ from hmc.body.kinematics import landmarks
 from hmc.errors import InputError
 from hmc.pose.method import begin_tracking, particles_of, with_particles
 from hmc.pose.methods.annealed import annealed_pose_step
-from hmc.pose.steps.annealed import DRIFT, first_spread, starting_particles
+from hmc.pose.steps.annealed import first_spread, starting_particles
 from hmc.pose.steps.presets import PRESETS, drift
 from hmc.search.filters import AnnealedSettings, particle_init
 
@@ -148,10 +148,10 @@ def test_tracking_begins_where_it_is_told():
     assert not begun.velocity.any() and particles_of(begun).particles.shape == (1, N_DOF) and not begun.memory
 
 
-def test_an_experiment_s_own_drift_takes_the_place_of_the_preset_s():
+def test_a_recording_s_own_drift_takes_the_place_of_the_usual():
     subject, _ = parts_of("canton2009", act("walk"))
     own = np.arange(1.0, 1.0 + N_DOF)
-    tracked = begin_tracking(replace(subject, extras={DRIFT: own}), np.zeros(N_DOF))
+    tracked = begin_tracking(replace(subject, capture=replace(subject.capture, drift=own)), np.zeros(N_DOF))
     assert_allclose(first_spread(tracked, replace(LEAN["canton2009"], drift_scale=0.5)), 0.5 * own)
     free = np.arange(N_DOF) != 7
     part = replace(tracked, subject=replace(tracked.subject, free=free))

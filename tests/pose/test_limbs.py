@@ -24,7 +24,7 @@ from hmc.pose.methods.annealed import annealed_pose_step
 from hmc.pose.methods.scalable import method_preset
 from hmc.pose.objectives.four_scores import make_score_table, scores
 from hmc.pose.objectives.symmetric import Symmetric, body_distance
-from hmc.pose.steps.annealed import DRIFT, annealed_subject
+from hmc.pose.steps.annealed import annealed_subject
 from hmc.pose.steps.hidden.limbs import LimbMemory, LimbSettings, limb_spread_deg, look_again
 from hmc.pose.steps.hidden.scouts import scout
 from hmc.pose.steps.hidden.shown import flesh_in_hulls, in_doubt, limb_signs, place_flesh
@@ -369,7 +369,7 @@ def test_the_printed_test_asks_for_spread_and_occupancy(subjects):
     view = view_of(hull_of(standing(), without("r_shank", "r_thigh", "l_thigh", "l_shank")))
 
     def followed(spread):
-        tracked = begin_tracking(replace(subjects["canton2009"], extras={DRIFT: spread}), standing())
+        tracked = begin_tracking(replace(subjects["canton2009"], capture=Capture(30.0, 0.03, drift=spread)), standing())
         for frame in range(4):
             tracked, info = step(np.random.default_rng(frame), tracked, view)
         return LimbMemory.of(tracked.memory, preset.limbs), info

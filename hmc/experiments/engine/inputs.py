@@ -187,10 +187,12 @@ class Inputs:
         yield from read_hulls(folder, grid, recording)
 
 
-def read_hulls(folder: Path, grid: VoxelGrid, recording: Recording) -> Iterator[HullStep]:
-    """Silhouettes and hulls as `write_hulls` kept them, in order, with None for images and doubts."""
+def read_hulls(folder: Path, grid: VoxelGrid, recording: Recording, first: int = 0, last: int | None = None) -> Iterator[HullStep]:
+    """Silhouettes and hulls as `write_hulls` kept them, in order, from frame `first` to before `last`, with None for images and doubts."""
     sizes = [camera.size for camera in recording.rig]
     for path in sorted(folder.glob("*.npz")):
+        if int(path.stem) < first or (last is not None and int(path.stem) >= last):
+            continue
         with np.load(path, allow_pickle=False) as data:
             levels = np.zeros(grid.shape, np.uint8)
             levels.ravel()[data["voxels"]] = data["levels"]

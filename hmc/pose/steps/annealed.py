@@ -11,7 +11,7 @@ from hmc.body.model import BodyModel
 from hmc.pose.method import Capture, Subject, Tracked, particles_of, with_particles
 from hmc.pose.objectives.four_scores import make_score_table
 from hmc.pose.objectives.symmetric import body_points, thinned
-from hmc.pose.steps.presets import PosePreset, drift
+from hmc.pose.steps.presets import PosePreset, drift_of
 from hmc.pose.steps.proposal import Proposal, Propose
 from hmc.pose.steps.restrict import ScoreData, SymmetricData, nearest_part, score_maps
 from hmc.pose.views.person_view import PersonView
@@ -19,9 +19,6 @@ from hmc.pose.views.rays import points_to_cover
 from hmc.search.filters import ParticleState, annealed_step, particle_init
 
 __all__ = ["annealed", "annealed_subject", "first_spread", "frame_data", "starting_particles"]
-
-#: What an experiment puts in place of P0, under this name among a subject's extras: ndarray, shape (27,).
-DRIFT = "drift"
 
 
 def annealed_subject(body: BodyModel, capture: Capture, preset: PosePreset) -> Subject:
@@ -71,9 +68,7 @@ def annealed(preset: PosePreset) -> Propose:
 def first_spread(tracked: Tracked, preset: PosePreset) -> np.ndarray:
     """Deviations of the first layer, shape (27,): P0, and 0 for angles of limbs that are not there."""
     subject = tracked.subject
-    own = subject.extras.get(DRIFT)
-    sd = preset.drift_scale * (drift(subject.capture.fps) if own is None else own)
-    return np.where(subject.free, sd, 0.0)
+    return np.where(subject.free, preset.drift_scale * drift_of(subject.capture), 0.0)
 
 
 def frame_data(

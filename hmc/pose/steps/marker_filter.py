@@ -12,7 +12,7 @@ from hmc.body.model import BodyModel
 from hmc.pose.method import Alternatives, PoseStep, StepInfo, Tracked, particles_of, unseen, with_particles
 from hmc.pose.objectives.epipolar import MarkerLikelihood, marker_cost
 from hmc.pose.steps.marker_limbs import fit_all_points, refine_to_points
-from hmc.pose.steps.presets import drift
+from hmc.pose.steps.presets import drift_of
 from hmc.pose.views.markers import SeenMarkers
 from hmc.pose.views.person_view import PersonView
 from hmc.search.filters import AnnealedInfo, AnnealedSettings, annealed_step, particle_init
@@ -137,7 +137,7 @@ def marker_frame(rng: np.random.Generator, tracked: Tracked, seen: SeenMarkers, 
     starts = particles_of(tracked)
     if preset.refine:
         starts = particle_init(np.stack([tracked.state, np.clip(tracked.state + tracked.velocity, limits.low, limits.high)]))
-    sd = preset.drift_scale * drift(tracked.subject.capture.fps)
+    sd = preset.drift_scale * drift_of(tracked.subject.capture)
     particles, annealed = annealed_step(rng, starts, log_likelihood, sd, limits.low, limits.high, preset.annealed)
     estimate, points, choice = annealed.estimate, missing, None
     if preset.refine:

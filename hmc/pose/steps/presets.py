@@ -11,6 +11,7 @@ from hmc.body.dimensions import FitBodySettings
 from hmc.body.joints import DOF_NAMES
 from hmc.body.scalable_models import MODEL_1, MODEL_2, PRINTED_1, PRINTED_2, UNITIVE_PIECES, Inclusive
 from hmc.errors import InputError
+from hmc.pose.method import Capture
 from hmc.pose.objectives.symmetric import SymmetricSettings
 from hmc.pose.steps.hidden.limbs import LimbSettings
 from hmc.pose.steps.limb_search import SearchSettings
@@ -19,7 +20,7 @@ from hmc.pose.steps.refine import RefineSettings
 from hmc.search.filters import AnnealedSettings
 from hmc.search.structural import StructuralSettings
 
-__all__ = ["PRESETS", "PosePreset", "drift"]
+__all__ = ["PRESETS", "PosePreset", "drift", "drift_of"]
 
 # Half of the largest variation expected in a thirtieth of a second: metres for the translations, radians for the angles.
 _DRIFT = {
@@ -47,6 +48,11 @@ def drift(fps: float) -> np.ndarray:
         key = next(key for key in _DRIFT if key in name) if name not in _DRIFT else name
         values.append(_DRIFT[key])
     return scale * np.array(values)
+
+
+def drift_of(capture: Capture) -> np.ndarray:
+    """P0 of a recording: its own, or that of everyday motion at its frame rate; shape (27,)."""
+    return drift(capture.fps) if capture.drift is None else capture.drift
 
 
 @dataclass(frozen=True)
