@@ -89,7 +89,7 @@ def _gains(frame, count: int) -> list[dict]:
                     "evaluations": count,
                     "MMTP_gain_percent": 100 * (1 - scores["MMTP_mm"] / plain["MMTP_mm"]),
                     "MMTP_gain_paper_percent": PAPER_GAINS[0],
-                    "MMTA_gain_percent": 100 * (scores["MMTA_percent"] / plain["MMTA_percent"] - 1),
+                    "MMTA_gain_percent": 100 * (scores["MMTA_percent"] / plain["MMTA_percent"] - 1) if plain["MMTA_percent"] else None,
                     "MMTA_gain_paper_percent": PAPER_GAINS[1],
                 }
             )

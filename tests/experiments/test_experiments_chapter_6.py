@@ -11,7 +11,7 @@ from hmc.body.joints import dof_index
 from hmc.body.kinematics import landmarks
 from hmc.body.model import neutral_state
 from hmc.body.proportions import canton_body, default_body
-from hmc.experiments import Inputs, Plan, fig_6_11, filter_runs, find_experiment, marker_runs, markerless_runs
+from hmc.experiments import Inputs, Plan, exploratory, fig_6_11, filter_study, find_experiment, marker_runs, markerless_runs
 from hmc.experiments.by_action import AVERAGE, COLUMNS, action_rows, pose_scores
 from hmc.experiments.engine.experiment import Cell
 from hmc.experiments.engine.inputs import rendered
@@ -90,7 +90,7 @@ def test_reports_tell_better_from_worse(name, rng):
         cells = []
         for parameters in find_experiment(name).grid(Plan(quick=True)):
             good = _is_better(name, parameters)
-            off = 0.01 + 0.04 * rng.random() + (0.0 if good == right else 0.2)
+            off = 0.02 + 0.01 * rng.random() + (0.0 if good == right else 0.2)
             cells.append(made(parameters, off, rng))
         report = report_of(name, cells)
         assert report.figures and all(row for table in report.tables for row in table.rows)
@@ -102,19 +102,19 @@ def _is_better(name, parameters):
     if name in ("table-6.4", "table-6.3", "fig-6.19"):
         return True
     if name == "fig-6.13":
-        return parameters["variance_px2"] < 100 and parameters["layers"] == 3
+        return parameters["variance_px2"] < 100 or parameters["layers"] == 3
     if name == "fig-6.17":
         return parameters["likelihood"] == "factorised"
     if name == "fig-6.18":
         return parameters["density"] in (1, 2)
     if name == "what-each-adds":
         return parameters["without"] == markerless_runs.EVERYTHING
-    return parameters["cameras"] == 0 and (parameters["voxel_mm"] == 20 or parameters["particles"] == 600)
+    return parameters["cameras"] == 0 and (parameters["voxel_mm"] == 20 or parameters["particles"] == 300)
 
 
-def test_the_papers_grid_has_7200_runs():
+def test_the_paper_s_filters_at_the_rate_that_it_shows_are_run_on_every_action():
     grid = find_experiment("fig-6.13").grid(Plan())
-    assert len(grid) == 7200 and len({tuple(sorted(parameters.items())) for parameters in grid}) == 7200
+    assert len(grid) == 5 * 720 and len({tuple(sorted(parameters.items())) for parameters in grid}) == 5 * 720
 
 
 def test_every_switch_changes_one_thing_only():
@@ -135,9 +135,9 @@ def test_every_switch_changes_one_thing_only():
 
 
 def test_filter_presets_are_the_theses_but_for_what_a_cell_says():
-    grid = find_experiment("fig-6.17").grid(Plan(quick=True))
+    grid = find_experiment("fig-6.17").grid(Plan(quick=True)) + find_experiment("fig-8.1").grid(Plan(quick=True))
     for parameters in grid:
-        preset = filter_runs.filter_preset(parameters)
+        preset = filter_study.study_preset(parameters)
         assert preset.body == "canton" and preset.refine is None and preset.likelihood == parameters["likelihood"]
         assert (preset.annealed.layers, preset.annealed.particles) == (parameters["layers"], parameters["particles"])
         assert preset.annealed.survival_rate == (0.5 if parameters["annealing"] == "printed" else PRESETS["default"].annealed.survival_rate)
@@ -203,13 +203,13 @@ def test_a_filter_cell_starts_from_the_truth(small, monkeypatch):
     parameters = find_experiment("fig-6.17").grid(Plan(quick=True, recordings=(source,)))[-1]
     few = {**parameters, "frames": 2, "voxel_mm": 50, "layers": 2, "particles": 20}
     # Particles that hardly move stay where the filter starts.
-    preset = replace(filter_runs.filter_preset(few), drift_scale=0.02)
-    monkeypatch.setattr(filter_runs, "filter_preset", lambda parameters: preset)
-    one = filter_runs.cell(few, inputs, np.random.default_rng(0))
+    preset = replace(filter_study.study_preset(few), drift_scale=0.02)
+    monkeypatch.setattr(filter_study, "study_preset", lambda parameters: preset)
+    one = filter_study.cell(few, inputs, np.random.default_rng(0))
     assert len(one["frames"]) == 1 and one["filter_s_per_frame"] > 0
     first = first_truth(inputs.recording(source.label)).positions[0]
     assert np.linalg.norm(one["estimate_m"][0] - first, axis=1).mean() < 0.08  # the thesis's body has other lengths
-    assert np.array_equal(one["estimate_m"], filter_runs.cell(few, inputs, np.random.default_rng(0))["estimate_m"])
+    assert np.array_equal(one["estimate_m"], filter_study.cell(few, inputs, np.random.default_rng(0))["estimate_m"])
 
 
 def test_what_an_action_varies_by_is_told_by_its_poses():
@@ -219,12 +219,12 @@ def test_what_an_action_varies_by_is_told_by_its_poses():
     states[:, 0] = 0.1 * np.arange(12)
     states[:, dof_index("root_rz")] = np.pi - 0.3 + 0.06 * np.arange(12)[:, None]
     states[:, dof_index("r_elbow_z")] = 0.4 + 0.1 * np.arange(12)[:, None]
-    drift = filter_runs.action_drift(body, landmarks(body, states))
+    drift = exploratory.largest_variation(body, landmarks(body, states))
     assert drift[0] == pytest.approx(0.05, abs=2e-3) and drift[3] == pytest.approx(0.03, abs=0.01)
     assert drift[dof_index("r_elbow_z")[0]] == pytest.approx(0.05, abs=0.01)
     still = [k for k in range(27) if k not in (0, 3, 6, 7, 8, *dof_index("r_elbow_z", "r_shoulder_y"))]
-    np.testing.assert_allclose(drift[still], 0.5 * filter_runs.LEAST_VARIATION[still], atol=0.02)
-    np.testing.assert_allclose(filter_runs.action_drift(body, landmarks(body, states[:1])), 0.5 * filter_runs.LEAST_VARIATION)
+    np.testing.assert_allclose(drift[still], 0.5 * exploratory.LEAST_VARIATION[still], atol=0.02)
+    np.testing.assert_allclose(exploratory.largest_variation(body, landmarks(body, states[:1])), 0.5 * exploratory.LEAST_VARIATION)
 
 
 @pytest.mark.slow

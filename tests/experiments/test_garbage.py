@@ -35,6 +35,6 @@ def test_nothing_holds_on_noise(name):
 
 @pytest.mark.parametrize("name", STUDIES)
 def test_no_method_is_ahead_of_an_equal_one(name):
-    """Of intervals of 95 % one in forty is above zero by chance: three draws must not agree."""
-    held = [{claim.text for claim in claims_on(name, 0.03, seed) if claim.holds and "no worse" not in claim.text} for seed in (1, 2, 3)]
+    """Nor is one that reaches a figure of the thesis; of intervals of 95 % one in forty is above zero by chance: three must not agree."""
+    held = [{claim.text for claim in claims_on(name, 0.03, seed) if claim.holds and "reaches" not in claim.text} for seed in (1, 2, 3)]
     assert not set.intersection(*held)
