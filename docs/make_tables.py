@@ -1,4 +1,4 @@
-"""The tables of the pages that are made of stored results.
+"""What of the pages is made of stored results: tables in them, and the page of the papers' experiments, docs/results.md.
 
     python docs/make_tables.py            # write them anew
     python docs/make_tables.py --check    # only say which pages are old
@@ -15,8 +15,12 @@ import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+from hmc.experiments.engine.markdown import to_markdown
+from hmc.experiments.engine.summary import summarise
+
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
+RESULTS = ROOT / "docs" / "results.md"
 PLACE = re.compile(r"(<!-- table: ([\w-]+) -->\n).*?(<!-- end of table -->)", re.DOTALL)
 
 #: Pages of the methods, beside the names in the README's table.
@@ -61,14 +65,21 @@ def _rows(experiment: str, table: str) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
+def made_pages() -> dict[Path, str]:
+    """Every page's text as results/ has it."""
+    pages = {page: with_tables(page.read_text(encoding="utf-8")) for page in PAGES}
+    return pages | {RESULTS: to_markdown(summarise(ROOT / "results"), "../results")}
+
+
 def main() -> int:
     """Write the pages, or say which are old."""
-    old = [page for page in PAGES if with_tables(page.read_text(encoding="utf-8")) != page.read_text(encoding="utf-8")]
+    pages = made_pages()
+    old = [page for page, text in pages.items() if not page.is_file() or page.read_text(encoding="utf-8") != text]
     for page in old:
         if "--check" in sys.argv[1:]:
-            print(f"{page.relative_to(ROOT)}: a table is not what results/ has; run python docs/make_tables.py")
+            print(f"{page.relative_to(ROOT)}: is not what results/ has; run python docs/make_tables.py")
         else:
-            page.write_text(with_tables(page.read_text(encoding="utf-8")), encoding="utf-8")
+            page.write_text(pages[page], encoding="utf-8")
             print(f"wrote {page.relative_to(ROOT)}")
     return 1 if old and "--check" in sys.argv[1:] else 0
 

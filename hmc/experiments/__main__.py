@@ -186,17 +186,19 @@ def _merge(args: argparse.Namespace) -> int:
 
 def _report(args: argparse.Namespace) -> int:
     from hmc.experiments.engine.booklet import write_booklet
+    from hmc.experiments.engine.markdown import to_markdown
     from hmc.experiments.engine.page import to_html, verdict_counts
     from hmc.experiments.engine.summary import summarise
     from hmc.io.files import atomic_write
 
     rows = summarise(args.out)
-    page, booklet = _folder(args.out) / "report.html", args.out / "report.pdf"
-    with atomic_write(page) as file:
-        file.write(to_html(rows))
+    page, text, booklet = (_folder(args.out) / f"report.{kind}" for kind in ("html", "md", "pdf"))
+    for path, content in ((page, to_html(rows)), (text, to_markdown(rows, "."))):
+        with atomic_write(path) as file:
+            file.write(content)
     write_booklet(booklet, rows)
     _tell(verdict_counts(rows))
-    _tell(f"wrote {page} and {booklet}")
+    _tell(f"wrote {page}, {text} and {booklet}")
     return 0
 
 
