@@ -14,6 +14,7 @@ import pytest
 from hmc.experiments import EXPERIMENTS
 from hmc.experiments.__main__ import main
 from hmc.experiments.engine.catalogue import CATALOGUE, UNKNOWN
+from hmc.experiments.engine.markdown import to_markdown
 from hmc.experiments.engine.page import to_html
 from hmc.experiments.engine.summary import DIFFERS, MISSING, NOT_RUN, REPRODUCED, summarise
 from hmc.io.files import write_toml
@@ -117,6 +118,19 @@ def test_report_is_written(out, capsys):
     assert content.startswith(b"%PDF-") and content.rstrip().endswith(b"%%EOF")
     assert len(re.findall(rb"/Type /Page\b", content)) >= 4
     assert len(re.findall(rb"/Subtype /Image", content)) >= 3
+
+
+def test_the_markdown_page_has_every_row_and_its_files(out):
+    text = to_markdown(summarise(out), ".")
+    for entry in CATALOGUE:
+        assert f"| {entry.id} |" in text or f"| [{entry.id}](" in text
+    links = re.findall(r"\]\(\./([^)]+)\)", text)
+    assert links and all((out / link).is_file() for link in links)
+    assert "- differs: faster over <the> surface (0.61 & 0.68)" in text
+    anchors = {line[3:].replace(".", "").lower() for line in text.splitlines() if line.startswith("## ")}
+    assert {link.lower() for link in re.findall(r"\]\(#([^)]+)\)", text)} <= anchors
+    table = next(line for line in text.splitlines() if line.startswith("| ---"))
+    assert table.count("|") == 5
 
 
 def test_report_of_nothing(tmp_path, capsys):
