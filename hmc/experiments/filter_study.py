@@ -38,6 +38,7 @@ from hmc.experiments.markerless_runs import (
 from hmc.experiments.removal import remover
 from hmc.experiments.truth import HEIGHT_M, first_truth, standing_state, stature_m, truth_track
 from hmc.io.masks import MaskStep, kept_masks
+from hmc.io.recording import Recording
 from hmc.pose.follow import FollowOptions
 from hmc.pose.method import Capture, begin_tracking
 from hmc.pose.methods.annealed import annealed_pose_step
@@ -46,7 +47,6 @@ from hmc.pose.registry import pose_method
 from hmc.pose.steps.annealed import annealed_subject
 from hmc.pose.steps.presets import PRESETS, PosePreset
 from hmc.pose.views.person_view import PersonView, views_of
-from hmc.tracking.resumable import person_grid
 from hmc.voxels.grid import VoxelGrid
 from hmc.voxels.hulls import stream_hulls, stream_masks
 
@@ -82,6 +82,8 @@ BASE: dict[str, Any] = {
 QUICK_BASE = BASE | {"voxel_mm": 30, "particles": 300, "gamma": 25.0}
 QUICK_ACTIONS = ("walk", "gesture", "box")
 REPEATS = 3
+#: How far hulls reach beyond a person's joints, metres.
+REACH_M = 0.7
 #: Beside the filters stand the marker-based filter behind the detector of Table 6.3 ...
 _DETECTOR = {"detection_rate": 0.9, "false_positives": 20.0, "variance_px2": 4.0, "layers": 3, "particles": 700, "frames": 0}
 MARKERS: dict[str, dict[str, Any]] = {
@@ -188,7 +190,7 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
     if parameters["frames"]:
         truth = truth.where(truth.frames < truth.frames[0] + parameters["frames"])
     voxel_m, preset = parameters["voxel_mm"] / 1000, study_preset(parameters)
-    grid = person_grid(recording, voxel_m)
+    grid = _around(recording, voxel_m)
     body = canton_body(stature_m(recording) or HEIGHT_M)
     capture = Capture(recording.fps, voxel_m, recording.room, recording.rig, action_drift(recording, parameters["recording"]))
     state, _ = fit_landmarks(body, truth.positions[0], standing_state(body, truth.positions[0]))
@@ -215,6 +217,13 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
         "truth_m": truth.positions[1:],
         "filter_s_per_frame": seconds / max(1, len(truth.frames) - 1),
     }
+
+
+def _around(recording: Recording, voxel_m: float) -> VoxelGrid:
+    """Voxels of the part of the room in which the first person ever is: hulls of the rest say nothing of them."""
+    joints, room = first_truth(recording).positions.reshape(-1, 3), np.asarray(recording.room, float)
+    low, high = joints.min(axis=0) - REACH_M, joints.max(axis=0) + REACH_M
+    return VoxelGrid.from_room(np.clip([low, high], *room), voxel_m, len(recording.rig))
 
 
 def _hulls(parameters: Parameters, kept: TrackedRecording, grid: VoxelGrid) -> Path:
