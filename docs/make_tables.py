@@ -63,12 +63,13 @@ def _rows(experiment: str, table: str) -> list[dict[str, str]]:
 
 def main() -> int:
     """Write the pages, or say which are old."""
-    old = [page for page in PAGES if with_tables(page.read_text(encoding="utf-8")) != page.read_text(encoding="utf-8")]
-    for page in old:
+    texts = {page: page.read_text(encoding="utf-8") for page in PAGES}
+    old = {page: made for page, text in texts.items() if (made := with_tables(text)) != text}
+    for page, made in old.items():
         if "--check" in sys.argv[1:]:
             print(f"{page.relative_to(ROOT)}: a table is not what results/ has; run python docs/make_tables.py")
         else:
-            page.write_text(with_tables(page.read_text(encoding="utf-8")), encoding="utf-8")
+            page.write_text(made, encoding="utf-8")
             print(f"wrote {page.relative_to(ROOT)}")
     return 1 if old and "--check" in sys.argv[1:] else 0
 
