@@ -132,5 +132,12 @@ def _draw(mmta: dict[Key, float], rate: float, likelihood: str) -> Figure:
 
 
 EXPERIMENT = Experiment(
-    "fig-6.13", "marker-based pose by detector, layers and particles", "Canton, Figure 6.13", grid, runs.cell, report, runs.FAMILY
+    "fig-6.13",
+    "marker-based pose by detector, layers and particles",
+    "Canton, Figure 6.13",
+    grid,
+    runs.cell,
+    report,
+    runs.FAMILY,
+    runs.VERSION,
 )

@@ -66,4 +66,4 @@ def _draw(estimate: np.ndarray, truth: np.ndarray, seconds: np.ndarray) -> plt.F
     return figure
 
 
-EXPERIMENT = Experiment("fig-6.19", "joint curves against truth", "Canton, Figure 6.19", grid, runs.cell, report, runs.FAMILY)
+EXPERIMENT = Experiment("fig-6.19", "joint curves against truth", "Canton, Figure 6.19", grid, runs.cell, report, runs.FAMILY, runs.VERSION)

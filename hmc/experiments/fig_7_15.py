@@ -149,4 +149,4 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     return Report((Table("fig-7.15", caption, rows), Table("fig-7.15-limbs", by_limb, limbs)), {"fig-7.15": figure}, tuple(claims))
 
 
-EXPERIMENT = Experiment("fig-7.15", "limbs hidden by furniture", "Canton, Figure 7.15", grid, cell, report, version=3)
+EXPERIMENT = Experiment("fig-7.15", "limbs hidden by furniture", "Canton, Figure 7.15", grid, cell, report, version=4)

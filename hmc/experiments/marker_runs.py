@@ -29,9 +29,11 @@ from hmc.pose.steps.marker_filter import MARKER_PRESETS, MarkerPreset, marker_fr
 from hmc.pose.views.markers import marker_views, seen_in_frame
 from hmc.synthetic.marker_detector import SyntheticDetector
 
-__all__ = ["FAMILY", "QUICK_FRAMES", "cell"]
+__all__ = ["FAMILY", "QUICK_FRAMES", "VERSION", "cell"]
 
 FAMILY = "markers"
+#: Of the cells; 2: the thesis's filter recovers nothing.
+VERSION = 2
 #: Detections are in images of this width, about that of HumanEva-I's, whatever the recording's; pixels.
 WIDTH_PX = 640
 #: Frames of the quick mode.

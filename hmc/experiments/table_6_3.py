@@ -69,4 +69,4 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     return Report((Table("table-6.3", caption, rows),), {"table-6.3": bars(rows, tuple(METHODS), PAPER)}, claims)
 
 
-EXPERIMENT = Experiment("table-6.3", "marker-based pose by action", "Canton, Table 6.3", grid, runs.cell, report, runs.FAMILY)
+EXPERIMENT = Experiment("table-6.3", "marker-based pose by action", "Canton, Table 6.3", grid, runs.cell, report, runs.FAMILY, runs.VERSION)

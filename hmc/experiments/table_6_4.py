@@ -82,4 +82,4 @@ def bars(rows: Sequence[dict], methods: Sequence[str], paper: dict) -> plt.Figur
     return figure
 
 
-EXPERIMENT = Experiment("table-6.4", "markerless pose by action", "Canton, Table 6.4", grid, runs.cell, report, runs.FAMILY)
+EXPERIMENT = Experiment("table-6.4", "markerless pose by action", "Canton, Table 6.4", grid, runs.cell, report, runs.FAMILY, runs.VERSION)
