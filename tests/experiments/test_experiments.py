@@ -202,7 +202,9 @@ def test_an_experiment_that_fails_does_not_stop_the_others(toy, tmp_path, capsys
     assert capsys.readouterr().out.count("0 cells computed, 6 found") == 2
 
 
-@pytest.mark.parametrize(("error", "words"), [("InputError('not for this')", "^not for this$"), ("KeyError('layers')", "what was left out")])
+@pytest.mark.parametrize(
+    ("error", "words"), [("InputError('not for this')", "^not for this$"), ("KeyError('layers')", "what was left out")]
+)
 def test_what_a_report_says_of_the_input_is_told_as_it_is(toy, tmp_path, error, words):
     at = "    figure, axes = plt.subplots()\n"
     toy.write_text("from hmc.errors import InputError\n" + TOY.replace(at, f"    raise {error}\n{at}"))
