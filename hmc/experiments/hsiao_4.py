@@ -73,4 +73,4 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     return Report((Table("hsiao-4", "Nine actions by spectral skeletons and swarms.", rows),), {"hsiao-4": figure}, claims)
 
 
-EXPERIMENT = Experiment("hsiao-4", "nine actions by the whole method", "Hsiao, chapter 4", grid, pose_cell, report, version=2)
+EXPERIMENT = Experiment("hsiao-4", "nine actions by the whole method", "Hsiao, chapter 4", grid, pose_cell, report, version=3)

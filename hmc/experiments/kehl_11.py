@@ -50,4 +50,6 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     return Report((Table("kehl-11", caption, rows),), {"kehl-11": figure}, claims)
 
 
-EXPERIMENT = Experiment("kehl-11", "single against several cues", "Kehl, Figure 11", grid, kehl_runs.cell, report, family=kehl_runs.FAMILY)
+EXPERIMENT = Experiment(
+    "kehl-11", "single against several cues", "Kehl, Figure 11", grid, kehl_runs.cell, report, kehl_runs.FAMILY, kehl_runs.VERSION
+)

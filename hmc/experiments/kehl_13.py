@@ -66,5 +66,12 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
 
 
 EXPERIMENT = Experiment(
-    "kehl-13", "SMD against Levenberg-Marquardt", "Kehl, Figures 12 and 13", grid, kehl_runs.cell, report, family=kehl_runs.FAMILY
+    "kehl-13",
+    "SMD against Levenberg-Marquardt",
+    "Kehl, Figures 12 and 13",
+    grid,
+    kehl_runs.cell,
+    report,
+    kehl_runs.FAMILY,
+    kehl_runs.VERSION,
 )

@@ -73,4 +73,6 @@ def _turns_deg(points: np.ndarray) -> np.ndarray:
     return np.degrees(np.arccos(np.clip(np.einsum("ni,ni->n", arm[1:], arm[:-1]), -1, 1)))
 
 
-EXPERIMENT = Experiment("kehl-14", "fast motion", "Kehl, Figures 14 and 16", grid, kehl_runs.cell, report, family=kehl_runs.FAMILY)
+EXPERIMENT = Experiment(
+    "kehl-14", "fast motion", "Kehl, Figures 14 and 16", grid, kehl_runs.cell, report, kehl_runs.FAMILY, kehl_runs.VERSION
+)

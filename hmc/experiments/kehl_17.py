@@ -46,4 +46,6 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     return Report((Table("kehl-17", caption, rows),), {"kehl-17": figure}, claims)
 
 
-EXPERIMENT = Experiment("kehl-17", "holding an object", "Kehl, Figures 7 and 17", grid, kehl_runs.cell, report, family=kehl_runs.FAMILY)
+EXPERIMENT = Experiment(
+    "kehl-17", "holding an object", "Kehl, Figures 7 and 17", grid, kehl_runs.cell, report, kehl_runs.FAMILY, kehl_runs.VERSION
+)

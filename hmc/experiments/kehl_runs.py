@@ -35,9 +35,11 @@ from hmc.search.meta_descent import SmdSettings
 from hmc.tracking.resumable import person_grid
 from hmc.voxels.hulls import FrontendSettings, stream_hulls
 
-__all__ = ["FAMILY", "VARIANTS", "cell", "cell_grid", "errors_mm", "observations", "preset_of", "shown"]
+__all__ = ["FAMILY", "VARIANTS", "VERSION", "cell", "cell_grid", "errors_mm", "observations", "preset_of", "shown"]
 
 FAMILY = "kehl"
+#: Of the cells; 2: hulls say nothing below the floor.
+VERSION = 2
 VOXEL_M = 0.03
 #: How long the person is watched before the body is fitted, seconds.
 WINDOW_S = 1.5

@@ -27,11 +27,13 @@ from hmc.voxels.hulls import FrontendSettings, HullStep
 from hmc.voxels.run_options import RunOptions
 
 __all__ = [
-    "EVERYTHING", "FAMILY", "FRONTEND", "MASKS_KEY", "SWITCHES", "TRACK_VOXEL_M", "VOXEL_M", "TrackedRecording", "Way",
-    "action_sources", "cell", "change_hulls", "opened", "pose_results", "run_method", "tracked",
+    "EVERYTHING", "FAMILY", "FRONTEND", "MASKS_KEY", "SWITCHES", "TRACK_VOXEL_M", "VERSION", "VOXEL_M", "TrackedRecording",
+    "Way", "action_sources", "cell", "change_hulls", "opened", "pose_results", "run_method", "tracked",
 ]  # fmt: skip
 
 FAMILY = "markerless"
+#: Of the cells; 2: hulls say nothing below the floor.
+VERSION = 2
 #: Of poses, and of tracks, metres.
 VOXEL_M, TRACK_VOXEL_M = 0.03, 0.05
 #: One thread: workers share the cores.

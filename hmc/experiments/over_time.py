@@ -218,4 +218,6 @@ def _gap_rows(cells: Sequence[Cell]) -> tuple[list[dict[str, Any]], plt.Figure]:
     return rows, figure
 
 
-EXPERIMENT = Experiment("over-time", "motion priors, starts, recovery and smoothing", "ours; docs/accuracy.md", grid, cell, report)
+EXPERIMENT = Experiment(
+    "over-time", "motion priors, starts, recovery and smoothing", "ours; docs/accuracy.md", grid, cell, report, version=2
+)

@@ -29,7 +29,7 @@ __all__ = ["FAMILY", "METHODS", "PAPER_THRESHOLD_MM", "VERSION", "cell", "grid",
 
 FAMILY = "pose"
 #: Of these cells.
-VERSION = 2
+VERSION = 3
 #: Methods and what figures call them.
 METHODS = {
     "canton2009": "markerless, the thesis's parameters",

@@ -93,5 +93,12 @@ def _draw(rows: Sequence[dict], cameras: Sequence[int]) -> plt.Figure:
 
 
 EXPERIMENT = Experiment(
-    "what-each-adds", "what each part of the default preset adds", "ours; docs/accuracy.md", grid, runs.cell, report, runs.FAMILY
+    "what-each-adds",
+    "what each part of the default preset adds",
+    "ours; docs/accuracy.md",
+    grid,
+    runs.cell,
+    report,
+    runs.FAMILY,
+    runs.VERSION,
 )

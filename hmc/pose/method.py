@@ -231,8 +231,6 @@ class StartPose:
         What steps are to know in that frame.
     costs : ndarray, shape (n,)
         Mean cost of each candidate that was followed, the winner first; square metres.
-    fit : object
-        What came of fitting the body's dimensions (`hmc.pose.starts.fit_body.FitBodyInfo`); None where they are not fitted ones.
     """
 
     subject: Subject
@@ -240,7 +238,6 @@ class StartPose:
     state: np.ndarray
     memory: Mapping[str, np.ndarray] = field(default_factory=dict)
     costs: np.ndarray = field(default_factory=lambda: np.array([np.nan]))
-    fit: Any = None
 
 
 class Start(Protocol):

@@ -19,6 +19,7 @@ from hmc.experiments import EXPERIMENTS, Inputs, Plan, Source, Table, find_exper
 from hmc.experiments.__main__ import main
 from hmc.experiments.ellipsoid import RADII_M, VOXEL_M, person_voxels
 from hmc.experiments.engine.inputs import _told, once, rendered, source_of
+from hmc.experiments.engine.selection import changed_plan
 from hmc.experiments.engine.store import cell_key, cell_rng, cell_text, digest, read_cell, write_text
 from hmc.experiments.engine.style import house_style
 from hmc.experiments.engine.sweep import plan_for
@@ -199,6 +200,16 @@ def test_an_experiment_that_fails_does_not_stop_the_others(toy, tmp_path, capsys
     broken.write_text(TOY.replace('Experiment("toy", "a toy"', 'Experiment("broken", "another"'))
     assert main(["run", str(broken), str(toy), *options]) == 0
     assert capsys.readouterr().out.count("0 cells computed, 6 found") == 2
+
+
+@pytest.mark.parametrize(
+    ("error", "words"), [("InputError('not for this')", "^not for this$"), ("KeyError('layers')", "what was left out")]
+)
+def test_what_a_report_says_of_the_input_is_told_as_it_is(toy, tmp_path, error, words):
+    at = "    figure, axes = plt.subplots()\n"
+    toy.write_text("from hmc.errors import InputError\n" + TOY.replace(at, f"    raise {error}\n{at}"))
+    with pytest.raises(InputError, match=words):
+        run_experiment(str(toy), tmp_path, changed_plan(Plan(), seeds=1))
 
 
 def test_computing_again_gives_the_same(toy, tmp_path):

@@ -9,12 +9,14 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from hmc.errors import InputError
 from hmc.experiments import Plan, run_experiment
 from hmc.experiments.__main__ import main
 from hmc.experiments.engine.merging import merge_stores
+from hmc.experiments.engine.store import cell_text, write_text
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -216,6 +218,16 @@ def test_merging_takes_no_cell_that_is_not_what_its_name_says(tmp_path, capsys):
         and "1 cell is of an earlier version" in told.err
         and "1 cell is here with other results" in told.err
     )
+
+
+def test_results_without_a_number_are_the_same_when_merged(tmp_path):
+    """What equals nothing, itself included, is still the same result."""
+    here, there = tmp_path / "here", tmp_path / "there"
+    for folder in (here, there):
+        write_text(folder / "cells" / "toy" / "one.json", cell_text({"x": 1}, {"none": np.nan, "many": [np.nan, 1.0]}))
+        write_text(folder / "cells" / "toy" / "other.json", cell_text({"x": 2}, {"none": np.nan if folder == here else 0.0}))
+    merged = merge_stores(here, [there])
+    assert (merged.copied, merged.same) == (0, 1) and [path.name for path in merged.different] == ["other.json"]
 
 
 def cells_of_b1(out):

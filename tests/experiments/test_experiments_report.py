@@ -11,12 +11,14 @@ import cv2
 import numpy as np
 import pytest
 
-from hmc.experiments import EXPERIMENTS
+from hmc.experiments import EXPERIMENTS, Claim, Plan, Report, find_experiment
 from hmc.experiments.__main__ import main
 from hmc.experiments.engine.catalogue import CATALOGUE, UNKNOWN
 from hmc.experiments.engine.markdown import to_markdown
-from hmc.experiments.engine.page import to_html
-from hmc.experiments.engine.summary import DIFFERS, MISSING, NOT_RUN, REPRODUCED, summarise
+from hmc.experiments.engine.page import to_html, verdict_counts
+from hmc.experiments.engine.selection import changed_plan
+from hmc.experiments.engine.summary import DIFFERS, HOLDS, MISSING, NOT_RUN, REPRODUCED, SHOWN, summarise
+from hmc.experiments.engine.writing import write_report
 from hmc.io.files import write_toml
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
@@ -24,7 +26,7 @@ CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shuti
 
 @pytest.fixture(scope="module")
 def out(tmp_path_factory):
-    """A reproduced experiment, made by running it, and one that differs, as its files."""
+    """An experiment that holds, made by running it, and one that differs, as its files."""
     folder = tmp_path_factory.mktemp("experiments")
     assert main(["run", "fig-B.1", "--quick", "--quiet", "--workers", "1", "--out", str(folder)]) == 0
     write_differing(folder / "fig-4.9-quick")
@@ -69,7 +71,7 @@ class Reader(HTMLParser):
 def test_every_table_and_figure_has_its_row(out):
     rows = {row.entry.id: row for row in summarise(out)}
     assert list(rows) == [entry.id for entry in CATALOGUE] + [name for name in EXPERIMENTS if name not in {e.id for e in CATALOGUE}]
-    assert rows["fig-B.1"].verdict == REPRODUCED and rows["fig-4.9"].verdict == DIFFERS and rows["fig-4.7"].verdict == NOT_RUN
+    assert rows["fig-B.1"].verdict == HOLDS and rows["fig-4.9"].verdict == DIFFERS and rows["fig-4.7"].verdict == NOT_RUN
     assert rows["fig-4.9"].why == UNKNOWN and rows["fig-B.1"].why == rows["fig-4.7"].why == ""
     assert replace(rows["fig-4.9"], entry=rows["table-4.3"].entry).why == rows["table-4.3"].entry.why != ""
     assert [claim.text for claim in rows["fig-4.9"].differing] == ["faster over <the> surface"]
@@ -93,6 +95,77 @@ def test_a_full_run_counts_before_a_quick_one_and_own_recordings_come_beside(out
     assert [result.folder.name for result in row.results] == ["fig-4.9", "fig-4.9-quick-own"]
 
 
+def run_of(folder, holds=(True, True), cells=("a", "b"), **parameters):
+    claims = [{"claim": f"claim {k}", "holds": one} for k, one in enumerate(holds)]
+    content = {"claims": claims, "parameters": {"quick": False, "cells": {key: {"x": 1} for key in cells}} | parameters}
+    write_toml(folder / "run.toml", content)
+
+
+def row_of(folder, name="fig-4.9"):
+    return next(row for row in summarise(folder) if row.entry.id == name)
+
+
+def test_reproduced_is_what_holds_in_full_alone(tmp_path):
+    """Less and less of the grid: a run counts by how much it is, and none but the whole one is called reproduced."""
+    told = []
+    run_of(tmp_path / "fig-4.9-quick-other", quick=True, changed={"asked": {"seeds": 1}, "own_cells": 4, "of_own": 2})
+    told.append(row_of(tmp_path).label)
+    run_of(tmp_path / "fig-4.9-quick", quick=True)
+    told.append(row_of(tmp_path).label)
+    run_of(tmp_path / "fig-4.9-other", changed={"asked": {"frames": 60}, "own_cells": 40, "of_own": 0})
+    told.append(row_of(tmp_path).label)
+    run_of(tmp_path / "fig-4.9-other", changed={"asked": {"seeds": 1}, "own_cells": 40, "of_own": 2})
+    told.append(row_of(tmp_path).label)
+    assert row_of(tmp_path).results[0].what == "in part, 2 cells, 2 of the 40 of the full grid, with seeds = 1"
+    run_of(tmp_path / "fig-4.9", holds=())
+    told.append(row_of(tmp_path).label)
+    run_of(tmp_path / "fig-4.9", holds=(True, False))
+    told.append(row_of(tmp_path).label)
+    run_of(tmp_path / "fig-4.9")
+    told.append(row_of(tmp_path).label)
+    assert told == ["changed, holds", "quick, holds", "quick, holds", "in part, holds", SHOWN, "in full, differs", REPRODUCED]
+    assert row_of(tmp_path).results[0].what == "in full, 2 cells"
+
+
+def test_a_changed_run_that_does_not_say_by_what_is_none_in_full(tmp_path):
+    run_of(tmp_path / "fig-4.9-other")
+    assert row_of(tmp_path).label == "changed, holds"
+
+
+def test_what_is_no_papers_is_not_reproduced(tmp_path):
+    run_of(tmp_path / "lost-arm")
+    assert row_of(tmp_path, "lost-arm").label == "in full, holds"
+
+
+@pytest.mark.parametrize(
+    ("changes", "label", "told"),
+    [
+        ({"seeds": 1}, "in part, holds", "in part, 2 cells, 2 of the 6 of the full grid, with seeds = 1"),
+        ({"seeds": 4}, "changed, holds", "changed, 8 cells, 6 of the 6 of the full grid, with seeds = 4"),
+        ({"settings": (("layers", 1),)}, "in part, holds", "in part, 3 cells, 3 of the 6 of the full grid, with layers = 1"),
+        ({"settings": (("layers", 9),)}, "changed, holds", "changed, 3 cells, 0 of the 6 of the full grid, with layers = 9"),
+        ({}, "reproduced", "in full, 6 cells"),
+    ],
+)
+def test_how_much_of_the_grid_a_run_is_stands_in_its_file(tmp_path, changes, label, told):
+    full = [{"layers": layers, "repeat": k} for layers in (1, 2) for k in range(3)]
+    experiment = replace(find_experiment("fig-4.9"), grid=lambda plan: full)
+    write_report(tmp_path, experiment, changed_plan(Plan(), **changes), Report(claims=(Claim("so it is", True),)))
+    row = row_of(tmp_path)
+    assert (row.label, row.results[0].what) == (label, told)
+
+
+def test_counts_tell_the_scopes_apart(tmp_path):
+    for name, holds, quick in (("fig-3.3", True, False), ("fig-3.5", True, True), ("fig-4.9", False, True), ("fig-4.7", False, False)):
+        run_of(tmp_path / f"{name}{'-quick' * quick}", holds=(holds,), quick=quick)
+    rows = summarise(tmp_path)
+    counts = f"{len(rows)} experiments: 1 reproduced, 1 hold quick, 1 differ in full, 1 differ quick, {len(rows) - 4} not computed yet."
+    assert verdict_counts(rows) == counts
+    words = " ".join(Reader(to_html(rows)).words)
+    for told in (counts, "quick, holds", "quick, differs", "in full, differs"):
+        assert told in words
+
+
 def test_page_is_whole_and_needs_nothing_beside_it(out):
     rows = summarise(out)
     page = Reader(to_html(rows))
@@ -106,13 +179,13 @@ def test_page_is_whole_and_needs_nothing_beside_it(out):
     text = " ".join(page.words)
     for words in ("faster over <the> surface: 0.61 & 0.68", "$x$ <y>", "Second & last.", "HumanEva-I", "hsiao-3.15"):
         assert words in text
-    assert "left_over" not in text and "2 reproduced" not in text and "1 reproduced, 1 differ" in text
+    assert "left_over" not in text and "1 reproduced" not in text and "1 hold quick, 1 differ quick" in text
 
 
 def test_report_is_written(out, capsys):
     assert main(["report", "--out", str(out)]) == 0
     told = capsys.readouterr().out
-    assert "1 reproduced, 1 differ" in told and "report.html" in told
+    assert "1 hold quick, 1 differ quick" in told and "report.html" in told
     assert (out / "report.html").read_text(encoding="utf-8") == to_html(summarise(out))
     content = (out / "report.pdf").read_bytes()
     assert content.startswith(b"%PDF-") and content.rstrip().endswith(b"%%EOF")

@@ -2,6 +2,7 @@
 
 import json
 
+import numpy as np
 import pytest
 
 from hmc.errors import InputError
@@ -43,6 +44,13 @@ def test_seeds_go_up_and_down():
 def test_parameters_are_the_same_for_all_cells_and_equal_cells_are_one():
     grid = grid_of(TOY, changed_plan(Plan(), settings=(None, ("frames", 60), ("layers", 4))))
     assert {(cell["frames"], cell["layers"]) for cell in grid} == {(60, 4)} and len(grid) == len(NAMES) * 2
+
+
+def test_cells_that_are_stored_under_one_name_are_one():
+    given = [{"layers": 1, "gone_s": (2.0, 3.5)}, {"layers": 2, "gone_s": [2.0, 3.5]}, {"layers": 3, "gone_s": np.array([2.0, 3.5])}]
+    one = Experiment("one", "", "", lambda plan: given, lambda *given: {}, lambda cells, plan: None)
+    assert len(grid_of(one, Plan())) == 3
+    assert len(grid_of(one, changed_plan(Plan(), settings=(("layers", 4),)))) == 1
 
 
 def test_actions_are_whole_words():

@@ -5,10 +5,18 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import hmc
 import hmc.api
+from hmc.body.joints import dof_index
+from hmc.body.kinematics import landmarks
+from hmc.body.marker_places import with_skin_markers
+from hmc.body.model import neutral_state
+from hmc.body.proportions import default_body
+from hmc.camera.model import project
+from hmc.io.detections import DetectionTable
 from hmc.pose import registry
 from hmc.tracking import trackers
 
@@ -61,3 +69,19 @@ def test_what_cannot_be_done_is_said(tmp_path):
     tracks = hmc.track(recording)
     with pytest.raises(hmc.InputError, match=r"must end in \.png"):
         hmc.view(tracks, recording, tmp_path / "picture.txt")
+
+
+@pytest.mark.slow
+def test_poses_from_detections():
+    """A person who wears the markers, seen by the shipped clip's cameras: no image is read, and no tracks are needed."""
+    recording = hmc.open_recording(ROOT / "data" / "synthetic" / "tiny", frames=3)
+    body = default_body(1.76)
+    states = np.tile(neutral_state("down", body.limits), (3, 1))
+    states[:, 2] = 0.95
+    states[:, dof_index("l_shoulder_x")] += np.radians([[-40], [-36], [-32]])
+    uv, _ = project(recording.rig, landmarks(with_skin_markers(body), states))
+    view, frame, _ = (index.ravel() for index in np.indices(uv.shape[:3]))
+    detections = DetectionTable(frame, np.array(recording.rig.names)[view], uv.reshape(-1, 2))
+    people = hmc.pose(recording, method="marker-apf", detections=detections)
+    assert people.frames.tolist() == [0, 1, 2] and set(people.persons) == {0}
+    assert np.linalg.norm(people.positions - landmarks(body, states), axis=-1).mean() < 0.01

@@ -114,7 +114,7 @@ def write_booklet(path: Path, rows: Sequence[Row]) -> None:
 def _summary(pages: _Pages, row: Row) -> None:
     entry = row.entry
     pages.room(0.6)
-    pages.text(f"{entry.id}: {entry.title}. {row.verdict.capitalize()}.", weight="bold", after=0.0)
+    pages.text(f"{entry.id}: {entry.title}. {row.label.capitalize()}.", weight="bold", after=0.0)
     paper = "" if entry.work == OURS else "The paper: "
     pages.text(f"{paper}{entry.shows}. {without_dataset(entry).capitalize()}", 8, indent=0.2, after=0.0, color="0.3")
     for claim in row.differing:
@@ -127,7 +127,7 @@ def _summary(pages: _Pages, row: Row) -> None:
 def _detail(pages: _Pages, row: Row) -> None:
     entry = row.entry
     pages.text(f"{entry.id}: {entry.title}", 13, "bold")
-    pages.text(f"{row.verdict.capitalize()}. {entry.work}: {entry.shows}.")
+    pages.text(f"{row.label.capitalize()}. {entry.work}: {entry.shows}.")
     if row.why:
         pages.text(f"Why it differs, as far as known: {row.why}")
     for result in row.results:

@@ -30,7 +30,7 @@ def to_markdown(rows: Sequence[Row], link: str = "") -> str:
         for row in own:
             entry, run = row.entry, f" ({row.results[0].what})" if row.results else ""
             name = f"[{entry.id}](#{entry.id.replace('.', '')})" if row.results else entry.id
-            lines.append(f"| {name} | {_cell(entry.title)} | {_cell(entry.shows)} | {row.verdict}{_cell(run)} |")
+            lines.append(f"| {name} | {_cell(entry.title)} | {_cell(entry.shows)} | {row.label}{_cell(run)} |")
         lines.append("")
     for row in rows:
         if row.results:
@@ -44,7 +44,7 @@ def _section(row: Row, link: str) -> Iterator[str]:
     without = without_dataset(entry)
     if without:
         yield f"{without.capitalize()}."
-    yield from ("", f"**{row.verdict.capitalize()}**; {run.what}.")
+    yield from ("", f"**{row.label.capitalize()}**; {run.what}.")
     for claim in run.claims:
         yield f"- {'holds' if claim.holds else 'differs'}: {claim.text}{f' ({claim.detail})' if claim.detail else ''}"
     if row.why:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from hmc.errors import InputError
 from hmc.experiments.engine.library import EXPERIMENTS, find_experiment
-from hmc.experiments.engine.store import cell_key, read_cell, write_text
+from hmc.experiments.engine.store import cell_key, digest, read_cell, write_text
 
 __all__ = ["MergeReport", "merge_stores"]
 
@@ -82,20 +82,20 @@ def merge_stores(out: Path, others: Sequence[Path]) -> MergeReport:
         elif not target.exists():
             write_text(target, text)
             copied += 1
-        elif _results_of(target) == cell.results:
+        elif _results_of(target) == digest(cell.results):
             same += 1
         else:
             different.append(path)
     return MergeReport(copied, same, tuple(different), tuple(old), tuple(damaged))
 
 
-def _results_of(path: Path) -> object:
-    """The results of a cell that is here; None where it is damaged."""
+def _results_of(path: Path) -> str | None:
+    """The digest of the results of a cell that is here; None where it is damaged."""
     try:
         cell = read_cell(path)
     except InputError:
         return None
-    return None if cell is None else cell.results
+    return None if cell is None else digest(cell.results)
 
 
 def _pairs(out: Path, others: Iterable[Path]) -> Iterable[tuple[Path, Path]]:

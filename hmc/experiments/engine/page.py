@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 from html import escape
 
 from hmc.experiments.engine.catalogue import Entry
-from hmc.experiments.engine.summary import DIFFERS, MISSING, NOT_RUN, REPRODUCED, SHOWN, Row, StoredRun, StoredTable
+from hmc.experiments.engine.summary import DIFFERS, HOLDS, MISSING, NOT_RUN, REPRODUCED, SCOPES, SHOWN, Row, StoredRun, StoredTable
 
 __all__ = ["HEADING", "INTRODUCTION", "to_html", "verdict_counts", "without_dataset"]
 
@@ -17,11 +17,12 @@ HEADING = "The papers, computed again"
 INTRODUCTION = (
     "Every table and figure of the three papers that hmc implements, and how what comes out here compares. The data of the papers are not "
     "to be had: rendered recordings, or those of the user, stand for them, so that order and shape are compared and not figures. An "
-    "experiment is reproduced when everything that its paper shows holds here; otherwise it differs, and how is said."
+    "experiment is reproduced when everything that its paper shows holds in a run in full. Where it holds in a quick run, or in a "
+    "part of the full grid, no more than that is said; otherwise it differs, and how is said."
 )
 #: Tables with more rows are folded up.
 MAX_OPEN_ROWS = 16
-_CLASS = {REPRODUCED: "good", DIFFERS: "bad", SHOWN: "good", NOT_RUN: "none", MISSING: "none"}
+_CLASS = {REPRODUCED: "good", HOLDS: "partly", DIFFERS: "bad", SHOWN: "none", NOT_RUN: "none", MISSING: "none"}
 
 _STYLE = """
 :root { color-scheme: light; }
@@ -40,7 +41,8 @@ th.paper, td.paper { background: #f1f4fa; }
 .overview td:first-child { white-space: nowrap; }
 .overview th:nth-child(1) { width: 7.5rem; } .overview th:nth-child(2) { width: 18%; } .overview th:nth-child(3) { width: 34%; }
 .verdict { display: inline-block; border-radius: 1rem; padding: .02rem .6rem; font-size: .8rem; white-space: nowrap; }
-.good { background: #d9f0df; color: #14532d; } .bad { background: #fde8cf; color: #7a3c04; } .none { background: #e9ecf1; color: #475063; }
+.good { background: #d9f0df; color: #14532d; } .partly { background: #e3edf9; color: #1d3f6e; }
+.bad { background: #fde8cf; color: #7a3c04; } .none { background: #e9ecf1; color: #475063; }
 section.experiment { border-top: 1px solid #d4dae4; padding: 1.25rem 0 .75rem; }
 ul.claims { list-style: none; padding: 0; margin: .5rem 0; } ul.claims li { margin: .3rem 0; max-width: 100ch; }
 img { max-width: 100%; height: auto; display: block; margin: .75rem 0; }
@@ -74,10 +76,12 @@ def to_html(rows: Sequence[Row]) -> str:
 
 
 def verdict_counts(rows: Sequence[Row]) -> str:
-    """How many rows have which verdict, as a sentence."""
-    counts = Counter(row.verdict for row in rows)
-    named = [f"{counts[verdict]} {'differ' if verdict == DIFFERS else verdict}" for verdict in _CLASS if counts[verdict]]
-    return f"{len(rows)} experiments: {', '.join(named)}."
+    """How many rows have which verdict, in full, in part and quick told apart, as a sentence."""
+    counts = Counter(row.label for row in rows)
+    told = {REPRODUCED: REPRODUCED}
+    told |= {f"{scope}, {verdict}": f"{word} {scope}" for verdict, word in ((HOLDS, "hold"), (DIFFERS, "differ")) for scope in SCOPES}
+    told |= {verdict: verdict for verdict in (SHOWN, NOT_RUN, MISSING)}
+    return f"{len(rows)} experiments: {', '.join(f'{counts[label]} {words}' for label, words in told.items() if counts[label])}."
 
 
 def without_dataset(entry: Entry) -> str:
@@ -90,7 +94,7 @@ def _overview(rows: Sequence[Row]) -> str:
     for row in rows:
         entry = row.entry
         name = f'<a href="#{_anchor(entry.id)}">{escape(entry.id)}</a>' if row.results else escape(entry.id)
-        here = [_chip(row.verdict)]
+        here = [_chip(row)]
         here += [f"<p>{escape(_how(claim.text, claim.detail))}</p>" for claim in row.differing]
         if row.why:
             here.append(f'<p class="small">{escape(row.why)}</p>')
@@ -104,7 +108,7 @@ def _overview(rows: Sequence[Row]) -> str:
 def _section(row: Row) -> str:
     entry = row.entry
     lines = [f'<section class="experiment" id="{_anchor(entry.id)}">', f"<h3>{escape(entry.id)}: {escape(entry.title)}</h3>"]
-    lines.append(f"<p>{_chip(row.verdict)} {escape(entry.work)}: {escape(entry.shows)}</p>")
+    lines.append(f"<p>{_chip(row)} {escape(entry.work)}: {escape(entry.shows)}</p>")
     if row.why:
         lines.append(f"<p><b>Why it differs, as far as known:</b> {escape(row.why)}</p>")
     for result in row.results:
@@ -160,8 +164,8 @@ def _how(claim: str, detail: str) -> str:
     return f"{claim}: {detail}" if detail else claim
 
 
-def _chip(verdict: str) -> str:
-    return f'<span class="verdict {_CLASS[verdict]}">{escape(verdict)}</span>'
+def _chip(row: Row) -> str:
+    return f'<span class="verdict {_CLASS[row.verdict]}">{escape(row.label)}</span>'
 
 
 def _anchor(name: str) -> str:

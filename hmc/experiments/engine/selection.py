@@ -9,6 +9,7 @@ from typing import Any
 
 from hmc.errors import InputError
 from hmc.experiments.engine.experiment import Experiment, Plan
+from hmc.experiments.engine.store import digest
 
 __all__ = ["REPEAT", "changed_plan", "grid_of", "read_settings"]
 
@@ -88,12 +89,12 @@ def _of_actions(experiment: Experiment, grid: list[dict[str, Any]], actions: Seq
 
 
 def _once(cells: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Cells in their order, each once."""
+    """Cells in their order, each once: those that would have one name are one."""
     found: list[dict[str, Any]] = []
     seen = set()
     for cell in cells:
-        told = repr(sorted(cell.items()))
-        if told not in seen:
-            seen.add(told)
+        key = digest(cell)
+        if key not in seen:
+            seen.add(key)
             found.append(cell)
     return found

@@ -15,10 +15,17 @@ from hmc.experiments.engine.library import EXPERIMENTS, find_experiment
 from hmc.experiments.engine.writing import report_folder
 from hmc.io.results import read_run
 
-__all__ = ["DIFFERS", "MISSING", "NOT_RUN", "OURS", "REPRODUCED", "SHOWN", "Row", "StoredRun", "StoredTable", "summarise"]
+__all__ = [
+    "CHANGED", "DIFFERS", "HOLDS", "IN_FULL", "IN_PART", "MISSING", "NOT_RUN", "OURS", "QUICK", "REPRODUCED", "SCOPES", "SHOWN", "Row",
+    "StoredRun", "StoredTable", "summarise",
+]  # fmt: skip
 
-REPRODUCED, DIFFERS, SHOWN = "reproduced", "differs", "shown"
+REPRODUCED, HOLDS, DIFFERS, SHOWN = "reproduced", "holds", "differs", "shown"
 NOT_RUN, MISSING = "not computed yet", "no experiment yet"
+#: How much of an experiment a run is: its own grid, cells of that and no others, its quick grid, or other seeds and parameters.
+IN_FULL, IN_PART, QUICK, CHANGED = "in full", "in part", "quick", "changed"
+#: Which run counts, where there are several.
+SCOPES = (IN_FULL, IN_PART, QUICK, CHANGED)
 #: Experiments without a paper come last.
 OURS = "Beyond the papers"
 
@@ -40,8 +47,10 @@ class StoredRun:
     Attributes
     ----------
     folder : Path
+    scope : str
+        One of `SCOPES`.
     what : str
-        How it was run: in full or quick, on which recordings.
+        How it was run: in full or quick, with what changed, on which recordings.
     claims : tuple of Claim
     tables : tuple of StoredTable
     pictures : tuple of Path
@@ -51,6 +60,7 @@ class StoredRun:
     """
 
     folder: Path
+    scope: str
     what: str
     claims: tuple[Claim, ...]
     tables: tuple[StoredTable, ...]
@@ -66,7 +76,8 @@ class Row:
     ----------
     entry : Entry
     verdict : str
-        One of the constants of this module, of the run that counts: in full before quick.
+        One of the constants of this module, of the run that counts, the first of `SCOPES`. `REPRODUCED` where everything that a paper
+        shows holds in a run in full; `HOLDS` where it does in less than that, and in full where it is no paper's.
     results : tuple of StoredRun
         The run that counts, then one on the user's recordings; either may be missing.
     """
@@ -74,6 +85,11 @@ class Row:
     entry: Entry
     verdict: str
     results: tuple[StoredRun, ...] = ()
+
+    @property
+    def label(self) -> str:
+        """The verdict, and in how much it was found where that has to be said: "quick, holds", "in full, differs"."""
+        return f"{self.results[0].scope}, {self.verdict}" if self.verdict in (HOLDS, DIFFERS) else self.verdict
 
     @property
     def differing(self) -> tuple[Claim, ...]:
@@ -119,15 +135,20 @@ def _row(out: Path, entry: Entry) -> Row:
     experiment = find_experiment(entry.id)
     results = []
     for own in ((), (Source("any@0"),)):
-        folders = [report_folder(out, experiment, Plan(quick, own)) for quick in (False, True)]
-        found = next((folder for folder in folders if (folder / "run.toml").is_file()), None)
-        if found is not None:
-            results.append(_result(found))
+        folders = [report_folder(out, experiment, Plan(quick, own, seeds)) for seeds in (None, 1) for quick in (False, True)]
+        found = [_result(folder) for folder in folders if (folder / "run.toml").is_file()]
+        results += sorted(found, key=lambda run: SCOPES.index(run.scope))[:1]
     if not results:
         return Row(entry, NOT_RUN)
-    claims = results[0].claims
-    verdict = SHOWN if not claims else REPRODUCED if all(claim.holds for claim in claims) else DIFFERS
-    return Row(entry, verdict, tuple(results))
+    return Row(entry, _verdict(entry, results[0]), tuple(results))
+
+
+def _verdict(entry: Entry, run: StoredRun) -> str:
+    if not run.claims:
+        return SHOWN
+    if not all(claim.holds for claim in run.claims):
+        return DIFFERS
+    return REPRODUCED if run.scope == IN_FULL and entry.work != OURS else HOLDS
 
 
 def _result(folder: Path) -> StoredRun:
@@ -138,13 +159,26 @@ def _result(folder: Path) -> StoredRun:
     except (KeyError, TypeError) as error:
         raise InputError(f"{folder / 'run.toml'}: its claims cannot be read; run the experiment again") from error
     names = [source.rpartition("@")[0] for source in parameters.get("recordings", [])]
-    what = f"{'quick' if parameters.get('quick') else 'in full'}, {len(parameters.get('cells', {}))} cells"
+    scope, what = _scope(folder, parameters)
     if names:
         what += f", on {', '.join(names)}"
     captions = run.get("captions", {})
     tables = (_table(path, captions.get(path.stem, "")) for path in _in_order(folder, "csv", list(captions)))
     pictures = _in_order(folder, "png", run.get("figures", []))
-    return StoredRun(folder, what, claims, tuple(tables), tuple(pictures), run.get("versions", {}))
+    return StoredRun(folder, scope, what, claims, tuple(tables), tuple(pictures), run.get("versions", {}))
+
+
+def _scope(folder: Path, parameters: dict[str, Any]) -> tuple[str, str]:
+    """How much of its experiment a run is, in a word and in figures."""
+    quick, changed, n = parameters.get("quick", False), parameters.get("changed"), len(parameters.get("cells", {}))
+    if changed is None and not folder.name.endswith("-other"):
+        return QUICK if quick else IN_FULL, f"{QUICK if quick else IN_FULL}, {n} cells"
+    changed = changed or {}
+    own, total = changed.get("of_own", 0), changed.get("own_cells", 0)
+    scope = IN_PART if n and own == n and not quick else CHANGED
+    what = f"{scope}, {n} cells, {own} of the {total} of the {QUICK if quick else 'full'} grid" if total else f"{scope}, {n} cells"
+    asked = [f"{name} = {value}" for name, value in changed.get("asked", {}).items()]
+    return scope, f"{what}, with {', '.join(asked)}" if asked else what
 
 
 def _in_order(folder: Path, kind: str, names: list[str]) -> Iterator[Path]:

@@ -132,7 +132,7 @@ def run_experiment(
     try:
         return Outcome(experiment.report(cells, plan), len(missing), found)
     except (KeyError, IndexError, StopIteration, ValueError) as error:
-        if not plan.changed:
+        if isinstance(error, InputError) or not plan.changed:
             raise
         raise InputError(
             f"{experiment.id}: the cells are computed and kept, but its report needs what was left out ({type(error).__name__} {error})"

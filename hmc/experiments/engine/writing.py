@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import csv
 import math
+from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -69,6 +71,8 @@ def write_report(out: Path, experiment: Experiment, plan: Plan, report: Report) 
         "cells_version": experiment.version,
         "cells": {cell_key(experiment, cell): cell for cell in grid},
     }
+    if plan.changed:
+        parameters["changed"] = _changes(experiment, plan, parameters["cells"])
     claims = [{"claim": claim.text, "holds": claim.holds, "detail": claim.detail} for claim in report.claims]
     captions = {table.name: table.caption for table in report.tables}
     write_run(
@@ -76,6 +80,13 @@ def write_report(out: Path, experiment: Experiment, plan: Plan, report: Report) 
         figures=list(report.figures), captions=captions,
     )  # fmt: skip
     return folder
+
+
+def _changes(experiment: Experiment, plan: Plan, keys: Iterable[str]) -> dict[str, Any]:
+    """What was asked for otherwise than the experiment has it, and how much of its own grid that is."""
+    own = {cell_key(experiment, cell) for cell in experiment.grid(replace(plan, seeds=None, actions=(), settings=()))}
+    asked = ({"seeds": plan.seeds} if plan.seeds else {}) | ({"actions": list(plan.actions)} if plan.actions else {})
+    return {"asked": asked | dict(plan.settings), "own_cells": len(own), "of_own": len(own.intersection(keys))}
 
 
 def to_latex(table: Table) -> str:

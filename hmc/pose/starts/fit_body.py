@@ -57,7 +57,7 @@ class _Prior:
     precision: np.ndarray
 
 
-def with_known_stature(settings: FitBodySettings, known: bool = True) -> FitBodySettings:
+def with_known_stature(settings: FitBodySettings, known: bool) -> FitBodySettings:
     """Settings by which the fit changes the stature little, where it is known."""
     return replace(settings, scale_deviation=KNOWN_STATURE) if known else settings
 

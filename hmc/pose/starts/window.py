@@ -21,7 +21,7 @@ from hmc.body.model import BodyModel, neutral_state
 from hmc.body.proportions import canton_body, default_body
 from hmc.pose.method import Capture, FrameRng, PoseStep, StartPose, StepInfo, Subject, Tracked, begin_tracking
 from hmc.pose.objectives.objective import Objective, cost_at
-from hmc.pose.starts.fit_body import WORTH_IT, FitBodyInfo, fit_body, with_known_stature
+from hmc.pose.starts.fit_body import WORTH_IT, fit_body, with_known_stature
 from hmc.pose.starts.spectral import spectral_poses
 from hmc.pose.starts.templates import first_poses
 from hmc.pose.steps.annealed import annealed, annealed_subject
@@ -169,7 +169,7 @@ class WindowStart:
         return replace(found, subject=replace(found.subject, capture=capture), anchor=found.anchor * stride)
 
     def _decide(self, window: _Window, height_m: float | None) -> StartPose:
-        """The subject with the person's body, a frame and the pose in it, the candidates' costs and the fit."""
+        """The subject with the person's body, a frame and the pose in it, and the candidates' costs."""
         preset, capture = self.preset, window.capture
         heights = (height_m,) if height_m else possible_heights([view.target for view in window.views], capture.floor_z)
         bodies = [canton_body(height) if preset.body == "canton" else default_body(height) for height in heights]
@@ -184,8 +184,8 @@ class WindowStart:
             return started
         # What the body's dimensions are fitted to need not be the last word on the poses.
         path = walk(window.frame_rng, quick_step(preset), started.subject, started.state, started.anchor, window.views)
-        subject, fit = _fit(started.subject, window, path, self, height_m is not None)
-        return replace(started, subject=subject, state=path[started.anchor][0].state, fit=fit)
+        subject = _fit(started.subject, window, path, self, height_m is not None)
+        return replace(started, subject=subject, state=path[started.anchor][0].state)
 
 
 @dataclass(frozen=True)
@@ -363,15 +363,13 @@ def walk_factor(headings: np.ndarray, velocities: np.ndarray, settings: StartSet
     return np.where(speed > settings.walk_speed_m_s, 1 + settings.walk_penalty * (1 - forwards) / 2, 1.0)
 
 
-def _fit(
-    subject: Subject, window: _Window, path: Sequence[tuple[Tracked, StepInfo]], start: WindowStart, height_known: bool
-) -> tuple[Subject, FitBodyInfo | None]:
+def _fit(subject: Subject, window: _Window, path: Sequence[tuple[Tracked, StepInfo]], start: WindowStart, height_known: bool) -> Subject:
     """The subject with a body fitted to some frames of the window, if the others agree."""
     preset, settings = start.preset, start.settings
     costs = np.array([info.cost for _, info in path])
     good = np.flatnonzero(np.isfinite(costs)).tolist()
     if len(good) < LEAST_BODY_FRAMES or preset.fit_body is None:
-        return subject, None
+        return subject
     # Frames in which the pose is in doubt teach nothing of the body: leave the worst third out.
     limit = np.quantile(costs[good], 0.67)
     good = [k for k in good if costs[k] <= limit]
@@ -380,7 +378,7 @@ def _fit(
     held_out = held_out[:: max(1, len(held_out) // 8)]
     objectives = {k: fine_objective(window.frame_rng(k), subject, window.target(k), preset.polish) for k in {*picks, *held_out}}
     coordinates = surface_coordinates(subject.body, preset.surface_samples)
-    body, _, info = fit_body(
+    body, _, _ = fit_body(
         [objectives[k] for k in picks],
         np.array([path[k][0].state for k in picks]),
         coordinates,
@@ -395,4 +393,4 @@ def _fit(
         for one in (subject, fitted)
     )
     # Of frames that it was not fitted to.
-    return (fitted, info) if np.mean(after) < WORTH_IT * np.mean(before) else (subject, None)
+    return fitted if np.mean(after) < WORTH_IT * np.mean(before) else subject

@@ -82,7 +82,7 @@ class SwarmSettings:
     spin_weight : float
         How much a change of the spin from one frame to the next counts, metres a radian.
     restart : RestartSettings or None
-        None: every frame has the fit near the last pose; for methods that recover in another way.
+        None: the default ones in `swarm_step`; `fit_near`, for methods that recover in another way, has none.
     voxels : bool
         Whether the voxels count beside their curves; the thesis fits curves alone, and has no fit where they are not those of a body.
     """
@@ -225,15 +225,15 @@ def swarm_step(
     velocity : ndarray, shape (3,), optional
         Of the person's track, metres a second.
     settings : SwarmSettings, optional
-        By default with a restart where the fit is doubtful.
+        A restart that is None is the default one: where the fit is doubtful.
 
     Returns
     -------
     state : SwarmState or None
     info : SwarmInfo
     """
-    settings = settings or SwarmSettings(restart=RestartSettings())
-    restart = settings.restart
+    settings = settings or SwarmSettings()
+    restart = settings.restart or RestartSettings()
     segmentation = reading.segmentation
     doubts = (*segmentation.doubts, *(f"{one} touch" for one in segmentation.touching), *reading.left_out)
     volume = reading.volume if settings.voxels else None
@@ -252,14 +252,14 @@ def swarm_step(
     facing = state.facing + facing_evidence(found.state, heading)
     started = turned = False
     spent = 0
-    backwards = restart is not None and facing < restart.backwards and facing_evidence(found.state, heading) < 0
+    backwards = facing < restart.backwards and facing_evidence(found.state, heading) < 0
     whole = segmentation.whole and reading.status == "read"
     # Parts that were left out because they are far away count here, where the frame shows everything.
     cost_m = found.cost_m
     if whole:
         cost_m = float(fit_cost(model, found.state[None], observe_curves(model, curves_of(reading), settings.nodes, volume=volume))[0])
-    doubtful = restart is not None and cost_m > max(restart.doubt_m, restart.doubt_ratio * state.usual_m)
-    if restart is not None and reading.status == "read" and (((doubtful or backwards) and whole) or restart.always):
+    doubtful = cost_m > max(restart.doubt_m, restart.doubt_ratio * state.usual_m)
+    if reading.status == "read" and (((doubtful or backwards) and whole) or restart.always):
         trial = start_fits(rng, model, reading, heading, settings, None if backwards else state.state)[0]
         spent = trial.evaluations
         margin = -settings.facing_m if backwards and facing_evidence(trial.state, heading) > 0 else restart.margin_m
@@ -268,7 +268,7 @@ def swarm_step(
             facing = facing_evidence(trial.state, heading)
         elif backwards:
             facing = 0.0
-    if restart is not None and found.cost_m > restart.lost_m:
+    if found.cost_m > restart.lost_m:
         read = reading.status == "read"
         why = FAR if read else reading.status
         error_m = found.error_m if read else np.nan
