@@ -207,8 +207,8 @@ def displaced(rng, parameters, noise):
 RESULTS = {
     "fig-3.3": peaks, "fig-3.5": lambda rng, parameters, noise: {"score": float(rng.random()), "mean_error": float(rng.random())},
     "fig-4.2": components, "table-4.2": classified, "fig-4.4": tree, "fig-4.7": ellipsoid, "fig-4.9": samples, "tracking": tracks,
-    "fig-4.12": crossing, "pose": pose, "fig-6.11": maps, "markers": pose, "markerless-filter": pose, "markerless": pose,
-    "fig-7.8": schedule, "scalable-filter": pose, "fig-7.15": behind_furniture, "lost-arm": lost_arm, "over-time": pose,
+    "fig-4.12": crossing, "pose": pose, "fig-6.11": maps, "markers": pose, "filters": pose, "markerless": pose,
+    "fig-7.8": schedule, "fig-7.15": behind_furniture, "lost-arm": lost_arm, "over-time": pose,
     "all-methods": pose, "fig-B.1": square, "hsiao-3.8": ghosts, "hsiao-parts": parts, "hsiao-4": swarmed, "hsiao-pso": optimised,
     "kehl-1": carved, "kehl-4": edges, "kehl-9": displaced, "kehl": descended,
 }  # fmt: skip
