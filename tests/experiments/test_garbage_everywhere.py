@@ -1,18 +1,29 @@
-"""A claim that holds whatever the results are says nothing: of every experiment, none may hold on shuffled results and on noise alike."""
+"""A claim that holds whatever the results are says nothing: of every experiment, none may hold on shuffled results and noise alike."""
 
 import pytest
 from results_at_random import RESULTS, claims_at_random
 
 from hmc.experiments import EXPERIMENTS, find_experiment
 
-#: Draws each way. A claim that compares two things holds on all of them by chance once in a thousand times.
+#: Draws each way. A claim that compares two things holds on all of them but one by chance once in a hundred times.
 DRAWS = 5
-#: Claims that hold on all draws, by experiment, for want of better ones. The list may only become shorter.
+#: Claims that hold on all draws but one at most, by experiment, for want of better ones. The list may only become shorter.
 CANNOT_FAIL: dict[str, set[str]] = {
-    "fig-4.4": {"weight, height or bounding box are asked for first"},  # four of six features, anywhere in three levels
-    "fig-5.3": {"of the poor one MMTP is free of what is lost, and the mean is not"},  # follows from what a poor frame is
+    # That something does not hold is what noise shows.
+    "fig-3.3": {"the particle filter's does not"},
+    # Four of six features, anywhere in three levels of a tree.
+    "fig-4.4": {"weight, height or bounding box are asked for first"},
+    # Frames are chosen by what is then claimed of them.
+    "fig-5.3": {
+        "of the good estimate MMTP is the mean error, and MMTA 1",
+        "of the poor one MMTP is free of what is lost, and the mean is not",
+    },
+    "fig-5.6": {"both tests choose about the same threshold for most methods"},
     "fig-5.7": {"matched landmarks alone give smaller angular errors than all"},
-    "kehl-14": {"turns of 31 degrees and more between frames"},  # of the truth, whatever is estimated
+    # No difference beyond its error is what equal methods show.
+    "over-time": {"no other motion prior or start is better than the default's, beyond twice the error of the difference"},
+    # Of the truth, whatever is estimated.
+    "kehl-14": {"turns of 31 degrees and more between frames"},
 }
 
 
@@ -22,11 +33,13 @@ def test_every_experiment_has_results_at_random():
 
 @pytest.mark.parametrize("name", EXPERIMENTS)
 def test_no_claim_holds_on_everything(name):
-    held, draws = None, ((noise, seed) for seed in range(DRAWS) for noise in (True, False))
-    while held != set() and (draw := next(draws, None)):
-        noise, seed = draw
-        now = {claim.text for claim in claims_at_random(name, seed, noise) if claim.holds}
-        held = now if held is None else held & now
+    missed: dict[str, int] = {}
+    for noise, seed in ((noise, seed) for seed in range(DRAWS) for noise in (True, False)):
+        for claim in claims_at_random(name, seed, noise):
+            missed[claim.text] = missed.get(claim.text, 0) + (not claim.holds)
+        if min(missed.values(), default=2) > 1:
+            break
+    held = {text for text, n in missed.items() if n <= 1}
     known = CANNOT_FAIL.get(name, set())
     assert held <= known, "these hold on shuffled results and on noise: let them say something that can fail"
     assert known <= held, "these can fail now: take them off the list"
