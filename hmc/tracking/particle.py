@@ -214,7 +214,7 @@ def _filter(
         efficiency[k] = survival_rate(weights)
         moved.append({"points": particles, "weights": weights / weights.sum()})
         positions[k] = moved[k]["weights"] @ particles
-    looks = looks_of(observation, around, positions) if settings.color else ()
+    looks = looks_of(observation, around, positions, settings.following) if settings.color else ()
     memories = tuple(PersonMemory(one.person, arrays, one.histogram) for one, arrays in zip(state.memories, moved, strict=True))
     seen = np.array([len(arrays) > 0 for arrays in moved], bool)
     return FilterEstimate(positions, seen, memories, looks, settings.keep_histogram, around.color_s, efficiency)

@@ -297,7 +297,7 @@ def filter_samples(
     efficiency = seen / np.maximum(drawn * np.bincount(person, weights**2, n), 1e-12)
     mean = np.stack([np.bincount(person, weights * column, n) for column in samples.T], axis=1)
     positions = np.where(seen[:, None], origin + size * (mean + 0.5), centres)
-    looks = looks_of(observation, around, positions) if settings.color else ()
+    looks = looks_of(observation, around, positions, settings.following) if settings.color else ()
     parts = np.split(np.arange(len(samples)), np.cumsum(np.bincount(person, minlength=n))[:-1]) if n else []
     kept = [{"samples": samples[part], "weights": weights[part]} if len(part) else {} for part in parts]
     memories = tuple(PersonMemory(one.person, arrays, one.histogram) for one, arrays in zip(state.memories, kept, strict=True))
