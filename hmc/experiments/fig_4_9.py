@@ -32,7 +32,7 @@ RADIUS = 2
 
 def grid(plan: Plan) -> list[dict]:
     """Both likelihoods, several times."""
-    repeats = 4 if plan.quick else 20
+    repeats = 8 if plan.quick else 20
     return [{"likelihood": name, "samples": SAMPLES, "steps": STEPS, "repeat": k} for name in LIKELIHOODS for k in range(repeats)]
 
 
