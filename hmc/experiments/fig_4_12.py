@@ -102,4 +102,4 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     return Report((Table("fig-4.12", caption, rows),), {"fig-4.12": figure}, tuple(claims))
 
 
-EXPERIMENT = Experiment("fig-4.12", "a crossing, with and without color", "Canton, Figure 4.12", grid, cell, report, version=2)
+EXPERIMENT = Experiment("fig-4.12", "a crossing, with and without color", "Canton, Figure 4.12", grid, cell, report, version=3)

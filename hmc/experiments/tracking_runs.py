@@ -35,7 +35,7 @@ __all__ = [
 ]  # fmt: skip
 
 FAMILY = "tracking"
-VERSION = 2
+VERSION = 3
 
 Method = tuple[str, bool]
 #: What is compared; a tracker that lacks one of them is run with the others.

@@ -227,7 +227,8 @@ METHOD = TrackerMethod(
     step=step,
     presets={
         "default": ParticleSettings(),
-        "canton2009": ParticleSettings(drift=0.0, sharpness=1.0, following=CANTON_2009),
+        # P is of the largest variation of a centroid in the development part (section 4.3.2): here in the recipes `train_*`, once.
+        "canton2009": ParticleSettings(noise_m_s=1.6, noise_z_m_s=1.1, drift=0.0, sharpness=1.0, following=CANTON_2009),
         "alike": ParticleSettings(following=ALIKE),
     },
     label="PF",

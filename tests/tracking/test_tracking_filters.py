@@ -176,7 +176,7 @@ def test_choices():
     assert make_tracker("sparse", particles=70).settings == SparseSettings(samples=70)
     assert make_tracker("particle", color=False).settings == ParticleSettings(color=False)
     assert make_tracker("sparse", preset="canton2009").settings == SparseSettings(
-        scouts=0.0, drift=0.0, solid=False, following=CANTON_2009
+        noise_m=0.1, scouts=0.0, drift=0.0, solid=False, following=CANTON_2009
     )
     assert make_tracker().color and not make_tracker("naive").color
     with pytest.raises(InputError, match="1 to 4"):
