@@ -97,7 +97,8 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
         )
     names = ", ".join(dict.fromkeys(one.parameters["recording"].rpartition("@")[0] for one in cells))
     caption = (
-        f"Two people pass each other ({names}): Sparse Sampling with {SAMPLES} samples, voxels of {100 * VOXEL_M:g} cm. The paper: Figure 4.12."
+        f"Two people pass each other ({names}): Sparse Sampling with {SAMPLES} samples, voxels of {100 * VOXEL_M:g} cm. The paper: Figure "
+        "4.12."
     )
     return Report((Table("fig-4.12", caption, rows),), {"fig-4.12": figure}, tuple(claims))
 

@@ -91,7 +91,7 @@ def _but(name: str) -> list[str]:
 
 
 def _ahead(cells: Sequence[Cell]) -> float:
-    """By how many millimetres PF's MOTP is worse than that of SS, over the factors that both reach; the mean of voxel sizes, raw and color."""
+    """By how many millimetres PF's MOTP is worse than that of SS, over factors that both reach: mean of voxel sizes, raw and color."""
     gains = []
     for voxel in dict.fromkeys(one.parameters["voxel_m"] for one in cells):
         for color in (False, True):

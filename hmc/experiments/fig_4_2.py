@@ -60,8 +60,10 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     people = [row for row in rows if row["class"] == "person"]
     least = min(value for row in people for key, value in row.items() if key.startswith("B_"))
     finest, whose = data[sizes[0]]
-    others = {name: float(bhattacharyya(*(_shares(finest[whose == wanted], k) for wanted in (True, False)))) for k, name in enumerate(FEATURES)}
-    separable = {name: others[name] for name in ("weight_kg", "height_m", "longer_side_m")}
+    separable = {
+        name: float(bhattacharyya(*(_shares(finest[whose == wanted], FEATURES.index(name)) for wanted in (True, False))))
+        for name in ("weight_kg", "height_m", "longer_side_m")
+    }
     features, is_person = data[sizes[0]]
     tops = features[is_person, FEATURES.index("top_m")]
     counts, edges = np.histogram(tops, 48, RANGES[FEATURES.index("top_m")])

@@ -117,6 +117,4 @@ def _gain(first: str, second: str, cells: Sequence[Cell]) -> Interval:
     return difference(clips, (one[:, 0], one[:, 1]), (other[:, 0], other[:, 1]))
 
 
-EXPERIMENT = Experiment(
-    "table-4.2", "seven person classifiers: precision, recall, F", "Canton, Table 4.2", grid, cell, report, version=2
-)
+EXPERIMENT = Experiment("table-4.2", "seven person classifiers: precision, recall, F", "Canton, Table 4.2", grid, cell, report, version=2)

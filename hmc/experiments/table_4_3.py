@@ -171,7 +171,8 @@ def _claims(preset: str, cells: Sequence[Cell]) -> list[Claim]:
     for score in ("MOTP", "MOTA"):
         but_voxel = [name for name in everything if name != "voxel_m"]
         finest, coarsest = (pick(one.parameters["voxel_m"] for one in own) for pick in (min, max))
-        claims.append(ahead(f"{preset}: finer voxels are better, in {score}", those(voxel_m=finest), those(voxel_m=coarsest), score, but_voxel))
+        text = f"{preset}: finer voxels are better, in {score}"
+        claims.append(ahead(text, those(voxel_m=finest), those(voxel_m=coarsest), score, but_voxel))
         for tracker, name in (("sparse", "SS"), ("particle", "PF")):
             with_color, without = (those(tracker=tracker, color=color) for color in (True, False))
             text = f"{preset}: color is better, in {score} of {name}"

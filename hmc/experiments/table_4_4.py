@@ -58,8 +58,8 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     ]
     names = ", ".join(source.name for source in runs.sources(plan))
     caption = (
-        f"Each tracker's best case, against the heads, on {names}: the configuration that is the paper's best, at the finest voxels that were "
-        "run, and the best one here, which is chosen on the same clips. The paper's (Canton, Table 4.4) on CLEAR 2007."
+        f"Each tracker's best case, against the heads, on {names}: the configuration that is the paper's best, at the finest voxels that "
+        "were run, and the best one here, which is chosen on the same clips. The paper's (Canton, Table 4.4) on CLEAR 2007."
     )
     return Report((Table("table-4.4", caption, rows),), {}, tuple(claims))
 

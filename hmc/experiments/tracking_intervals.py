@@ -65,7 +65,7 @@ def gain(better: Sequence[Cell], worse: Sequence[Cell], score: str, by: Sequence
 
 
 def ahead(text: str, better: Sequence[Cell], worse: Sequence[Cell], score: str, by: Sequence[str]) -> Claim:
-    """The claim that some runs have a better score than others: it holds where the interval of the gain is above 0, of people who are followed.
+    """The claim that some runs have a better score than others: it holds where the interval of the gain is above 0 and people are followed.
 
     Parameters
     ----------

@@ -1,9 +1,9 @@
 """Runs of the person trackers that tables 4.3 and 4.4 and figures 4.11, 4.13 and 4.14 of Canton (2009) share: one cell is one run.
 
 The thesis's recordings (CLEAR 2007: 40 sequences of 5 minutes, up to 5 people in rooms of 5 x 4 m, 4 cameras in the corners and one on the
-ceiling, 25 frames a second) are not public; rendered meetings in such a room stand for them (recipes ``meeting_clear_*``: four and five people,
-a noisy sensor, chairs, doors, one room without the camera overhead), or the user's recordings. As CLEAR does, centroids are compared with the
-true centres of the heads, in the xy plane (section 4.4.1); beside that with the true centroids.
+ceiling, 25 frames a second) are not public; rendered meetings in such a room stand for them (recipes ``meeting_clear_*``: four and five
+people, a noisy sensor, chairs, doors, one room without the camera overhead), or the user's recordings. As CLEAR does, centroids are
+compared with the true centres of the heads, in the xy plane (section 4.4.1); beside that with the true centroids.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from hmc.plugins import load_plugins
 from hmc.tracking.following import finish, init
 from hmc.tracking.resumable import Timing
 from hmc.tracking.state import TrackRow
-from hmc.tracking.trackers import TRACKERS, make_tracker
+from hmc.tracking.trackers import TRACKERS, Tracker, make_tracker
 from hmc.tracking.tracks import frame_rng, table_of
 from hmc.tracking.views import FrameViews
 
 __all__ = [
-    "FAMILY", "PRESETS", "REFERENCES", "VERSION", "Method", "Score", "cell", "errors_of", "follow", "method_name", "methods", "parameters_of",
-    "scores_of", "sources", "style_of", "voxel_sizes",
+    "FAMILY", "PRESETS", "REFERENCES", "VERSION", "Method", "Score", "cell", "errors_of", "follow", "method_name", "methods",
+    "parameters_of", "scores_of", "sources", "style_of", "voxel_sizes",
 ]  # fmt: skip
 
 FAMILY = "tracking"
@@ -148,11 +148,11 @@ def errors_of(tracks: TrackTable, truth: TrackTable) -> Results:
     }
 
 
-def follow(parameters: Parameters, inputs: Inputs, seed: int) -> tuple[TrackTable, Timing, float]:
-    """Tracks of a run, the processor time spent, and the recording's frames a second."""
+def follow(parameters: Parameters, inputs: Inputs, seed: int, tracker: Tracker | None = None) -> tuple[TrackTable, Timing, float]:
+    """Tracks of a run, the processor time spent, and the recording's frames a second; by a tracker other than its parameters', if given."""
     label, color = parameters["recording"], parameters["color"]
     recording = inputs.recording(label)
-    tracker = make_tracker(parameters["tracker"], color=color, particles=parameters["particles"], preset=parameters["preset"])
+    tracker = tracker or make_tracker(parameters["tracker"], color=color, particles=parameters["particles"], preset=parameters["preset"])
     state, timing = init(recording.fps), Timing()
     rows: list[TrackRow] = []
     images: Iterator = (frame.images for frame in iterate_frames(recording)) if color else repeat(())

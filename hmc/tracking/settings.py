@@ -145,8 +145,8 @@ class FollowingSettings:
             raise InputError(f"`rules` must be 'default' or 'canton2009'; got {self.rules!r}")
 
 
-#: As Canton (2009) prints it: sections 4.2.3 and 4.3.1. How close is too close is not printed: of .45 to 1.0 m (to begin) and .2 to .4 m (to
-#: end) those with which the three trackers, without color, have the best mean MOTA on the recipe `meeting_tuning`, on which nothing is tested.
+#: As Canton (2009) prints it: sections 4.2.3 and 4.3.1. How close is too close is not printed: of .45 to 1.0 m (to begin) and .2 to .4 m
+#: (to end) those with which the trackers, without color, have the best mean MOTA on the recipe `meeting_tuning`. Nothing is tested on it.
 CANTON_2009 = FollowingSettings(
     rules="canton2009",
     least_certain_m3=np.inf,

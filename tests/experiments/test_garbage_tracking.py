@@ -68,14 +68,24 @@ def test_a_tree_of_chance_is_not_the_thesis_s():
 
 def test_spreads_that_do_not_differ_are_none_faster():
     experiment, plan, rng = find_experiment("fig-4.9"), Plan(quick=True), np.random.default_rng(4)
-    shown = {str(step): [[0.0, 0.0, 0.0]] for step in (0, 50, 150, 400)}
+    rest = {"error_mm": [1.0] * 601, "n_samples": [400] * 601}
+    rest["shown_m"] = {str(step): [[0.0, 0.0, 0.0]] for step in (0, 50, 150, 400)}
     held = []
     for _ in range(3):
-        cells = [
-            Cell(p, {"spread": list(rng.uniform(0.4, 0.9) + np.zeros(601)), "error_mm": [1.0] * 601, "n_samples": [400] * 601, "shown_m": shown})
-            for p in experiment.grid(plan)
-        ]
+        cells = [Cell(p, {"spread": list(rng.uniform(0.4, 0.9) + np.zeros(601)), **rest}) for p in experiment.grid(plan)]
         with house_style():
             held.append(experiment.report(cells, plan).claims[0].holds)
             plt.close("all")
     assert not all(held)
+
+
+def test_nobody_is_behind_where_errors_are_noise():
+    experiment, held = find_experiment("why-behind"), []
+    for seed in (1, 2, 3):
+        rng = np.random.default_rng(seed)
+        cells = [
+            Cell(p, {"standing": 90, "standing_m": 9.0, "walking": 90, "walking_m": 9.0, "behind_m": float(rng.normal(0, 4))})
+            for p in experiment.grid(Plan())
+        ]
+        held.append({claim.text for claim in experiment.report(cells, Plan()).claims if claim.holds})
+    assert not set.intersection(*held)

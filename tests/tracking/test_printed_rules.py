@@ -10,8 +10,8 @@ from test_tracking_naive import FPS, GRID, box, errors, line, nothing, person
 from hmc.errors import InputError
 from hmc.tracking.blobs import observe
 from hmc.tracking.following import advance, init
-from hmc.tracking.rules import PRINTED, filtering, printed
 from hmc.tracking.region import least_radius
+from hmc.tracking.rules import PRINTED, filtering, printed
 from hmc.tracking.rules.printed import claim_regions
 from hmc.tracking.settings import CANTON_2009, FollowingSettings, LifecycleSettings
 from hmc.tracking.state import Track, TrackerState
