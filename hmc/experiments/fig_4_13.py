@@ -14,10 +14,12 @@ import numpy as np
 from hmc.experiments import table_4_3
 from hmc.experiments import tracking_runs as runs
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
+from hmc.experiments.engine.intervals import Interval, interval
 
 __all__ = ["EXPERIMENT"]
 
-PRESET = "default"
+#: The trackers as the thesis has them.
+PRESET = "canton2009"
 
 
 def report(cells: Sequence[Cell], plan: Plan) -> Report:
@@ -59,7 +61,7 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     left.minorticks_off()
     left.legend(title="dotted: theory")
     caption = "Processor time of the filters and the theory's growth (Canton, Table 4.5 and Figure 4.13)."
-    return Report((Table("fig-4.13", caption, rows),), {"fig-4.13": figure}, tuple(_claims(rows)))
+    return Report((Table("fig-4.13", caption, rows),), {"fig-4.13": figure}, tuple(_claims(cells)))
 
 
 def _theory(method: str, voxel_m: float, n: int | None) -> float:
@@ -69,32 +71,51 @@ def _theory(method: str, voxel_m: float, n: int | None) -> float:
     return float(n or 1) * (ellipsoid if method.startswith("PF") else 26 * 2**3)
 
 
-def _claims(rows: list[dict]) -> list[Claim]:
-    def growth(method: str, key: str) -> float:
-        """Exponent by which the time grows with one over the voxel's side, or with N, the other held."""
-        other = "N" if key == "voxel_cm" else "voxel_cm"
-        own = [row for row in rows if row["method"] == method]
-        slopes = []
-        for fixed in {row[other] for row in own}:
-            line = [row for row in own if row[other] == fixed]
-            slopes.append(np.polyfit(np.log([row[key] for row in line]), np.log([row["measured_ms"] for row in line]), 1)[0])
-        return float(np.mean(slopes)) * (-1 if key == "voxel_cm" else 1)
+def _claims(cells: Sequence[Cell]) -> list[Claim]:
+    """Exponents of growth clip by clip, and their intervals over clips."""
+    clips = list(dict.fromkeys(one.parameters["recording"] for one in cells))
+    own = [[one for one in cells if one.parameters["recording"] == clip and one.parameters["preset"] == PRESET] for clip in clips]
+    names = list(dict.fromkeys(runs.method_name(one.parameters) for one in cells))
 
-    names = dict.fromkeys(row["method"] for row in rows)
-    by_voxel = {method: growth(method, "voxel_cm") for method in names}
-    by_number = {method: growth(method, "N") for method in names if any(row["N"] for row in rows if row["method"] == method)}
+    def growth(method: str, key: str) -> np.ndarray:
+        return np.array([_growth([one for one in part if runs.method_name(one.parameters) == method], key) for part in own])
+
+    def apart(exponents: np.ndarray) -> Interval:
+        return interval(clips, exponents, np.ones(len(clips)))
+
+    by_voxel = {method: growth(method, "voxel_m") for method in names}
+    with_number = [name for name in names if name.startswith(("SS", "PF"))]
+    by_number = {method: growth(method, "particles") for method in with_number}
+    larger = [apart(by_voxel[name] - by_voxel["SS raw"]) for name in ("naive", "PF raw")]
+    grows = [apart(by_voxel[name]) for name in ("naive", "PF raw")]
     return [
         Claim(
             "naive and PF grow with the number of voxels, SS less than they",
-            by_voxel["SS raw"] < min(by_voxel["naive"], by_voxel["PF raw"]) and min(by_voxel["naive"], by_voxel["PF raw"]) > 0,
-            "time goes with the voxel's side to the power of " + ", ".join(f"{name} -{value:.2f}" for name, value in by_voxel.items()),
+            all(one.above_zero for one in (*larger, *grows)),
+            "time goes with the voxel's side to the power of " + ", ".join(f"{name} {_power(-value)}" for name, value in by_voxel.items()),
         ),
         Claim(
             "SS and PF grow with their samples",
-            min(by_number.values()) > 0,
-            "time goes with N to the power of " + ", ".join(f"{name} {value:.2f}" for name, value in by_number.items()),
+            all(apart(value).above_zero for value in by_number.values()),
+            "time goes with N to the power of " + ", ".join(f"{name} {_power(value)}" for name, value in by_number.items()),
         ),
     ]
+
+
+def _growth(cells: Sequence[Cell], key: str) -> float:
+    """Exponent by which a method's time grows with one over the voxel's side, or with N, the other held; NaN of one size or number."""
+    other = "particles" if key == "voxel_m" else "voxel_m"
+    slopes = []
+    for fixed in dict.fromkeys(one.parameters[other] for one in cells):
+        line = [one for one in cells if one.parameters[other] == fixed]
+        at, times = ([one.parameters[key] for one in line], [one.results["filter_s"] / max(one.results["rows"], 1) for one in line])
+        if len(set(at)) > 1 and min(times) > 0:
+            slopes.append(np.polyfit(np.log(at), np.log(times), 1)[0])
+    return (-1 if key == "voxel_m" else 1) * float(np.mean(slopes)) if slopes else float("nan")
+
+
+def _power(exponents: np.ndarray) -> str:
+    return f"{np.mean(exponents):.2f}"
 
 
 EXPERIMENT = Experiment(

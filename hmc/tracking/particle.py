@@ -214,7 +214,7 @@ def _filter(
         efficiency[k] = survival_rate(weights)
         moved.append({"points": particles, "weights": weights / weights.sum()})
         positions[k] = moved[k]["weights"] @ particles
-    looks = looks_of(observation, around, positions) if settings.color else ()
+    looks = looks_of(observation, around, positions, settings.following) if settings.color else ()
     memories = tuple(PersonMemory(one.person, arrays, one.histogram) for one, arrays in zip(state.memories, moved, strict=True))
     seen = np.array([len(arrays) > 0 for arrays in moved], bool)
     return FilterEstimate(positions, seen, memories, looks, settings.keep_histogram, around.color_s, efficiency)
@@ -227,7 +227,8 @@ METHOD = TrackerMethod(
     step=step,
     presets={
         "default": ParticleSettings(),
-        "canton2009": ParticleSettings(drift=0.0, sharpness=1.0, following=CANTON_2009),
+        # P is of the largest variation of a centroid in the development part (section 4.3.2): here in the recipes `train_*`, once.
+        "canton2009": ParticleSettings(noise_m_s=1.6, noise_z_m_s=1.1, drift=0.0, sharpness=1.0, following=CANTON_2009),
         "alike": ParticleSettings(following=ALIKE),
     },
     label="PF",

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 
-__all__ = ["person_radii", "region_distance"]
+from hmc.errors import InputError
+
+__all__ = ["least_radius", "person_radii", "region_distance"]
 
 #: Radius of an average person across, metres (Canton, section 4.2.3).
 PERSON_RADIUS_M = 0.30
@@ -38,6 +40,34 @@ def person_radii(centroids: np.ndarray, enlarge_xy: float = 1.5, enlarge_z: floa
     radii[..., :2] = enlarge_xy * PERSON_RADIUS_M
     radii[..., 2] = np.maximum(enlarge_z * centroids[..., 2], LEAST_HALF_HEIGHT_M)
     return radii
+
+
+def least_radius(speed_m_s: float | np.ndarray, fps: float | np.ndarray) -> np.ndarray:
+    """Least radius across of a region that does not lose who moves so fast (Canton, Eq. 4.6).
+
+    From frame to frame a person moves by no more than the region's width: region and person, who is as wide, still touch.
+
+    Parameters
+    ----------
+    speed_m_s : float or ndarray
+        Largest speed of a person, metres a second, 0 or more.
+    fps : float or ndarray
+        Frames a second, above 0.
+
+    Returns
+    -------
+    ndarray
+        ``v_max / (2 f_R)``, metres, broadcast.
+
+    Raises
+    ------
+    InputError
+        When a speed is negative or a number of frames a second is not positive.
+    """
+    speed, rate = np.asarray(speed_m_s, float), np.asarray(fps, float)
+    if not (np.all(speed >= 0) and np.all(rate > 0)):
+        raise InputError(f"`speed_m_s` must be 0 or more and `fps` above 0; got {speed_m_s} and {fps}")
+    return speed / (2 * rate)
 
 
 def region_distance(points: np.ndarray, centres: np.ndarray, radii: np.ndarray) -> np.ndarray:

@@ -13,13 +13,12 @@ import numpy as np
 from hmc.tracking.appearance import color_surface, histogram
 from hmc.tracking.blobs import Observation
 from hmc.tracking.region import person_radii, region_distance
+from hmc.tracking.settings import FollowingSettings
 
 __all__ = ["Surroundings", "blocking", "look_around", "looks_of"]
 
 #: Color of a voxel inside the hull, and of a surface voxel that no camera sees.
 INNER, UNSEEN = -2, -1
-#: Fewer colored voxels tell nothing of a person.
-LEAST_COLORED = 30
 
 
 @dataclass(frozen=True)
@@ -104,10 +103,12 @@ def blocking(points: np.ndarray, person: np.ndarray, centres: np.ndarray, sharpn
     return free
 
 
-def looks_of(observation: Observation, surroundings: Surroundings, positions: np.ndarray) -> tuple[np.ndarray, ...]:
-    """What each person looks like in this frame: the histogram of the colored voxels in their ellipsoid (Eq. 4.11).
+def looks_of(
+    observation: Observation, surroundings: Surroundings, positions: np.ndarray, settings: FollowingSettings
+) -> tuple[np.ndarray, ...]:
+    """What each person looks like in this frame: the histogram of the colored voxels in their ellipsoid (Canton, Eq. 4.11).
 
-    A voxel in several ellipsoids does not count, so that people who stand together do not take on one another's colors.
+    By default a voxel in several ellipsoids does not count, so that people who stand together do not take on one another's colors.
 
     Parameters
     ----------
@@ -115,15 +116,18 @@ def looks_of(observation: Observation, surroundings: Surroundings, positions: np
     surroundings : Surroundings
     positions : ndarray, shape (k, 3)
         The new estimates.
+    settings : FollowingSettings
+        Of which `shared_looks` and `least_colored` count.
 
     Returns
     -------
     tuple of ndarray, shape (n_colors,) or (0,)
-        Empty where fewer than `LEAST_COLORED` voxels have a color.
+        Empty where fewer voxels than `least_colored` have a color.
     """
     colored = np.flatnonzero(surroundings.colors >= 0)
     inside = region_distance(observation.points[colored], positions, person_radii(positions, 1.0, 1.0)) <= 1
-    inside &= inside.sum(axis=1, keepdims=True) == 1
+    if not settings.shared_looks:
+        inside &= inside.sum(axis=1, keepdims=True) == 1
     bins = surroundings.colors[colored]
-    enough = inside.sum(axis=0) >= LEAST_COLORED
+    enough = inside.sum(axis=0) >= settings.least_colored
     return tuple(histogram(bins[mine] if many else bins[:0]) for mine, many in zip(inside.T, enough, strict=True))

@@ -1,6 +1,7 @@
 """The thesis's own life of tracks (Canton 2009, sections 4.2.3 and 4.3.1) on drawn rooms, against loops and closed forms."""
 
 from dataclasses import replace
+from itertools import count
 
 import numpy as np
 import pytest
@@ -9,7 +10,8 @@ from test_tracking_naive import FPS, GRID, box, errors, line, nothing, person
 from hmc.errors import InputError
 from hmc.tracking.blobs import observe
 from hmc.tracking.following import advance, init
-from hmc.tracking.rules import PRINTED
+from hmc.tracking.region import least_radius
+from hmc.tracking.rules import PRINTED, filtering, printed
 from hmc.tracking.rules.printed import claim_regions
 from hmc.tracking.settings import CANTON_2009, FollowingSettings, LifecycleSettings
 from hmc.tracking.state import Track, TrackerState
@@ -50,6 +52,30 @@ def test_the_naive_tracker_is_at_the_centroid_of_its_region():
     assert set(walk.persons) == {0} and len(walk.frames) == 60 and errors(walk, 0, path).max() < 0.03
 
 
+@pytest.mark.parametrize(("name", "ticks"), [("naive", 2.0), ("particle", 1.0)])
+def test_the_filters_time_is_that_of_what_finds_people(name, ticks, monkeypatch):
+    """Eq. 4.33: of the naive tracker sharing out the voxels belongs to it, of the others only what they do themselves."""
+    clock = count().__next__
+    for module in (filtering, printed):
+        monkeypatch.setattr(module, "thread_time", lambda: float(clock()))
+    tracker = make_tracker(name, color=None if name == "naive" else False, preset="canton2009")
+    state = replace(init(FPS), tracks=(track(0, 0, 0),), next_person=1)
+    _, info = tracker.step(np.random.default_rng(0), state, 0, observe(GRID, person(0, 0)))
+    assert info.filter_s == pytest.approx(ticks, abs=0.1)  # less what colors take
+
+
+def test_a_region_keeps_who_is_no_faster_than_its_radius_allows():
+    """Eq. 4.6, against a loop over the points of a person who is as wide as the region."""
+    radius, disc = 0.3, [(x, y) for x in np.linspace(-0.3, 0.3, 61) for y in np.linspace(-0.3, 0.3, 61) if np.hypot(x, y) <= 0.3 + 1e-9]
+    for fps in (10.0, 25.0):
+        for speed in np.arange(0.5, 20.0, 0.5):
+            touches = any((x + speed / fps) ** 2 + y**2 <= radius**2 + 1e-9 for x, y in disc)
+            assert touches == (least_radius(speed, fps) <= radius + 1e-9)
+    np.testing.assert_allclose(least_radius(np.array([1.0, 3.0]), 25), [0.02, 0.06])
+    with pytest.raises(InputError, match="`fps` above 0"):
+        least_radius(1.0, 0)
+
+
 def test_furniture_begins_no_track_and_who_stands_too_close_to_another_neither():
     table = box((1.0, 0.5, 0.65), (2.2, 1.5, 0.72))
     assert len(followed([table] * 5).frames) == 0
@@ -78,7 +104,7 @@ def stay(state: TrackerState, predicted, observation, efficiency=1.0):
 @pytest.mark.parametrize(("volume", "efficiency", "after_s"), [(nothing(), 1.0, 2.0), (person(0, 0), 0.01, 1.0), (person(0, 0), 0.5, None)])
 def test_a_track_ends_that_is_no_person_or_whose_filter_finds_hardly_anything(volume, efficiency, after_s):
     lifecycle = LifecycleSettings(least_distance_m=9.0)  # so that no other begins in its place
-    settings = FollowingSettings(rules="canton2009", lifecycle=lifecycle)
+    settings = replace(CANTON_2009, lifecycle=lifecycle)
     state = replace(init(FPS), tracks=(track(0, 0, 0),), next_person=1)
     alive = []
     for frame in range(60):

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hmc.errors import InputError
 from hmc.tracking.appearance import N_COLORS, adapt, bhattacharyya, color_bins, histogram, similar_colors
 from hmc.tracking.particle import ParticleSettings, color_likelihood, overlap
-from hmc.tracking.settings import FollowingSettings
+from hmc.tracking.settings import CANTON_2009
 from hmc.tracking.sparse import SparseSettings, neighbourhood_counts, pseudo_likelihood, spread_out
 from hmc.tracking.surroundings import blocking
 from hmc.tracking.trackers import make_tracker
@@ -176,7 +176,7 @@ def test_choices():
     assert make_tracker("sparse", particles=70).settings == SparseSettings(samples=70)
     assert make_tracker("particle", color=False).settings == ParticleSettings(color=False)
     assert make_tracker("sparse", preset="canton2009").settings == SparseSettings(
-        scouts=0.0, drift=0.0, solid=False, following=FollowingSettings(rules="canton2009")
+        noise_m=0.1, scouts=0.0, drift=0.0, solid=False, following=CANTON_2009
     )
     assert make_tracker().color and not make_tracker("naive").color
     with pytest.raises(InputError, match="1 to 4"):

@@ -27,6 +27,7 @@ EXPERIMENTS = {
     "fig-4.12": "fig_4_12",
     "fig-4.13": "fig_4_13",
     "fig-4.14": "fig_4_14",
+    "why-behind": "why_behind",
     "fig-5.3": "fig_5_3",
     "fig-5.4": "fig_5_4",
     "fig-5.6": "fig_5_6",

@@ -18,7 +18,6 @@ from hmc.tracking.rules.printed import (
     claim_regions,
     end_tracks,
     filter_in_place,
-    measure_regions,
     move_tracks,
 )
 from hmc.tracking.rules.pushed_objects import release_pushed_objects
@@ -59,7 +58,6 @@ RULES: tuple[Rule, ...] = (
 PRINTED: tuple[Rule, ...] = (
     filter_in_place,
     claim_regions,
-    measure_regions,
     move_tracks,
     adapt_histograms,
     begin_tracks,

@@ -11,6 +11,7 @@ Shown by tests/tracking/test_printed_rules.py.
 from __future__ import annotations
 
 from dataclasses import replace
+from time import thread_time
 
 import numpy as np
 
@@ -25,9 +26,9 @@ from hmc.tracking.region import PERSON_RADIUS_M, region_distance
 from hmc.tracking.rules.filtering import filter_at
 from hmc.tracking.settings import FollowingSettings
 from hmc.tracking.state import Track, TrackRow
-from hmc.tracking.update import FrameUpdate, Measurement
+from hmc.tracking.update import FrameUpdate
 
-__all__ = ["adapt_histograms", "begin_tracks", "claim_regions", "end_tracks", "filter_in_place", "measure_regions", "move_tracks"]
+__all__ = ["adapt_histograms", "begin_tracks", "claim_regions", "end_tracks", "filter_in_place", "move_tracks"]
 
 
 def filter_in_place(update: FrameUpdate, settings: FollowingSettings) -> FrameUpdate:
@@ -46,26 +47,9 @@ def claim_regions(update: FrameUpdate, settings: FollowingSettings) -> FrameUpda
     return replace(update, owners=owners)
 
 
-def measure_regions(update: FrameUpdate, settings: FollowingSettings) -> FrameUpdate:
-    """The update with the features of each track's voxels and the verdict of the tree on them."""
-    observation, n = update.observation, len(update.state.tracks)
-    owned = blob_features(observation.points, update.owners, n, observation.voxel_size_m)
-    certain = blob_features(observation.points, np.where(observation.certain, update.owners, -1), n, observation.voxel_size_m)
-    measurement = Measurement(
-        locating=update.owners >= 0,
-        owned=owned,
-        located=owned,
-        certain=certain,
-        supported=(owned.counts > 0) | update.estimate.seen,
-        like_person=_is_person(owned, settings),
-        like_object=np.zeros(n, bool),
-    )
-    return replace(update, measurement=measurement)
-
-
 def move_tracks(update: FrameUpdate, settings: FollowingSettings) -> FrameUpdate:
     """The update with each track where its filter says, or at the centroid of its voxels (Eq. 4.5); where it was, without either."""
-    tracks = []
+    tracks = list[Track]()
     for k, track in enumerate(update.state.tracks):
         voxels = update.observation.points[update.owners == k]
         if update.estimate.seen[k]:
@@ -75,7 +59,9 @@ def move_tracks(update: FrameUpdate, settings: FollowingSettings) -> FrameUpdate
         head = head_centre(voxels) if len(voxels) else track.head
         tracks.append(replace(track, head=head, last_frame=update.frame))
     rows = tuple(TrackRow(update.frame, track.person, track.position, track.head) for track in tracks)
-    return replace(update, tracks=tuple(tracks), rows=rows)
+    # Without a filter of its own, sharing out the voxels is what finds the people.
+    filter_s = update.filter_s if update.filter else thread_time() - update.begun_s
+    return replace(update, tracks=tuple(tracks), rows=rows, filter_s=filter_s)
 
 
 def adapt_histograms(update: FrameUpdate, settings: FollowingSettings) -> FrameUpdate:
@@ -109,9 +95,11 @@ def begin_tracks(update: FrameUpdate, settings: FollowingSettings) -> FrameUpdat
 def end_tracks(update: FrameUpdate, settings: FollowingSettings) -> FrameUpdate:
     """The update with the tracks that stay, by the three criteria of section 4.2.3; of two in one place the older."""
     limits, fps, kept = settings.lifecycle, update.state.fps, list[Track]()
+    owned = blob_features(update.observation.points, update.owners, len(update.tracks), update.observation.voxel_size_m)
+    person = _is_person(owned, settings)
     for k, track in enumerate(update.tracks):
         efficiency = float(update.estimate.efficiency[k]) if len(update.estimate.efficiency) else 1.0
-        unlike = 0 if update.measurement.like_person[k] else track.unlike + 1
+        unlike = 0 if person[k] else track.unlike + 1
         inefficient = track.inefficient + 1 if efficiency < limits.least_efficiency else 0
         close = any(horizontal_distance(track.position, other.position) < limits.same_place_m for other in kept)
         if not close and unlike <= limits.unlike_s * fps and inefficient <= limits.efficiency_s * fps:
