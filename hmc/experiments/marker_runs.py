@@ -13,11 +13,10 @@ import numpy as np
 from hmc.body.inverse import fit_landmarks
 from hmc.body.kinematics import landmarks
 from hmc.body.proportions import canton_body, default_body
-from hmc.camera.model import Rig
 from hmc.errors import InputError
 from hmc.experiments.engine.experiment import Parameters, Results
 from hmc.experiments.engine.inputs import Inputs
-from hmc.experiments.pose_runs import synthetic_detections
+from hmc.experiments.pose_runs import as_detected, synthetic_detections
 from hmc.experiments.truth import HEIGHT_M, estimate_of, first_truth, standing_state, stature_m, truth_track
 from hmc.io.detections import DetectionTable
 from hmc.io.recording import Recording
@@ -32,8 +31,6 @@ from hmc.synthetic.marker_detector import SyntheticDetector
 __all__ = ["FAMILY", "QUICK_FRAMES", "cell"]
 
 FAMILY = "markers"
-#: Detections are in images of this width, about that of HumanEva-I's, whatever the recording's; pixels.
-WIDTH_PX = 640
 #: Frames of the quick mode.
 QUICK_FRAMES = 30
 
@@ -50,10 +47,7 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
     inputs : Inputs
     rng : numpy.random.Generator
     """
-    recording = inputs.recording(parameters["recording"])
-    # Errors are in pixels, so what one is worth must not depend on the recording's.
-    cameras = tuple(camera.scaled(WIDTH_PX / camera.size[0]) for camera in recording.rig)
-    recording = replace(recording, rig=Rig(cameras))
+    recording = as_detected(inputs.recording(parameters["recording"]))
     truth = first_truth(recording)
     if parameters["frames"]:
         truth = truth.where(truth.frames < truth.frames[0] + parameters["frames"])
