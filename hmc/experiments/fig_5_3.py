@@ -148,7 +148,7 @@ def _draw(axes, cells: Sequence[Cell], row: dict) -> None:
         f"{row['estimate']}: mean {row['mean_mm']:.1f}, deviation {row['deviation_mm']:.1f}\n"
         f"MMTP {row['MMTP_mm']:.1f}, MMTA {row['MMTA']:.2f}"
     )
-    axes.legend()
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.15), ncols=2)
 
 
 EXPERIMENT = Experiment(

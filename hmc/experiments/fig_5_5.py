@@ -86,10 +86,10 @@ def _draw(cells: Sequence[Cell]) -> plt.Figure:
     upper.set(ylabel="mm", title=f"{one.parameters['recording'].rpartition('@')[0]}, {runs.METHODS[one.parameters['method']]}")
     upper.legend(ncols=2)
     lower.plot(seconds, scores.deviation, color=COLORS["other"], label="deviation")
-    lower.set(xlabel="seconds", ylabel="deviation (mm)")
+    lower.set(xlabel="seconds", ylabel="deviation (mm)", ylim=(0, 1.25 * scores.deviation[np.isfinite(scores.deviation)].max()))
     right = lower.twinx()
     right.plot(seconds, 100 * scores.mmta, color=COLORS["particle"], label="MMTA")
-    right.set(ylabel="MMTA (%)", ylim=(0, 105))
+    right.set(ylabel="MMTA (%)", ylim=(0, 125), yticks=range(0, 101, 20))
     right.grid(False)
     lower.legend(handles=[*lower.get_lines(), *right.get_lines()], ncols=2)
     return figure

@@ -100,9 +100,9 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
         steps = 1 + np.arange(len(spread)) / (len(spread) // len(added))
         for k in range(len(added)):
             there = spread[:, k] > 0
-            lines.plot(steps[there], spread[there, k], "o-", label=f"variables of model {k + 1}")
-        lines.set(xlabel="model (between: inner layers)", ylabel="spread over the first")
-        lines.legend()
+            lines.plot(steps[there], spread[there, k], "o-", label=f"{k + 1}")
+        lines.set(xlabel="model (between: inner layers)", ylabel="spread over the first", ylim=(0, 1.45))
+        lines.legend(loc="upper left", title="variables of model", ncols=3)
         claims += _claims(own, model, particles)
     caption = "The printed SHBM-APF at work, read off its runs. The paper: Canton, Figure 7.8, Eq. 7.19 and 7.29."
     return Report((Table("fig-7.8", caption, rows),), {"fig-7.8": figure}, tuple(claims))
