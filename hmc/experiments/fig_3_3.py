@@ -1,8 +1,9 @@
 """Figure 3.3: particle filter and annealed particle filter on likelihoods with several peaks.
 
 Source: Canton (2009), section 3.2. Shown there without figures: with as many particles in all, and 3 layers, the particle filter's mean is
-misled by the lower peaks and the annealed one's lies on the highest. The thesis does not state its function: here a family of them is drawn,
-each with several seeds. The survival rate is .5, as section 3.2.2 has it for all layers; beside it a lower rate, and twice the layers.
+misled by the lower peaks and the annealed one's lies on the highest. The thesis does not state its function: here a family of them is
+drawn, each with several seeds. The survival rate is .5, as section 3.2.2 has it for all layers; beside it a lower rate, and twice the
+layers.
 """
 
 from __future__ import annotations
@@ -89,13 +90,15 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
         left.plot(places, likelihood, color=COLORS["paper"], linewidth=1)
         for layer, kept in enumerate(shown["layers"] if shown else ()):
             size = 400 * np.array(kept["weight"])
-            left.scatter(kept["x"], np.full(len(size), -0.12 * (layer + 1)), s=np.maximum(size, 0.3), color=color, alpha=0.6, linewidth=0)
+            low = np.full(len(size), -0.12 * (layer + 1))
+            left.scatter(kept["x"], low, s=np.maximum(size, 0.3), color=color, alpha=0.6, linewidth=0)
         if shown:
             left.axvline(shown["estimate"], color=color, linestyle="--", linewidth=1)
         left.set(ylabel=name, yticks=(0, 0.5, 1))
         right.hist([min(_distance(one), 20.0) for one in own], bins=np.linspace(0, 20, 41), color=color)
         near, on = (mean_interval(run_values(own, value, "function")) for value in (_distance, _on_peak))
-        rows.append({"method": name, "survival_rate": METHODS[name][0], "layers": METHODS[name][1], "particles": PARTICLES, "runs": len(own),
+        rate, layers = METHODS[name]
+        rows.append({"method": name, "survival_rate": rate, "layers": layers, "particles": PARTICLES, "runs": len(own),
                      "distance_in_widths": near.value, "distance_low": near.low, "distance_high": near.high,
                      "on_the_highest_peak": on.value, "on_low": on.low, "on_high": on.high})  # fmt: skip
     panels[-1, 0].set_xlabel("state; layers from top to bottom, the estimate dashed")
@@ -116,6 +119,4 @@ def _ahead(text: str, more: Sequence[Cell], less: Sequence[Cell], value: Callabl
     return Claim(text, gain.above_zero, f"by {gain.value:.2f} [{gain.low:.2f}, {gain.high:.2f}] {unit}")
 
 
-EXPERIMENT = Experiment(
-    "fig-3.3", "particle filter and annealed one on several peaks", "Canton, Figure 3.3", grid, cell, report, version=2
-)
+EXPERIMENT = Experiment("fig-3.3", "particle filter and annealed one on several peaks", "Canton, Figure 3.3", grid, cell, report, version=2)

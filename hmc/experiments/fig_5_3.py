@@ -79,8 +79,8 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
         Claim("the mean is biased by them, and MMTP less so", more.above_zero and less.above_zero, told),
     )
     caption = (
-        f"Scores of frames, matched within {runs.PAPER_THRESHOLD_MM:g} mm: of one frame of each kind (that of the middle mean error), and of "
-        "all frames of the methods that follow. The paper: Canton, Figure 5.3, on HumanEva-I."
+        f"Scores of frames, matched within {runs.PAPER_THRESHOLD_MM:g} mm: of one frame of each kind (that of the middle mean error), and "
+        "of all frames of the methods that follow. The paper: Canton, Figure 5.3, on HumanEva-I."
     )
     return Report((Table("fig-5.3", caption, rows),), {"fig-5.3": figure}, claims)
 
@@ -108,7 +108,8 @@ def _frame_row(cells: Sequence[Cell], kind: str) -> dict:
     if not found:
         return row | _filled(kind, None)
     _, one, k = sorted(found, key=lambda each: each[0])[len(found) // 2]
-    own = {name: float(value[0]) for name, value in _columns(score(runs.errors_mm(one)[k : k + 1], runs.PAPER_THRESHOLD_MM, by="frame")).items()}
+    scores = score(runs.errors_mm(one)[k : k + 1], runs.PAPER_THRESHOLD_MM, by="frame")
+    own = {name: float(value[0]) for name, value in _columns(scores).items()}
     row |= {name: one.parameters[name] for name in ("recording", "method", "repeat")} | {"frame": k}
     return row | _filled(kind, own)
 

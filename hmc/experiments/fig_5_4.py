@@ -1,7 +1,8 @@
 """Figure 5.4: histograms of the errors of three methods, and their quantiles against a Gaussian's.
 
-Source: Canton (2009), section 5.2.2: the errors of the markerless algorithms have a long tail and lie off the line of a Gaussian's quantiles,
-those of the marker-based one lie on it. How well they do is R^2, of each run by itself; pictures and table are of all runs together.
+Source: Canton (2009), section 5.2.2: the errors of the markerless algorithms have a long tail and lie off the line of a Gaussian's
+quantiles, those of the marker-based one lie on it. How well they do is R^2, of each run by itself; pictures and table are of all runs
+together.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Figure 5.7: the angles of an elbow and of a knee over a walk, truth and estimate read as poses of one reference body.
 
 Source: Canton (2009), section 5.3.2, Eq. 5.9. Estimates are by bodies whose lengths and axes are not the reference body's; the true joints
-are the rendered actor's. That angles of two bodies can be compared shows in that they follow one another: the error must be less than that of
-an estimate that knows nothing but the angle's mean, in joints that move. Methods that do not follow count for no claim.
+are the rendered actor's. That angles of two bodies can be compared shows in that they follow one another: the error must be less than that
+of an estimate that knows nothing but the angle's mean, in joints that move. Methods that do not follow count for no claim.
 """
 
 from __future__ import annotations

@@ -115,8 +115,8 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
                 "modes": float(np.mean([count_modes(values) for values in maps])),
                 "width_percent": float(100 * np.mean([np.exp(values - values.max()).mean() for values in maps])),
                 "best_off_truth_deg": float(np.mean(off)),
-                "spread_deg": float(np.mean([_spread_degrees(one, values) for one, values in zip(whole, maps, strict=True)])),
-                "expected_off_truth_deg": float(np.mean([_expected_off_degrees(one, values) for one, values in zip(whole, maps, strict=True)])),
+                "spread_deg": float(np.mean([_spread_degrees(one, _map(one, k)) for one in whole])),
+                "expected_off_truth_deg": float(np.mean([_expected_off_degrees(one, _map(one, k)) for one in whole])),
             }
         )
     modes = {panel: _by_frame(whole, lambda one, k=k: count_modes(_map(one, k))) for k, panel in enumerate(PANELS)}
@@ -130,8 +130,8 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
         _more("the surface sharpens", spread[second], spread[last], "degrees less spread", there),
     )
     caption = (
-        f"Likelihood over {ANGLES[0]} and {ANGLES[1]}; its width is its mean against its best, its spread is about its own mean. The paper: Canton, Figure 6.11, surfaces "
-        "without numbers."
+        f"Likelihood over {ANGLES[0]} and {ANGLES[1]}; its width is its mean against its best, its spread is about its own mean. "
+        "The paper: Canton, Figure 6.11, surfaces without numbers."
     )
     return Report((Table("fig-6.11", caption, rows),), {"fig-6.11": _draw(whole[len(whole) // 2])}, claims)
 

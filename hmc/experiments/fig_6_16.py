@@ -1,6 +1,7 @@
 """Figure 6.16: what cameras and voxels are worth: 3 cameras at 3 cm, 7 at 3 cm, 7 at 2 cm, by layers and particles.
 
-Source: Canton (2009), section 6.7.1.1.
+Source: Canton (2009), section 6.7.1.1. The thesis's 3 cameras are those in color, as here on HumanEva-I; of rendered recordings, which are
+all in color, they are evenly spread.
 """
 
 from __future__ import annotations

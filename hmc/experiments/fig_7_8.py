@@ -55,7 +55,7 @@ def grid(plan: Plan) -> list[dict]:
 
 
 def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Results:
-    """Follow the first person for some frames from the true first pose: particles of every layer, and their moves as a share of the first."""
+    """Follow the first person for some frames from the true first pose: particles of every layer, and how far they moved."""
     seen = tracked(inputs, parameters["recording"], 0)
     recording, truth = seen.recording, first_truth(seen.recording)
     preset = method_preset(PRESETS["canton2009"], "shbm-apf", (parameters["model"],))
@@ -92,9 +92,10 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
         for k in range(len(added)):
             steps = spread[spread[:, k] > 0, k]
             rows.append({"hierarchy": model, "variables_of_model": k + 1, "dimensions": int(added[k]), "dimensions_paper": ADDED_PAPER[k],
-                         "particles": float(particles[k]), "particles_paper": PARTICLES_PAPER[k], "effective_particles": float(effective[k]),
-                         "effective_particles_paper": 2 * sum(PARTICLES_PAPER[k:]), "spread_in_the_last_layer": float(steps[-1])}
-                        | {"spread_by_Eq_7_26": _printed_spread(len(added), len(spread) // len(added), k)})  # fmt: skip
+                         "particles": float(particles[k]), "particles_paper": PARTICLES_PAPER[k],
+                         "effective_particles": float(effective[k]), "effective_particles_paper": 2 * sum(PARTICLES_PAPER[k:]),
+                         "spread_in_the_last_layer": float(steps[-1]),
+                         "spread_by_Eq_7_26": _printed_spread(len(added), len(spread) // len(added), k)})  # fmt: skip
         bars.bar(range(1, len(effective) + 1), effective)
         bars.set(xlabel="variables of model", ylabel="effective particles", xticks=range(1, len(effective) + 1), title=f"hierarchy {model}")
         steps = 1 + np.arange(len(spread)) / (len(spread) // len(added))

@@ -15,6 +15,7 @@ import numpy as np
 
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs
+from hmc.experiments.engine.intervals import Interval
 from hmc.experiments.run_means import mean_interval, run_values
 
 __all__ = ["EXPERIMENT"]
@@ -123,8 +124,7 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     at_45 = np.array([row["area_at_45_deg_percent"] for row in plain])
     holes = {alpha: max(row["most_holes_percent"] for row in rows if row["alpha"] == alpha) for alpha in ALPHAS}
     told = ", ".join(
-        f"{row['side_px']} px: {row['area_at_45_deg_percent']:.1f} [{row['area_at_45_low_percent']:.1f}, {row['area_at_45_high_percent']:.1f}] %"
-        for row in plain
+        f"{row['side_px']} px: {Interval(*(row[f'area_at_45_{end}_percent'] for end in ('deg', 'low', 'high')))} %" for row in plain
     )
     claims = (
         Claim(f"without over-sampling {PRINTED:g} % are left at 45 degrees", bool(abs(at_45.mean() - PRINTED) < SAME), told),
@@ -143,4 +143,6 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     return Report((Table("fig-B.1", caption, rows),), {"fig-B.1": figure}, claims)
 
 
-EXPERIMENT = Experiment("fig-B.1", "compactness of a rotated square against over-sampling", "Canton, Figure B.1", grid, cell, report, version=2)
+EXPERIMENT = Experiment(
+    "fig-B.1", "compactness of a rotated square against over-sampling", "Canton, Figure B.1", grid, cell, report, version=2
+)

@@ -41,7 +41,7 @@ METHODS = {
     "canton2009": "markerless, the thesis's parameters",
     "default": "markerless, default",
     "markers": "marker based",
-    "clean markers": "marker based, no false detections",
+    "clean markers": "marker based, none false",
 }
 #: Detectors: what the thesis's Table 6.3 has, and one that finds nothing but markers.
 _DETECTORS = {"markers": SyntheticDetector(0.9, 20.0, 4.0), "clean markers": SyntheticDetector(0.9, 0.0, 4.0)}

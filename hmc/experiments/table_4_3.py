@@ -1,6 +1,7 @@
 """Table 4.3 and Figure 4.11: MOTP and MOTA of the three trackers by voxel size, number of samples or particles, and color.
 
-Source: Canton (2009), section 4.4.2. Two presets are run: ``canton2009``, the parameters as the thesis prints them, and ``default``, ours.
+Source: Canton (2009), section 4.4.2. Two presets are run: ``canton2009``, the parameters that the thesis prints and
+our own where it prints none (the noise of the samples), and ``default``, ours.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""No claim of chapters 2, 3 and 5, of figures 6.11 and 7.8 or of appendix B holds on garbage: on noise, shuffled results or random poses."""
+"""No claim of chapters 2, 3 and 5, of figures 6.11 and 7.8 or of appendix B holds on noise, on shuffled results or on random poses."""
 
 import matplotlib.pyplot as plt
 import numpy as np
