@@ -7,6 +7,7 @@ landmarks, MMTP is less so. Both are read as rank correlations over the frames o
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -27,10 +28,11 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     """A run over time, and how strongly each score goes with MMTA in all of them."""
     methods = runs.followed(cells)
     known = [one for one in cells if one.parameters["method"] in methods]
-    rows, per_run = [], {name: {} for name in SCORES}
+    rows = []
+    per_run: dict[str, dict] = {name: {} for name in SCORES}
     for method in methods:
         own = [one for one in known if one.parameters["method"] == method]
-        found = {name: run_values(own, lambda one, name=name: _with_mmta(one, name)) for name in SCORES}
+        found = {name: run_values(own, partial(_with_mmta, name=name)) for name in SCORES}
         for name, values in found.items():
             per_run[name] |= {(clip, (method, repeat)): value for (clip, repeat), value in values.items()}
         rows.append({"method": runs.METHODS[method]} | _row(found))

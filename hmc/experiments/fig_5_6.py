@@ -77,7 +77,7 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
 
 def _by_run(cells: Sequence[Cell], value: Callable[[Cell], float]) -> RunValues:
     """A figure of every run of every method: a method's runs are seeds of the same clips."""
-    found = {}
+    found: dict = {}
     for method in runs.METHODS:
         own = run_values([one for one in cells if one.parameters["method"] == method], value)
         found |= {(clip, (method, repeat)): figure for (clip, repeat), figure in own.items()}

@@ -7,6 +7,7 @@ factorised likelihood (Table 6.2). Every other angle is that of the true pose, r
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import matplotlib.pyplot as plt
@@ -115,12 +116,12 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
                 "modes": float(np.mean([count_modes(values) for values in maps])),
                 "width_percent": float(100 * np.mean([np.exp(values - values.max()).mean() for values in maps])),
                 "best_off_truth_deg": float(np.mean(off)),
-                "spread_deg": float(np.mean([_spread_degrees(one, _map(one, k)) for one in whole])),
+                "spread_deg": float(np.mean([_spread_degrees(one, k) for one in whole])),
                 "expected_off_truth_deg": float(np.mean([_expected_off_degrees(one, _map(one, k)) for one in whole])),
             }
         )
-    modes = {panel: _by_frame(whole, lambda one, k=k: count_modes(_map(one, k))) for k, panel in enumerate(PANELS)}
-    spread = {panel: _by_frame(whole, lambda one, k=k: _spread_degrees(one, _map(one, k))) for k, panel in enumerate(PANELS)}
+    modes = {panel: _by_frame(whole, partial(_n_modes, panel=k)) for k, panel in enumerate(PANELS)}
+    spread = {panel: _by_frame(whole, partial(_spread_degrees, panel=k)) for k, panel in enumerate(PANELS)}
     anywhere = _by_frame(whole, lambda one: _expected_off_degrees(one, np.zeros_like(_map(one, 0))))
     there = mean_interval(gains(anywhere, _by_frame(whole, lambda one: _expected_off_degrees(one, _map(one, len(PANELS) - 1)))))
     first, second, last = "out and occupancy", "and double occupancy", "all"
@@ -150,9 +151,14 @@ def _more(text: str, first: dict, second: dict, what: str, there: Interval) -> C
     return Claim(text, gain.above_zero and there.above_zero, f"{gain.value:.2f} [{gain.low:.2f}, {gain.high:.2f}] {what}")
 
 
-def _spread_degrees(one: Cell, values: np.ndarray) -> float:
+def _n_modes(one: Cell, panel: int) -> float:
+    return float(count_modes(_map(one, panel)))
+
+
+def _spread_degrees(one: Cell, panel: int) -> float:
     """Spread of the likelihood about its own mean; that few points carry it makes it no smaller."""
     points = np.stack(np.meshgrid(*np.array(one.results["degrees"]), indexing="ij"), axis=-1).reshape(-1, 2)
+    values = _map(one, panel)
     weights = np.exp(values - values.max()).ravel()
     weights /= weights.sum()
     variance = (weights @ (points - weights @ points) ** 2).sum() / max(1 - weights @ weights, 1e-9)

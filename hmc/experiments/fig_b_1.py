@@ -9,6 +9,7 @@ a pixel's, a small square loses most at other angles, where many rotated points 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -102,9 +103,9 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
         degrees = np.array(own[0].results["angle_deg"])
         area = 100 * np.mean([one.results["area_left"] for one in own], axis=0)
         k = int(np.abs(degrees - 45).argmin())
-        at_45 = mean_interval(run_values(own, lambda one, k=k: 100 * one.results["area_left"][k], "side_px"))
-        rows.append({"side_px": side, "alpha": alpha, "area_at_45_deg_percent": at_45.value, "area_at_45_low_percent": at_45.low,
-                     "area_at_45_high_percent": at_45.high, "area_at_45_deg_percent_paper": {1.0: PRINTED, 0.7: 100.0}.get(alpha),
+        there = mean_interval(run_values(own, partial(_percent_left, place=k), "side_px"))
+        rows.append({"side_px": side, "alpha": alpha, "area_at_45_deg_percent": there.value, "area_at_45_low_percent": there.low,
+                     "area_at_45_high_percent": there.high, "area_at_45_deg_percent_paper": {1.0: PRINTED, 0.7: 100.0}.get(alpha),
                      "least_area_percent": area.min(), "at_deg": float(degrees[area.argmin()]),
                      "most_holes_percent": 100 * max(max(one.results["holes"]) for one in own)})  # fmt: skip
         if side != DRAWN:
@@ -141,6 +142,10 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     )
     caption = "Squares of pixels, rotated and rounded, by the distance alpha between their points. The paper: Canton, Figure B.1."
     return Report((Table("fig-B.1", caption, rows),), {"fig-B.1": figure}, claims)
+
+
+def _percent_left(one: Cell, place: int) -> float:
+    return 100 * float(one.results["area_left"][place])
 
 
 EXPERIMENT = Experiment(

@@ -72,8 +72,15 @@ def as_proposed(propose: Propose) -> PoseStep:
         if not shows_enough(view.target):
             return unseen(tracked)
         found = propose(rng, tracked, view)
-        told = {"annealed": found.annealed, "structural": found.structural, "levels": found.levels, "details": found.details}
-        info = StepInfo(found.status, found.cost, found.evaluations, **told)
+        info = StepInfo(
+            found.status,
+            found.cost,
+            found.evaluations,
+            annealed=found.annealed,
+            structural=found.structural,
+            levels=found.levels,
+            details=found.details,
+        )
         if found.status != "fitted":
             return Tracked(tracked.subject, tracked.state, np.zeros_like(tracked.velocity), found.memory), info
         return Tracked(tracked.subject, found.estimate, found.estimate - tracked.state, found.memory), info
