@@ -1,8 +1,8 @@
 """Forward kinematics over arrays of states, and the twists of its joints. Canton (2009), Eq. 6.1 and appendix A.
 
 A joint's transform is the product of the exponential maps of its axes, ordered from the root outwards; written in the
-parent's frame that is a rotation about the joint's centre, which is what is computed here (the test holds it against
-``scipy.linalg.expm`` of the twists).
+parent's frame that is a rotation about the joint's centre, which is what is computed here (a test holds it against
+`hmc.body.twists.chain_map`, which is Eq. A.10 in general).
 
 There is one form for one state and for many, `_place`: states lie along the last axis, so that every step is arithmetic on whole rows, and
 all segments of one depth in the tree are turned at once. The public functions differ in precision and in the order of axes alone.

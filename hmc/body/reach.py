@@ -12,6 +12,7 @@ from hmc.body.joints import SEGMENTS
 from hmc.body.kinematics import segment_transforms
 from hmc.body.limbs import LIMBS
 from hmc.body.model import BodyModel
+from hmc.body.twists import rotations_about
 
 __all__ = ["limb_joint", "limb_lengths", "reach"]
 
@@ -63,22 +64,13 @@ def reach(body: BodyModel, state: np.ndarray, limb: str, points: np.ndarray, swi
         hinge = bend
         end = -np.stack([lower * np.sin(hinge), zero, upper + lower * np.cos(hinge)], axis=1)
     aim, end = (v / np.maximum(np.linalg.norm(v, axis=1, keepdims=True), 1e-9) for v in (aim, end))
-    turn = _about(aim, swivels) @ _between(end, aim)
+    turn = rotations_about(aim, swivels) @ _between(end, aim)
     dofs = LIMBS[limb].dofs
     low, high = body.limits.low[dofs], body.limits.high[dofs]
     both = np.concatenate([_angles(turn), np.repeat(hinge[None, :, None], 2, axis=0)], axis=-1)
     clipped = np.clip(both, low, high)
     better = np.abs(clipped - both).sum(-1).argmin(0)
     return clipped[better, np.arange(len(points))]
-
-
-def _about(axes: np.ndarray, angles: np.ndarray) -> np.ndarray:
-    """Rotations about unit axes (n, 3) by angles (n,), shape (n, 3, 3): Rodrigues' formula."""
-    x, y, z = axes.T
-    zero = np.zeros_like(x)
-    cross = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(-1, 3, 3)
-    sin, cos = np.sin(angles)[:, None, None], np.cos(angles)[:, None, None]
-    return np.eye(3) + sin * cross + (1 - cos) * cross @ cross
 
 
 def _between(first: np.ndarray, second: np.ndarray) -> np.ndarray:
@@ -89,7 +81,7 @@ def _between(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     middle[opposite] = np.cross(first[opposite], np.eye(3)[np.abs(first[opposite]).argmin(1)])
     middle /= np.linalg.norm(middle, axis=1, keepdims=True)
     half = np.full(len(first), np.pi)
-    return _about(middle, half) @ _about(first, half)
+    return rotations_about(middle, half) @ rotations_about(first, half)
 
 
 def _angles(turn: np.ndarray) -> np.ndarray:

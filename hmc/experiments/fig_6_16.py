@@ -1,7 +1,7 @@
 """Figure 6.16: what cameras and voxels are worth: 3 cameras at 3 cm, 7 at 3 cm, 7 at 2 cm, by layers and particles.
 
-Source: Canton (2009), section 6.7.1.1. The thesis has a sample of every action, each by another person; its three cameras are
-the color ones, of better silhouettes. Here those of all cameras are alike, and three are spread evenly over the ring.
+Source: Canton (2009), section 6.7.1.1. The thesis has a sample of every action, each by another person; its three cameras are those in
+color, of better silhouettes, as here on HumanEva-I; of rendered recordings, which are all in color, they are evenly spread.
 """
 
 from __future__ import annotations

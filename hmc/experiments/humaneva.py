@@ -11,7 +11,7 @@ from __future__ import annotations
 import os
 import re
 import shutil
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -28,7 +28,7 @@ from hmc.io.recording import open_recording
 from hmc.io.results import PoseTable, write_joints
 from hmc.landmarks import LANDMARKS
 
-__all__ = ["JOINTS", "Sync", "Take", "convert_take", "find_takes", "landmark_positions", "read_sync", "synchronise"]
+__all__ = ["JOINTS", "Sync", "Take", "color_cameras", "convert_take", "find_takes", "landmark_positions", "read_sync", "synchronise"]
 
 #: The first frames of a video are doubles of one another, for an error of the codec; the support code begins with frame 6, counted from 1.
 FIRST_FRAME = 6
@@ -44,6 +44,8 @@ MARKERS = (
     "RASI LASI LPSI RPSI STRN CLAV C7 T10 RBAK LFHD RFHD LBHD RBHD LSHO RSHO LUPA RUPA LELB RELB LFRM RFRM LFRA RFRA LWRA LWRB RWRA RWRB "
     "LFIN RFIN LTHI RTHI LKNE RKNE LTIB RTIB LANK RANK LHEE RHEE LTOE RTOE"
 ).split()
+#: Names of its cameras in color, and of those in grey.
+_COLOR, _GREY = re.compile(r"C\d+"), re.compile(r"BW\d+")
 _VIDEO = re.compile(r"(?P<action>[A-Za-z]+)_(?P<trial>\d+)_\((?P<camera>B?W?C?\d+)\)")
 
 
@@ -82,6 +84,20 @@ class Take:
     def title(self) -> str:
         """Subject and sequence, as S1_Walking_1."""
         return f"{self.folder.name}_{self.name}"
+
+
+def color_cameras(names: Sequence[str]) -> tuple[str, ...]:
+    """The cameras in color of a HumanEva-I recording, C1 to C3; none of any other recording.
+
+    The thesis's reconstructions from three cameras are from these (Canton 2009, section 6.7.1.1).
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of a recording's cameras.
+    """
+    known = all(_COLOR.fullmatch(name) or _GREY.fullmatch(name) for name in names) and any(_GREY.fullmatch(name) for name in names)
+    return tuple(name for name in names if _COLOR.fullmatch(name)) if known else ()
 
 
 def find_takes(root: Path) -> list[Take]:

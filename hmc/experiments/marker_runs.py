@@ -13,12 +13,11 @@ import numpy as np
 from hmc.body.inverse import fit_landmarks
 from hmc.body.kinematics import landmarks
 from hmc.body.proportions import canton_body, default_body
-from hmc.camera.model import Rig
 from hmc.errors import InputError
 from hmc.experiments.engine.experiment import Parameters, Results
 from hmc.experiments.engine.inputs import Inputs
 from hmc.experiments.exploratory import action_drift, measured_truth
-from hmc.experiments.pose_runs import synthetic_detections
+from hmc.experiments.pose_runs import as_detected, synthetic_detections
 from hmc.experiments.truth import HEIGHT_M, estimate_of, standing_state, stature_m, truth_track
 from hmc.io.detections import DetectionTable
 from hmc.io.recording import Recording
@@ -35,8 +34,6 @@ __all__ = ["FAMILY", "VERSION", "cell"]
 FAMILY = "markers"
 #: Of these cells.
 VERSION = 3
-#: Detections are in images of this width, about that of HumanEva-I's, whatever the recording's; pixels.
-WIDTH_PX = 640
 
 
 def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Results:
@@ -51,10 +48,7 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
     inputs : Inputs
     rng : numpy.random.Generator
     """
-    recording = inputs.recording(parameters["recording"])
-    # Errors are in pixels, so what one is worth must not depend on the recording's.
-    cameras = tuple(camera.scaled(WIDTH_PX / camera.size[0]) for camera in recording.rig)
-    recording = replace(recording, rig=Rig(cameras))
+    recording = as_detected(inputs.recording(parameters["recording"]))
     truth = measured_truth(recording, parameters["recording"])
     if parameters["frames"]:
         truth = truth.where(truth.frames < truth.frames[0] + parameters["frames"])

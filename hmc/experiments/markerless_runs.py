@@ -5,7 +5,7 @@ Tracks and silhouettes are made once for all cells of a recording and its camera
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -14,6 +14,7 @@ import numpy as np
 from hmc.experiments.engine.experiment import Parameters, Plan, Results, Source
 from hmc.experiments.engine.inputs import Inputs, once, rendered
 from hmc.experiments.five_actions import ACTIONS, ACTORS, action_name
+from hmc.experiments.humaneva import color_cameras
 from hmc.experiments.truth import estimate_of, first_truth
 from hmc.io.recording import Recording, open_recording
 from hmc.io.results import TrackTable, read_tracks, write_tracks
@@ -28,7 +29,7 @@ from hmc.voxels.run_options import RunOptions
 
 __all__ = [
     "EVERYTHING", "FAMILY", "FRONTEND", "MASKS_KEY", "SWITCHES", "TRACK_VOXEL_M", "VERSION", "VOXEL_M", "TrackedRecording",
-    "Way", "action_sources", "cell", "change_hulls", "opened", "pose_results", "run_method", "tracked",
+    "Way", "action_sources", "cell", "change_hulls", "chosen_cameras", "opened", "pose_results", "run_method", "tracked",
 ]  # fmt: skip
 
 FAMILY = "markerless"
@@ -101,12 +102,19 @@ def action_sources(plan: Plan, actions: Iterable[str] = ACTIONS, actors: Iterabl
 
 
 def opened(inputs: Inputs, label: str, cameras: int) -> Recording:
-    """A recording with so many of its cameras, evenly spread over the order of their names; 0: all."""
+    """A recording with so many of its cameras; 0: all. See `chosen_cameras`."""
     folder = inputs.recording_folder(label)
     names = open_recording(folder).rig.names
-    if not 0 < cameras < len(names):
-        return open_recording(folder)
-    return open_recording(folder, [names[k * len(names) // cameras] for k in range(cameras)])
+    return open_recording(folder, chosen_cameras(names, cameras) if 0 < cameras < len(names) else None)
+
+
+def chosen_cameras(names: Sequence[str], n: int) -> list[str]:
+    """So many cameras: of HumanEva-I those in color first, as the thesis has it; else evenly spread over the order of their names."""
+    color = color_cameras(names)
+    if n < len(color):
+        return [color[k * len(color) // n] for k in range(n)]
+    rest, left = [name for name in names if name not in color], n - len(color)
+    return [*color, *(rest[k * len(rest) // left] for k in range(left))]
 
 
 def tracked(inputs: Inputs, label: str, cameras: int) -> TrackedRecording:
@@ -119,7 +127,9 @@ def tracked(inputs: Inputs, label: str, cameras: int) -> TrackedRecording:
         tracks = track_recording(recording, TRACK_VOXEL_M, run=run)
         write_tracks(part / "tracks.csv", tracks)
 
-    folder = once(inputs.folder / label / f"tracks-{len(recording.rig)}-cameras", make)
+    every = open_recording(inputs.recording_folder(label)).rig.names
+    some_in_color = len(recording.rig) < len(every) and color_cameras(every)  # other cameras than those that are evenly spread
+    folder = once(inputs.folder / label / f"tracks-{len(recording.rig)}-cameras{'-color-first' if some_in_color else ''}", make)
     return TrackedRecording(recording, read_tracks(folder / "tracks.csv"), folder / "masks")
 
 

@@ -33,7 +33,8 @@ COLUMNS = ("MOTP_mm", "MOTA_percent", "FP_percent", "miss_percent", "mismatch_pe
 
 def report(cells: Sequence[Cell], plan: Plan) -> Report:
     """The paper's best cases, on which it is decided, and the best cases here, by MOTA and then by MOTP."""
-    groups, rows, claims = table_4_3.groups(cells), [], list[Claim]()
+    groups, claims = table_4_3.groups(cells), list[Claim]()
+    rows: list[dict[str, Any]] = []
     for preset in runs.PRESETS:
         printed = {family: _printed_case(preset, family, groups) for family in PAPER}
         for family, paper in PAPER.items():
@@ -51,11 +52,9 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
             first, second = (groups[printed[family]] for family in (better, worse))
             by = ("recording",) if worse == "naive" else ("recording", "repeat")
             claims += [ahead(f"{preset}: {better} ahead of {worse} in {score}", first, second, score, by) for score in ("MOTA", "MOTP")]
-    empty = {"MOTA_low": None, "MOTA_high": None, "centroid_MOTP_mm": None}
-    rows += [
-        {"method": name, "preset": "", "chosen": "", "best_case": "", "runs": None} | _columns((None,) * 5, paper) | empty
-        for name, paper in OTHERS.items()
-    ]
+    empty: dict[str, Any] = {"MOTA_low": None, "MOTA_high": None, "centroid_MOTP_mm": None}
+    nothing: dict[str, Any] = {"preset": "", "chosen": "", "best_case": "", "runs": None}
+    rows += [{"method": name} | nothing | _columns((None,) * 5, paper) | empty for name, paper in OTHERS.items()]
     names = ", ".join(source.name for source in runs.sources(plan))
     caption = (
         f"Each tracker's best case, against the heads, on {names}: the configuration that is the paper's best, at the finest voxels that "

@@ -14,6 +14,7 @@ from itertools import repeat
 
 import numpy as np
 
+from hmc.errors import InputError
 from hmc.experiments.engine.experiment import Cell, Parameters, Plan, Results, Source
 from hmc.experiments.engine.inputs import Inputs, rendered
 from hmc.experiments.engine.style import COLORS
@@ -133,6 +134,8 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
 
 def errors_of(tracks: TrackTable, truth: TrackTable) -> Results:
     """What CLEAR MOT counts, against each of `REFERENCES`."""
+    if truth.heads is None:
+        raise InputError("the true centroids have no heads, against which trackers are measured; render the recording again")
     places = {"head": truth.heads, "centroid": truth.positions}
     scores = {name: evaluate_tracks(tracks, replace(truth, positions=places[name])) for name in REFERENCES}
     return {

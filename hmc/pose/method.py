@@ -21,6 +21,7 @@ from hmc.pose.objectives.four_scores import ScoreTable
 from hmc.pose.objectives.symmetric import BodyPoints, body_points
 from hmc.pose.views.person_view import PersonView
 from hmc.search.filters import AnnealedInfo, ParticleState
+from hmc.search.structural import StructuralInfo
 
 __all__ = [
     "Alternatives",
@@ -178,6 +179,8 @@ class StepInfo:
         Other poses of the frame, between which later frames decide.
     annealed : AnnealedInfo or None
         Of the annealed layers, where there are any.
+    structural : StructuralInfo or None
+        Of the layers of a hierarchy's models, where there are any.
     levels : ndarray, shape (n_models, 27), or None
         The estimates of a hierarchy's models, NaN where a model lacks the angle.
     details : mapping
@@ -190,6 +193,7 @@ class StepInfo:
     missing: np.ndarray | None = None
     alternatives: Alternatives | None = None
     annealed: AnnealedInfo | None = None
+    structural: StructuralInfo | None = None
     levels: np.ndarray | None = None
     details: Mapping[str, Any] = field(default_factory=dict)
 

@@ -29,6 +29,7 @@ from hmc.search.filters import (
     spread_scale,
     truncated_drift,
 )
+from hmc.search.fitness import combined_cost, log_fitness, log_joint_fitness
 from hmc.search.truncated import truncated_normal
 from hmc.search.weights import effective_sample_size, normalise, survival_rate, systematic
 
@@ -39,9 +40,12 @@ __all__ = [
     "LayerInfo",
     "ParticleState",
     "annealed_step",
+    "combined_cost",
     "effective_sample_size",
     "filter_layer",
     "find_beta",
+    "log_fitness",
+    "log_joint_fitness",
     "normalise",
     "particle_init",
     "sir_step",

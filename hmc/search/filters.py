@@ -82,6 +82,8 @@ class LayerInfo:
     best : ndarray, shape (d,)
         The particle of the highest likelihood.
     best_log_likelihood : float
+    drift : ndarray, shape (d,)
+        How far the particles moved, the root of the mean square of each variable's moves.
     """
 
     ess: float
@@ -92,6 +94,7 @@ class LayerInfo:
     ancestors: np.ndarray
     best: np.ndarray
     best_log_likelihood: float
+    drift: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -229,7 +232,9 @@ def filter_layer(
     """
     n = len(state.particles) if particles is None else particles
     ancestors = resample(rng, normalise(state.log_weights), n)
-    moved = propagate(rng, state.particles[ancestors])
+    drawn = state.particles[ancestors]
+    moved = propagate(rng, drawn)
+    drift = np.sqrt(np.mean((moved - drawn) ** 2, axis=0))
     log_weights = np.asarray(log_likelihood(moved), float)
     if log_weights.shape != (len(moved),):
         raise ValueError(f"`log_likelihood` must give ({len(moved)},), one number a particle; it gave shape {log_weights.shape}")
@@ -242,7 +247,7 @@ def filter_layer(
         status = beta_info.status
         log_weights = temper(log_weights - best_log_likelihood if np.isfinite(best_log_likelihood) else log_weights, beta)
     ess = effective_sample_size(normalise(log_weights))
-    info = LayerInfo(ess, ess / len(moved), beta, status, len(moved), ancestors, moved[best], best_log_likelihood)
+    info = LayerInfo(ess, ess / len(moved), beta, status, len(moved), ancestors, moved[best], best_log_likelihood, drift)
     return ParticleState(moved, log_weights), info
 
 

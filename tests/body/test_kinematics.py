@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
 from hmc.body.joints import DOF_NAMES, N_DOF, SEGMENTS, dof_index
 from hmc.body.kinematics import SEGMENT_DOFS, dof_masks, joint_twists, landmarks, place_segments, segment_transforms
 from hmc.body.proportions import canton_body, default_body, landmark_segments
+from hmc.body.twists import chain_map
 from hmc.landmarks import BONES, landmark_index
 
 BODY = default_body(1.78)
@@ -27,15 +27,6 @@ def random_states(seed: int, n: int, body=BODY) -> np.ndarray:
     return rng.uniform(low, high, (n, N_DOF))
 
 
-def twist(axis: np.ndarray, centre: np.ndarray) -> np.ndarray:
-    """Eq. A.5, with the signs of a skew-symmetric matrix."""
-    x, y, z = axis
-    matrix = np.zeros((4, 4))
-    matrix[:3, :3] = [[0, -z, y], [z, 0, -x], [-y, x, 0]]
-    matrix[:3, 3] = -np.cross(axis, centre)
-    return matrix
-
-
 def product_of_exponentials(body, state, index):
     """Segment's frame to world (Eq. A.10), ordered from the root outwards; twists are those of the neutral pose."""
     chain, at = [], index
@@ -43,14 +34,18 @@ def product_of_exponentials(body, state, index):
         chain.insert(0, at)
         at = SEGMENTS[at].parent
     home = np.cumsum(body.offsets[chain], axis=0)
-    matrix = np.eye(4)
-    matrix[:3, 3] = state[:3]
-    for segment, centre in zip(chain, home, strict=True):
-        for name, dof in zip(SEGMENTS[segment].axes, SEGMENT_DOFS[segment], strict=True):
-            matrix = matrix @ expm(twist(np.eye(3)["xyz".index(name)], centre) * state[dof])
+    joints = [(name, centre, dof) for one, centre in zip(chain, home, strict=True) for name, dof in _turns(one)]
+    axes = np.eye(3)[["xyz".index(name) for name, _, _ in joints]]
+    matrix = chain_map(axes, np.array([centre for _, centre, _ in joints]), state[[dof for _, _, dof in joints]])
     at_rest = np.eye(4)
     at_rest[:3, 3] = home[-1]
-    return matrix @ at_rest
+    matrix = matrix @ at_rest
+    matrix[:3, 3] += state[:3]
+    return matrix
+
+
+def _turns(segment):
+    return zip(SEGMENTS[segment].axes, SEGMENT_DOFS[segment], strict=True)
 
 
 @pytest.mark.parametrize("body", [BODY, canton_body(1.6)], ids=["default", "canton"])

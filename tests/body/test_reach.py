@@ -11,6 +11,7 @@ from hmc.body.limbs import LIMBS
 from hmc.body.model import neutral_state
 from hmc.body.proportions import default_body
 from hmc.body.reach import limb_joint, limb_lengths, reach
+from hmc.body.twists import rotations_about
 
 LOWER = {"r_arm": 4, "l_arm": 6, "r_leg": 8, "l_leg": 10}
 
@@ -51,7 +52,7 @@ def test_rotations_agree_with_scipy():
     axes = rng.normal(size=(50, 3))
     axes /= np.linalg.norm(axes, axis=1, keepdims=True)
     angles = rng.uniform(-3, 3, 50)
-    turn = module._about(axes, angles)
+    turn = rotations_about(axes, angles)
     assert_allclose(turn, Rotation.from_rotvec(axes * angles[:, None]).as_matrix(), atol=1e-12)
     for triple in module._angles(turn):
         assert_allclose(Rotation.from_euler("XYZ", triple).as_matrix(), turn, atol=1e-9)

@@ -232,7 +232,8 @@ def test_the_likelihood_map_is_best_near_the_truth_with_all_scores(small, monkey
     source, inputs = small
     monkeypatch.setattr(fig_6_11, "SIDE", 21)
     monkeypatch.setattr(fig_6_11, "VOXEL_M", 0.04)
-    one = Cell({}, fig_6_11.cell({"recording": source.label, "at": 0.5}, inputs, np.random.default_rng(0)))
+    parameters = {"recording": source.label, "at": 0.5}
+    one = Cell(parameters, fig_6_11.cell(parameters, inputs, np.random.default_rng(0)))
     report = report_of("fig-6.11", [one])
     rows = {row["scores"]: row for row in report.tables[0].rows}
     assert list(rows) == list(fig_6_11.PANELS) and rows["all"]["best_off_truth_deg"] < 30

@@ -10,6 +10,7 @@ from hmc.errors import InputError
 from hmc.experiments.__main__ import main
 from hmc.experiments.five_actions import action_title
 from hmc.experiments.humaneva import FIRST_FRAME, JOINTS, MARKERS, Sync, convert_take, find_takes, synchronise
+from hmc.experiments.markerless_runs import chosen_cameras
 from hmc.io.recording import background_frames, iterate_frames, open_recording
 from hmc.io.results import read_joints
 from hmc.landmarks import LANDMARKS
@@ -158,3 +159,13 @@ def test_wrong_input_is_told(release, tmp_path, capsys):
     write_c3d(release / "S1" / "Mocap_Data" / "Box_1.c3d", ["LFEP"], np.ones((60, 1, 3)), 120.0)
     with pytest.raises(InputError, match=r"Box_1\.c3d: the motion capture has no point TRXO"):
         convert_take(find_takes(release)[0], tmp_path / "out")
+
+
+def test_three_cameras_are_those_in_color():
+    """As in the thesis's reconstructions from three cameras; of other recordings they are evenly spread."""
+    names = ("BW1", "BW2", "BW3", "BW4", "C1", "C2", "C3")
+    assert chosen_cameras(names, 3) == ["C1", "C2", "C3"]
+    assert chosen_cameras(names, 2) == ["C1", "C2"] and chosen_cameras(names, 5) == ["C1", "C2", "C3", "BW1", "BW3"]
+    other = tuple(f"cam_0{k}" for k in range(7))
+    assert chosen_cameras(other, 3) == ["cam_00", "cam_02", "cam_04"]
+    assert chosen_cameras(("C1", "C2", "C3", "C4"), 2) == ["C1", "C3"]  # no grey ones: not that dataset

@@ -2,8 +2,8 @@
 
 Figures of a study are ratios of sums over many clips and seeds (a mean error is a sum of errors over a number of landmarks), and clips
 differ far more than seeds do. So clips are drawn with replacement, and of each clip drawn its seeds; two methods are compared on the same
-draws. The bootstrap of few runs is too narrow (of three it misses the truth in a quarter of all cases): they are
-widened as Student's are.
+draws. The bootstrap of few runs is too narrow (of three it misses the truth in a quarter of all cases): intervals are widened as
+Student's are.
 
 References
 ----------

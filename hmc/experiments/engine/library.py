@@ -15,6 +15,7 @@ __all__ = ["EXPERIMENTS", "find_experiment"]
 
 #: Every experiment's id and its module in this package.
 EXPERIMENTS = {
+    "fig-2.4": "fig_2_4",
     "fig-3.3": "fig_3_3",
     "fig-3.5": "fig_3_5",
     "fig-4.2": "fig_4_2",
@@ -30,6 +31,7 @@ EXPERIMENTS = {
     "why-behind": "why_behind",
     "fig-5.3": "fig_5_3",
     "fig-5.4": "fig_5_4",
+    "fig-5.5": "fig_5_5",
     "fig-5.6": "fig_5_6",
     "fig-5.7": "fig_5_7",
     "fig-6.11": "fig_6_11",

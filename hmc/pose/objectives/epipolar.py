@@ -12,6 +12,7 @@ import numpy as np
 from hmc.errors import InputError
 from hmc.pose.objectives.nearest_detections import nearest_detections
 from hmc.pose.views.markers import FARTHEST_PX, MarkerViews, SeenMarkers
+from hmc.search.fitness import combined_cost
 
 __all__ = ["MarkerLikelihood", "marker_cost", "project_markers"]
 
@@ -103,11 +104,14 @@ def marker_cost(seen: SeenMarkers, points: np.ndarray, settings: MarkerLikelihoo
     views = uv.shape[1]
     place, squared = (one.reshape(views, -1) for one in nearest_detections(seen.uv, uv.reshape(2, views, markers, n), seen.gate_px))
     matched = np.add.reduce(place < seen.stride - 1, axis=0, dtype=np.int32)
-    cost = np.zeros(markers * n, np.float32)
+    scores, shares = [], []
     if settings.reprojection < 1:
-        cost += (1 - settings.reprojection) * _epipolar_score(seen, place, matched)
+        scores.append(_epipolar_score(seen, place, matched))
+        shares.append(1 - settings.reprojection)
     if settings.reprojection > 0:
-        cost += np.float32(settings.reprojection / views / seen.gate_px**2) * squared.sum(axis=0)
+        scores.append(np.float32(1 / views / seen.gate_px**2) * squared.sum(axis=0))
+        shares.append(settings.reprojection)
+    cost = combined_cost(np.stack(scores, axis=-1), shares)
     return cost.reshape(markers, n).mean(axis=0, dtype=float), matched.reshape(markers, n)
 
 

@@ -16,6 +16,7 @@ from hmc.pose.steps.presets import drift_of
 from hmc.pose.views.markers import SeenMarkers
 from hmc.pose.views.person_view import PersonView
 from hmc.search.filters import AnnealedInfo, AnnealedSettings, annealed_step, particle_init
+from hmc.search.fitness import log_fitness
 
 __all__ = ["MARKER_PRESETS", "TIPS", "MarkerInfo", "MarkerPreset", "marker_frame", "on_markers", "with_tips"]
 
@@ -132,7 +133,7 @@ def marker_frame(rng: np.random.Generator, tracked: Tracked, seen: SeenMarkers, 
 
     def log_likelihood(states: np.ndarray) -> np.ndarray:
         cost, _ = marker_cost(seen, place_tips(body, states), preset.likelihood)
-        return -(cost**2) / (2 * preset.likelihood.sigma**2)
+        return log_fitness(cost, preset.likelihood.sigma)
 
     starts = particles_of(tracked)
     if preset.refine:

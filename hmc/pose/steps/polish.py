@@ -110,6 +110,8 @@ def polished(propose: Propose, settings: PolishSettings, make_objective: MakeObj
         estimate, cost, more = polish(rng, objective, starts, tracked.state, settings)
         after = Tracked(tracked.subject, estimate, estimate - tracked.state, found.memory)
         evaluations = found.evaluations + more
-        return after, StepInfo("fitted", cost, evaluations, annealed=found.annealed, levels=found.levels, details=found.details)
+        return after, StepInfo(
+            "fitted", cost, evaluations, annealed=found.annealed, structural=found.structural, levels=found.levels, details=found.details
+        )
 
     return step

@@ -12,6 +12,7 @@ from hmc.pose.method import PoseStep, StepInfo, Tracked, unseen
 from hmc.pose.views.hull_target import HullTarget
 from hmc.pose.views.person_view import PersonView
 from hmc.search.filters import AnnealedInfo
+from hmc.search.structural import StructuralInfo
 
 __all__ = ["LEAST_SURFACE", "Proposal", "Propose", "as_proposed", "shows_enough"]
 
@@ -37,6 +38,7 @@ class Proposal:
     status : str
         ``"fitted"``, or why there is no pose.
     annealed : AnnealedInfo or None
+    structural : StructuralInfo or None
     levels : ndarray, shape (n_models, 27), or None
     details : mapping
         As in `StepInfo`.
@@ -49,6 +51,7 @@ class Proposal:
     memory: Mapping[str, np.ndarray] = field(default_factory=dict)
     status: str = "fitted"
     annealed: AnnealedInfo | None = None
+    structural: StructuralInfo | None = None
     levels: np.ndarray | None = None
     details: Mapping[str, Any] = field(default_factory=dict)
 
@@ -69,7 +72,15 @@ def as_proposed(propose: Propose) -> PoseStep:
         if not shows_enough(view.target):
             return unseen(tracked)
         found = propose(rng, tracked, view)
-        info = StepInfo(found.status, found.cost, found.evaluations, annealed=found.annealed, levels=found.levels, details=found.details)
+        info = StepInfo(
+            found.status,
+            found.cost,
+            found.evaluations,
+            annealed=found.annealed,
+            structural=found.structural,
+            levels=found.levels,
+            details=found.details,
+        )
         if found.status != "fitted":
             return Tracked(tracked.subject, tracked.state, np.zeros_like(tracked.velocity), found.memory), info
         return Tracked(tracked.subject, found.estimate, found.estimate - tracked.state, found.memory), info

@@ -59,7 +59,7 @@ def structured(preset: PosePreset) -> Propose:
             for level, thread in enumerate(threads[:-1]):
                 memory |= with_particles(thread, f"_{level}")
         cost = -info.best_log_likelihood if preset.likelihood == "symmetric" else np.nan
-        return Proposal(threads[-1].mean, info.best, cost, info.evaluations, memory, levels=info.estimates)
+        return Proposal(threads[-1].mean, info.best, cost, info.evaluations, memory, structural=info, levels=info.estimates)
 
     return propose
 
