@@ -25,15 +25,15 @@ __all__ = ["EXPERIMENT"]
 #: What a variant's name ends with, and what the table says.
 ENDINGS = {", as printed": "as printed", "": "default"}
 METHODS = {"SMD": COLORS["sparse"], "LM": COLORS["naive"], "LM, 5 times the points": COLORS["particle"]}
-#: In the table alone: what the comparison owes to the axes of the descent.
-BESIDE = "SMD along the parameters"
+#: In the table alone: what the comparison owes to the stop and to the axes of the descent.
+BESIDE = {", as printed": kehl_runs.QUARTER, "": "SMD along the parameters"}
 PAPER = {"SMD": (28.9, 1.3), "LM, 5 times the points": (42.7, 0.73)}
 
 
 def grid(plan: Plan) -> list[dict]:
     """Every method on every clip, and Levenberg-Marquardt with every tolerance on the clip to train on, once."""
     stops = _lm_variants(kehl_runs.TOLERANCES[: 2 if plan.quick else None])
-    tests = kehl_runs.cell_grid(plan, "kick_turn", [*(f"SMD{ending}" for ending in ENDINGS), BESIDE, *stops])
+    tests = kehl_runs.cell_grid(plan, "kick_turn", [*(f"SMD{ending}" for ending in ENDINGS), *BESIDE.values(), *stops])
     if plan.recordings:  # these may be anything: there is none apart
         return tests
     apart = replace(plan, recordings=(rendered(training_name("kick_turn")),))
@@ -69,9 +69,8 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
             column[1].plot(first["frames"], kehl_runs.errors_mm(own[0]).mean(axis=1), color=METHODS[name])
             rows.append(_row(name, family, own, stops.get(name, (None,))[0], PAPER.get(name, (None, None))))
         column[0].set(title=family, yscale="log")
-        if not ending:
-            rows.append(_row(BESIDE, family, kehl_runs.of_variant(tests, BESIDE), None, (None, None)))
-        else:
+        rows.append(_row(BESIDE[ending].replace(ending, ""), family, kehl_runs.of_variant(tests, BESIDE[ending]), None, (None, None)))
+        if ending:
             claims = _claims(groups)
     panels[0, 0].set(ylabel="processor time, ms")
     panels[0, 0].legend()

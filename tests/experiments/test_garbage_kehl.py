@@ -15,7 +15,7 @@ STUDIES = ("kehl-1", "kehl-4", "kehl-9", *FOLLOWED)
 
 
 def followed(rng, parameters, off_m):
-    """A run whose joints are off by errors of one size, a fifth of them by ten times that, whatever was run; the right arm is flung about."""
+    """A run whose joints are off by errors of one size, a fifth of them by ten times that, whatever was run; the arm is flung about."""
     truth = walking().copy()
     arm = [LANDMARKS.index(name) for name in ("r_elbow", "r_wrist")]
     truth[::2, arm, 2] = 2 * truth[::2, None, LANDMARKS.index("r_shoulder"), 2] - truth[::2, arm, 2]
