@@ -113,7 +113,7 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     clips = [str(one.parameters["recording"]) for one in cells]
     images = np.array([float(one.results["images"]) for one in cells])
     outline = sum(one.results["outline_px"] for one in cells)
-    rows, at = [], {}
+    rows, at, strictest = [], {}, {}
     for name, color in (("color", COLORS["sparse"]), ("grey", COLORS["naive"])):
         hits, clutter = (np.array([one.results[what][name] for one in cells], float) for what in ("hits", "clutter_px"))
         recall = hits.sum(axis=0) / outline
@@ -124,6 +124,7 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
             threshold = float(np.interp(want, recall[order], THRESHOLDS[name][order], right=np.nan))
             sums = np.array([np.interp(threshold, THRESHOLDS[name], one) for one in clutter])
             at[name, want] = sums, images
+            strictest[name] = threshold  # recalls rise
             found = interval(clips, sums, images)
             rows.append({
                 "edges": TITLES[name], "recall": want, "clutter_px_an_image": found.value, "low": found.low, "high": found.high,
@@ -133,7 +134,7 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     panels[0].set_yscale("symlog", linthresh=1)
     panels[0].set_ylim(bottom=-0.1)
     panels[0].legend()
-    _draw(panels[1:], cells[0].results["example"], {row["edges"]: row["threshold"] for row in rows if row["recall"] == RECALLS[-1]})
+    _draw(panels[1:], cells[0].results["example"], strictest)
     gains = {want: difference(clips, at["grey", want], at["color", want]) for want in RECALLS}
     detail = ", ".join(f"{gain} pixels less at recall {want}" for want, gain in gains.items())
     claims = (Claim("color edges leave less clutter at equal recall", all(gain.above_zero for gain in gains.values()), detail),)
@@ -148,8 +149,8 @@ def _draw(panels, example: dict | None, thresholds: dict[str, float]) -> None:
     image, (top, bottom, left, right) = np.array(example["image"], np.uint8), example["box"]
     drawn = [("image", image[..., ::-1])]
     for name, title in TITLES.items():
-        if np.isfinite(thresholds[title]):
-            nearest = int(np.abs(np.log(THRESHOLDS[name] / thresholds[title])).argmin())
+        if np.isfinite(thresholds[name]):
+            nearest = int(np.abs(np.log(THRESHOLDS[name] / thresholds[name])).argmin())
             drawn.append((f"{title}, recall {RECALLS[-1]}", np.repeat(255 * ~_edges(name, image)[nearest][..., None], 3, axis=2)))
     for panel, (title, picture) in zip(panels, drawn, strict=False):
         panel.imshow(picture[top:bottom, left:right].astype(np.uint8))

@@ -65,7 +65,8 @@ def lm_name(times: int, tolerance: float) -> str:
 
 #: Relative changes at which Levenberg-Marquardt stops: which of them is the best is found on a clip apart (`kehl_13`).
 TOLERANCES = (1e-2, 1e-3, 1e-4)
-_PRINTED = {"name": "kehl2006"}
+_NOTHING: dict = {}
+_PRINTED: dict = {"name": "kehl2006"}
 #: Within the range of tolerances of section 6.2, .1 to 2, but not section 7's: tells what stopping early costs.
 QUARTER = "SMD, as printed, a quarter of the tolerance"
 #: Variants by name: what differs from the preset, in the cues and elsewhere. "As printed" is `kehl2006`, the others `default`.
@@ -83,7 +84,7 @@ VARIANTS: dict[str, tuple[dict, dict]] = {
     "surface, edges, as printed": ({"colors": None}, _PRINTED),
 } | {
     f"{lm_name(times, tolerance)}{ending}": ({}, more | {"optimiser": "lm", "times": times, "levenberg": LmSettings(tolerance=tolerance)})
-    for ending, more in (("", {}), (", as printed", _PRINTED))
+    for ending, more in zip(("", ", as printed"), (_NOTHING, _PRINTED), strict=True)
     for times in (1, 5)
     for tolerance in TOLERANCES
 }  # fmt: skip

@@ -282,13 +282,14 @@ def test_the_printed_descent_is_equations_17_to_23(seed):
     """Written down once more, a component at a time, with step sizes that grow without bound and parameters put back into limits."""
     rng = np.random.default_rng(seed)
     preset = SMD_PRESETS["kehl2006"]
+    descent = replace(preset.descent, growth=np.inf)
     hessian = np.diag(rng.uniform(1, 3, 4)) + 0.3
     low, high = np.full(4, -0.5), np.full(4, 0.8)
     p, a, v, mu = rng.uniform(-0.4, 0.7, 4), rng.uniform(0.1, 0.4, 4), np.zeros(4), rng.uniform(1, 60, 4)
     state = smd_init(p, a, mu)
     for _ in range(6):
         g = hessian @ (p - [0.9, 0, -0.2, 0.3]) + 0.1 * rng.normal(size=4)
-        state = smd_step(state, Evaluation(0.0, g, lambda x: hessian @ x, lambda: hessian), low, high, preset.descent)
+        state = smd_step(state, Evaluation(0.0, g, lambda x: hessian @ x, lambda: hessian), low, high, descent)
         hv = hessian @ v
         for k in range(4):
             a[k] *= max(0.5, 1 + mu[k] * v[k] * g[k])  # Eq. 18
