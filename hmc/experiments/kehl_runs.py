@@ -1,7 +1,8 @@
 """One person followed by multi-cue descent through a rendered recording: what the experiments of Kehl (2006), section 7, share.
 
-The recordings are rendered after the paper's descriptions, for its own are not public: five cameras (four in corners, one overhead), 15
-frames a second, 640 x 480 pixels; each begins in the pose of da Vinci's man. Only the tracker is timed: hulls and colors are made before.
+The recordings are rendered after the paper's descriptions, for its own are not public (`hmc.experiments.drill_clips`): five cameras (four
+in corners, one overhead), 15 frames a second, 640 x 480 pixels, as many frames as the paper has; each begins in the pose of da Vinci's
+man. Only the tracker is timed: hulls and colors are made before.
 """
 
 from __future__ import annotations
@@ -16,8 +17,11 @@ import numpy as np
 from hmc.body.kinematics import landmarks
 from hmc.camera.model import project
 from hmc.errors import InputError
-from hmc.experiments.engine.experiment import Cell, Parameters, Results, Source
+from hmc.experiments.drill_clips import clip_names
+from hmc.experiments.engine.experiment import Cell, Parameters, Plan, Results
 from hmc.experiments.engine.inputs import Inputs, rendered
+from hmc.experiments.engine.intervals import Interval, difference, interval
+from hmc.experiments.engine.selection import REPEAT
 from hmc.experiments.engine.style import COLORS
 from hmc.experiments.truth import first_truth, stature_m
 from hmc.io.recording import Recording
@@ -35,30 +39,55 @@ from hmc.search.meta_descent import SmdSettings
 from hmc.tracking.resumable import person_grid
 from hmc.voxels.hulls import FrontendSettings, stream_hulls
 
-__all__ = ["FAMILY", "VARIANTS", "VERSION", "cell", "cell_grid", "errors_mm", "observations", "preset_of", "shown"]
+__all__ = [
+    "FAMILY", "FOLLOWED_MM", "QUARTER", "REPEATS", "TOLERANCES", "VARIANTS", "VERSION",
+    "cell", "cell_grid", "error_interval", "errors_mm", "is_followed", "joint_gain",
+    "lm_name", "observations", "of_variant", "preset_of", "seconds_gain", "shown",
+]  # fmt: skip
 
-FAMILY = "kehl"
-#: Of the cells; 2: hulls say nothing below the floor.
-VERSION = 2
+FAMILY, VERSION = "kehl", 2
+#: Runs of every clip and variant.
+REPEATS = 3
+#: Who is nearer than this on the mean over joints and frames, with the interval's upper end, is followed and not lost, millimetres.
+FOLLOWED_MM = 100.0
 VOXEL_M = 0.03
 #: How long the person is watched before the body is fitted, seconds.
 WINDOW_S = 1.5
-_SURFACE = {"edge_weight": 0.0, "colors": None}
+_SURFACE: dict = {"edge_weight": 0.0, "colors": None}
 #: The descent along the parameters themselves, with the settings found best for that.
 ALONG_PARAMETERS = SmdSettings(first_step=0.5, meta_step=3e-4, iterations=25, by_curvature=False, averaged=False)
-#: Variants by name: what differs from the default preset, in the cues and elsewhere.
+
+
+def lm_name(times: int, tolerance: float) -> str:
+    """What Levenberg-Marquardt with so many times the points and this tolerance is called."""
+    return f"LM{f', {times} times the points' if times > 1 else ''}, stop at {tolerance:g}"
+
+
+#: Relative changes at which Levenberg-Marquardt stops: which of them is the best is found on a clip apart (`kehl_13`).
+TOLERANCES = (1e-2, 1e-3, 1e-4)
+_NOTHING: dict = {}
+_PRINTED: dict = {"name": "kehl2006"}
+#: Within the range of tolerances of section 6.2, .1 to 2, but not section 7's: tells what stopping early costs.
+QUARTER = "SMD, as printed, a quarter of the tolerance"
+#: Variants by name: what differs from the preset, in the cues and elsewhere. "As printed" is `kehl2006`, the others `default`.
 VARIANTS: dict[str, tuple[dict, dict]] = {
     "SMD": ({}, {}),
-    "SMD, as printed": ({}, {"name": "kehl2006"}),
+    "SMD, as printed": ({}, _PRINTED),
+    QUARTER: ({}, _PRINTED | {"tolerance_m": 0.005, "tolerance_deg": 0.5}),
     "deterministic": ({}, {"optimiser": "deterministic"}),
-    "LM": ({}, {"optimiser": "lm"}),
-    "LM, 5 times the points": ({}, {"optimiser": "lm", "times": 5}),
-    "LM that stops early": ({}, {"optimiser": "lm", "levenberg": LmSettings(tolerance=1e-2)}),
+    "deterministic, as printed": ({}, _PRINTED | {"optimiser": "deterministic"}),
     "SMD along the parameters": ({}, {"descent": ALONG_PARAMETERS, "tolerance_m": 0.005, "tolerance_deg": 0.5}),
     "surface": (_SURFACE, {}),
     "surface, edges": ({"colors": None}, {}),
     "surface, color": ({"edge_weight": 0.0}, {}),
-}
+    "surface, as printed": (_SURFACE, _PRINTED),
+    "surface, edges, as printed": ({"colors": None}, _PRINTED),
+} | {
+    f"{lm_name(times, tolerance)}{ending}": ({}, more | {"optimiser": "lm", "times": times, "levenberg": LmSettings(tolerance=tolerance)})
+    for ending, more in zip(("", ", as printed"), (_NOTHING, _PRINTED), strict=True)
+    for times in (1, 5)
+    for tolerance in TOLERANCES
+}  # fmt: skip
 
 
 def preset_of(variant: str) -> SmdPreset:
@@ -75,17 +104,18 @@ def preset_of(variant: str) -> SmdPreset:
     return replace(preset, cues=replace(preset.cues, **cues), **more)
 
 
-def cell_grid(
-    quick: bool, recordings: Sequence[Source], name: str, variants: Sequence[str], repeats: int, shown_s: Sequence[float] = ()
-) -> list[dict]:
-    """Every variant, several times, on the user's recordings or on a rendered one; in the quick mode once."""
-    sources = tuple(recordings) or (rendered(name),)
+def cell_grid(plan: Plan, drill: str, variants: Sequence[str], shown_s: Sequence[float] = ()) -> list[dict]:
+    """Every variant, several times, on the user's recordings or on the clips of a drill; in the quick mode on one clip, 45 frames of it."""
+    sources = plan.recordings or tuple(rendered(name) for name in clip_names(drill)[: 1 if plan.quick else None])
     return [
-        {"recording": source.label, "variant": variant, "repeat": k, "shown_s": list(shown_s)}
+        {
+            "recording": source.label, "variant": variant, REPEAT: k, "shown_s": list(shown_s) if k == 0 else [],
+            "frames": 45 if plan.quick else 0,
+        }
         for source in sources
-        for k in range(1 if quick else repeats)
+        for k in range(REPEATS)
         for variant in variants
-    ]
+    ]  # fmt: skip
 
 
 def observations(recording: Recording, frames: int = 0) -> Iterator[tuple[int, Skin | None, HullTarget | None]]:
@@ -121,9 +151,9 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
     truth = first_truth(recording)
     height = stature_m(recording)
     preset = preset_of(parameters["variant"])
-    wanted = {round(second * recording.fps) for second in parameters["shown_s"]} if parameters["repeat"] == 0 else set()
+    wanted = {round(second * recording.fps) for second in parameters["shown_s"]}
     window = max(3, round(WINDOW_S * recording.fps))
-    waiting, stream = [], observations(recording)
+    waiting, stream = [], observations(recording, parameters["frames"])
     for index, seen, target in stream:
         waiting.append((index, seen, target))
         if len(waiting) == window:
@@ -168,6 +198,61 @@ def errors_mm(one: Cell) -> np.ndarray:
     """Errors of a cell, (n, 15), millimetres."""
     estimate, truth = (np.array(one.results[name], float).reshape(-1, len(LANDMARKS), 3) for name in ("estimate_m", "truth_m"))
     return 1000 * landmark_errors(estimate, truth)
+
+
+def of_variant(cells: Sequence[Cell], variant: str) -> list[Cell]:
+    """The cells of a variant, by clip and run."""
+    own = [one for one in cells if one.parameters["variant"] == variant]
+    return sorted(own, key=lambda one: (str(one.parameters["recording"]), int(one.parameters[REPEAT])))
+
+
+def error_interval(cells: Sequence[Cell], joints: Sequence[int] = (), last: float = 1.0) -> Interval:
+    """Mean joint error of some cells over clips and runs, millimetres.
+
+    Parameters
+    ----------
+    cells : sequence of Cell
+    joints : sequence of int
+        Of `LANDMARKS`; all where empty.
+    last : float
+        Of each run the last so large a share of the frames.
+    """
+    return interval(_clips(cells), *_errors(cells, joints, last))
+
+
+def joint_gain(better: Sequence[Cell], worse: Sequence[Cell], joints: Sequence[int] = ()) -> Interval:
+    """By how many millimetres the first group is nearer than the second, on the same clips and runs."""
+    return difference(_clips(worse), _errors(worse, joints, 1.0), _errors(better, joints, 1.0))
+
+
+def seconds_gain(faster: Sequence[Cell], slower: Sequence[Cell]) -> Interval:
+    """By how many milliseconds a frame the first group is quicker than the second."""
+    return difference(_clips(slower), _milliseconds(slower), _milliseconds(faster))
+
+
+def is_followed(cells: Sequence[Cell], last: float = 1.0) -> bool:
+    """Whether people are followed: all of the error's interval is below `FOLLOWED_MM`. Nothing is claimed of who is lost."""
+    return error_interval(cells, last=last).high < FOLLOWED_MM
+
+
+def _clips(cells: Sequence[Cell]) -> list[str]:
+    return [str(one.parameters["recording"]) for one in cells]
+
+
+def _errors(cells: Sequence[Cell], joints: Sequence[int], last: float) -> tuple[np.ndarray, np.ndarray]:
+    """Sum of errors and how many, a run."""
+    parts = []
+    for one in cells:
+        errors = errors_mm(one)
+        errors = errors[-max(1, round(last * len(errors))) :, list(joints) or slice(None)]
+        parts.append((errors.sum(), errors.size))
+    sums, counts = np.array(parts, float).reshape(-1, 2).T
+    return sums, counts
+
+
+def _milliseconds(cells: Sequence[Cell]) -> tuple[np.ndarray, np.ndarray]:
+    seconds = [np.asarray(one.results["seconds"], float) for one in cells]
+    return np.array([1000 * one.sum() for one in seconds]), np.array([one.size for one in seconds], float)
 
 
 def shown(axes, picture: dict, title: str) -> None:

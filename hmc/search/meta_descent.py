@@ -68,6 +68,8 @@ class SmdSettings:
     averaged : bool
         The moving average of Eq. 20 is what is found; otherwise the last state, as in the paper. Every state comes from samples of
         its own, so the average rests on more of them.
+    growth : float
+        A step size grows by this factor at most from one iteration to the next; the paper has no such bound.
     """
 
     first_step: float = 1.5
@@ -79,6 +81,7 @@ class SmdSettings:
     by_curvature: bool = True
     damping: float = 0.1
     averaged: bool = True
+    growth: float = 2.0
 
 
 @dataclass(frozen=True)
@@ -153,7 +156,7 @@ def smd_step(state: SmdState, found: Evaluation, low: np.ndarray, high: np.ndarr
     settings : SmdSettings
     """
     gradient = found.gradient @ state.axes
-    steps = state.steps * np.clip(1 + state.meta * state.trace * gradient, 0.5, 2.0)
+    steps = state.steps * np.clip(1 + state.meta * state.trace * gradient, 0.5, settings.growth)
     parameters = np.clip(state.parameters - state.axes @ (steps * gradient), low, high)
     # The gradient that would have led there without limits.
     constrained = state.inverse @ (state.parameters - parameters) / steps

@@ -61,7 +61,8 @@ def pedal_arms(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator) 
 
 
 def dance(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator) -> Motion:
-    """Arms flung about, fast steps on the spot, and poses far apart with quick changes (section 7.4)."""
+    """Arms flung about, then fast steps on the spot, then poses far apart with quick changes (section 7.4), for a quarter, a fifth and
+    the rest of the time, as the paper's 375 frames are shared out."""
     poses = [
         {"left": (0.25, 0.35, 0.88), "right": (0.15, -0.55, -0.75)},
         {"left": (0.15, 0.55, -0.75), "right": (0.25, -0.35, 0.88)},
@@ -71,29 +72,34 @@ def dance(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator) -> Mo
         {"left": (-0.25, 0.50, -0.75), "right": (0.85, -0.30, 0.20)},
     ]
     keys: list[Key] = []
-    now = 0.9
-    for k in range(8):
+    now, end = 0.9, float(times[-1]) if len(times) else 0.0
+    while now < 95 / 375 * end:
+        k = len(keys)
         keys.append((now, poses[k % 4 if k < 4 else int(rng.integers(len(poses)))], 0.3 * (-1) ** k, 0.05, {}))
         now += 0.33
     step = {"ahead": 0.12, "up": 0.26}
-    for k in range(8):
+    while now < 175 / 375 * end:
+        k = len(keys)
         side, other = ("left", "right") if k % 2 else ("right", "left")
         keys.append((now, {other: (0.45, 0.15 if other == "left" else -0.15, -0.55), side: _DOWN[side]}, 0.0, 0.05, {side: step}))
         now += 0.28
-    for k in rng.permutation(len(poses)):
-        keys += [(now, poses[k], 0.25 * (-1) ** k, 0.0, {}), (now + 0.25, poses[k], 0.25 * (-1) ** k, 0.0, {})]
-        now += 0.58
+    while now < end:
+        for k in rng.permutation(len(poses)):
+            keys += [(now, poses[k], 0.25 * (-1) ** k, 0.0, {}), (now + 0.25, poses[k], 0.25 * (-1) ** k, 0.0, {})]
+            now += 0.58
     return _drill(skeleton, times, keys)
 
 
 def play_cube(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator) -> Motion:
-    """Passes something from one hand to the other, lifts it and reaches out with it (section 7.5)."""
+    """Brings something to the other hand, lifts it and reaches out with it, over and over (section 7.5; the paper's cube is thrown and
+    kicked too)."""
     meet = {"left": (0.66, -0.24, -0.12), "right": (0.66, 0.24, -0.12)}
     right_out = {"left": _DOWN["left"], "right": (0.35, -0.88, 0.08)}
     right_up = {"left": _DOWN["left"], "right": (0.35, -0.30, 0.84)}
     right_ahead = {"left": (0.2, 0.5, -0.7), "right": (0.95, -0.10, 0.05)}
-    stages = [right_out, right_up, right_ahead, meet, right_out, right_ahead, right_up, meet, right_out]
-    return _drill(skeleton, times, [(1.2 + 0.75 * k, pose, 0.15 * (-1) ** k, 0.04, {}) for k, pose in enumerate(stages)])
+    stages = [right_out, right_up, right_ahead, meet, right_out, right_ahead, right_up, meet]
+    count = 1 + int(max(float(times[-1]) - 1.2, 0.0) / 0.75) if len(times) else 1
+    return _drill(skeleton, times, [(1.2 + 0.75 * k, stages[k % len(stages)], 0.15 * (-1) ** k, 0.04, {}) for k in range(count)])
 
 
 def _drill(skeleton: Skeleton, times: np.ndarray, keys: list[Key]) -> Motion:

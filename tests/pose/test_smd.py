@@ -277,6 +277,33 @@ def test_step_sizes_grow_where_gradients_agree_and_halve_at_most():
     np.testing.assert_allclose(sure.steps, [0.2, 0.05])  # and double at most
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_the_printed_descent_is_equations_17_to_23(seed):
+    """Written down once more, a component at a time, with step sizes that grow without bound and parameters put back into limits."""
+    rng = np.random.default_rng(seed)
+    preset = SMD_PRESETS["kehl2006"]
+    descent = replace(preset.descent, growth=np.inf)
+    hessian = np.diag(rng.uniform(1, 3, 4)) + 0.3
+    low, high = np.full(4, -0.5), np.full(4, 0.8)
+    p, a, v, mu = rng.uniform(-0.4, 0.7, 4), rng.uniform(0.1, 0.4, 4), np.zeros(4), rng.uniform(1, 60, 4)
+    state = smd_init(p, a, mu)
+    for _ in range(6):
+        g = hessian @ (p - [0.9, 0, -0.2, 0.3]) + 0.1 * rng.normal(size=4)
+        state = smd_step(state, Evaluation(0.0, g, lambda x: hessian @ x, lambda: hessian), low, high, descent)
+        hv = hessian @ v
+        for k in range(4):
+            a[k] *= max(0.5, 1 + mu[k] * v[k] * g[k])  # Eq. 18
+            to = min(max(p[k] - a[k] * g[k], low[k]), high[k])  # Eq. 17, 22
+            constrained = (p[k] - to) / a[k]  # Eq. 23
+            v[k] = 0.3 * v[k] + a[k] * (constrained - 0.3 * hv[k])  # Eq. 19
+            p[k] = to
+        np.testing.assert_allclose(state.parameters, p)
+        np.testing.assert_allclose(state.steps, a)
+        np.testing.assert_allclose(state.trace, v)
+    assert (preset.descent.average, preset.descent.iterations, preset.tolerance_m, preset.tolerance_deg) == (3, 40, 0.02, 2.0)
+    assert preset.refine_share == 0.5
+
+
 def test_the_descent_does_not_depend_on_the_units():
     """Degrees for radians, with step sizes learnt in degrees either way: the same path."""
     matrix, goal, wide = np.diag([1.0, 4.0]), np.array([0.3, -0.2]), np.full(2, np.inf)

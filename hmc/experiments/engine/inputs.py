@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from hmc.errors import InputError
+from hmc.experiments.drill_clips import drill_recipes
 from hmc.experiments.engine.experiment import Source
 from hmc.experiments.engine.store import digest
 from hmc.experiments.five_actions import action_recipes
@@ -213,7 +214,8 @@ def write_hulls(folder: Path, steps: Iterable[HullStep]) -> None:
 
 def _recipe_of(name: str) -> tuple[Recipe, bool]:
     """A recipe, and whether its furniture comes in after the empty room was filmed."""
-    for recipe, brought_in in (*training_recipes(), *((recipe, False) for recipe in (*action_recipes(), *nine_recipes()))):
+    as_filmed = ((recipe, False) for recipe in (*action_recipes(), *nine_recipes(), *drill_recipes()))
+    for recipe, brought_in in (*training_recipes(), *as_filmed):
         if recipe.name == name:
             return recipe, brought_in
     return load_recipe(name), False

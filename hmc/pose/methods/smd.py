@@ -28,8 +28,13 @@ SETTLING = 1
 NEEDS = frozenset({"hulls", "skin"})
 
 
-#: `kehl2006` has the paper's cues, counts and tolerances (section 7); `default` adds voxels that look for the body, and descends along
-#: axes taken from the curvature, which needs fewer iterations.
+#: `kehl2006` has what the paper prints: 60 and 20 surface points and 10 contour points a limb in three views, edges from the start, n = 3,
+#: at most 40 iterations, lambda = .3, mu a tenth of the first step sizes, tolerances of 2 degrees and 2 cm and half of that (sections 6.2
+#: and 7), the last state as the result, no prediction, no search. Of what it does not print, these are named here: nu of Eq. 9 (`width`),
+#: and first step sizes, in shares of the inverse curvature. The printed ones, 2500 to 10,000, depend on w_s and w_e, which are not printed;
+#: with those here the body leaves the person (docs/multi-cue.md). `reach` and `growth` are ours: without them one step may throw the body
+#: out of the room, and step sizes overflow.
+#: `default` adds voxels that look for the body, and descends along axes taken from the curvature, which needs fewer iterations.
 SMD_PRESETS: dict[str, SmdPreset] = {
     "default": SmdPreset(),
     "kehl2006": SmdPreset(
