@@ -144,7 +144,7 @@ def test_error_is_that_of_the_best_assignment(seed):
     errors, choice = skeleton_error(MODEL, states, observed)
     chains = part_chains(*segment_ends(MODEL, states))
     for k in range(3):
-        matrix = np.full((len(names), 6), np.nan)
+        matrix = np.full((len(names), 6), 1e3)
         for q, (row, part) in enumerate(observed.pairs):
             matrix[row, part] = brute_error(observed.blends[q] @ chains[k, part], observed.nodes[row])
         rows, columns = linear_sum_assignment(matrix)
@@ -158,7 +158,7 @@ def test_named_curves_keep_their_kind():
     observed = observe_curves(MODEL, curves)
     assert len(observed.choices) == 4
     free = observe_curves(MODEL, curves, named=False)
-    assert len(free.choices) == len(list(permutations(range(6))))
+    assert len(free.choices) == len(list(permutations(range(5)))) and free.parts_of(0)["trunk"] == "torso"
     for choice in range(4):
         for name, part in observed.parts_of(choice).items():
             assert MODEL_PARTS.index(part) in KINDS[name]
@@ -285,7 +285,7 @@ def test_pairs_do_not_depend_on_the_other_curves():
     curves = model_curves(random_states(9, 1)[0])
     together = observe_curves(MODEL, curves)
     alone = together.only(("arm_1", "head"))
-    rows = [k for k, (row, _) in enumerate(together.pairs) if together.names[row] in ("arm_1", "head")]
+    rows = [k for k, (row, _) in enumerate(together.pairs) if together.names[row] in ("arm_1", "arm_2", "head")]
     chains = part_chains(*segment_ends(MODEL, state))
     np.testing.assert_allclose(pair_errors(chains, alone)[0], pair_errors(chains, together)[0][rows])
     assert len(alone.choices) == 2
