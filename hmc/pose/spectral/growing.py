@@ -137,6 +137,8 @@ def grow_branches(
     branches, free = [], far > radius
     while len(branches) < settings.most_branches and np.count_nonzero(free) > settings.first_nodes:
         branch = _grow(places, far, free, settings)
+        if settings.stop == "radius":
+            branch = _with_near(places, branch, free, settings.reach * far[branch.nodes[0]])
         free[branch.nodes] = False
         if len(branch.nodes) >= settings.least_nodes:
             branches.append(branch)
@@ -148,6 +150,16 @@ def _with_rest(places: np.ndarray, branch: Branch, nodes: np.ndarray) -> Branch:
     rest = np.setdiff1d(np.arange(len(nodes)), branch.nodes)
     nearest = cKDTree(places[branch.nodes]).query(places[rest])[1] if len(rest) else rest
     return Branch(nodes[np.concatenate([branch.nodes, rest])], np.concatenate([branch.sites, branch.sites[nearest]]))
+
+
+def _with_near(places: np.ndarray, branch: Branch, free: np.ndarray, reach: float) -> Branch:
+    """A branch with the free nodes beside it: what steps of N nodes left out would be branches of its own."""
+    own = free.copy()
+    own[branch.nodes] = False
+    rest = np.flatnonzero(own)
+    away, nearest = cKDTree(places[branch.nodes]).query(places[rest]) if len(rest) else (np.zeros(0), rest)
+    near = away < reach
+    return Branch(np.concatenate([branch.nodes, rest[near]]), np.concatenate([branch.sites, branch.sites[nearest[near]]]))
 
 
 def _grow(places: np.ndarray, far: np.ndarray, free: np.ndarray, settings: GrowSettings) -> Branch:

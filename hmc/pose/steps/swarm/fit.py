@@ -92,8 +92,6 @@ class FitSettings:
     tune_m, tune_rad : float
         How far the first round of fine tuning looks for positions and angles; each further one half as far.
     tune_rounds : int
-    all_curves : bool
-        Whether all curves count in every stage; else those of the stage's parts.
     limbs_stay : bool
         Whether limbs stay where they are while the torso is tuned (`torso_moves`); the thesis does not say.
     """
@@ -105,7 +103,6 @@ class FitSettings:
     tune_m: float = 0.05
     tune_rad: float = 0.6
     tune_rounds: int = 2
-    all_curves: bool = False
     limbs_stay: bool = True
 
 
@@ -211,7 +208,7 @@ def fit_hierarchical(
     state, evaluations = start.copy(), 0
     prior = Prior(start, weight)
     for stage, ((free, names), (particles, iterations)) in enumerate(zip(STAGES, settings.stages, strict=True)):
-        seen = observed if settings.all_curves else observed.only(names)
+        seen = observed.only(names)
         if not seen.names:
             continue
         low, high = bounds_around(model, state, 0.25 if stage == 0 else 0.12, 4 * np.pi)
