@@ -14,7 +14,7 @@ import numpy as np
 from hmc.body.joints import N_DOF, JointLimits, dof_index
 from hmc.body.joints import default_limits as body_limits
 from hmc.body.model import BodyModel
-from hmc.body.proportions import canton_body, default_body, make_body
+from hmc.body.proportions import default_body, make_body
 from hmc.landmarks import LANDMARKS
 
 __all__ = [
@@ -119,13 +119,15 @@ def model_of_height(height_m: float, thesis: bool = False) -> SkeletonModel:
     ----------
     height_m : float
     thesis : bool
-        Ranges as printed, shoulders as high as the neck, and one length a part (Canton's table 6.1: the thesis prints none).
+        Ranges as printed, and shoulders as high as the neck.
     """
     return model_of_body(thesis_body(height_m) if thesis else default_body(height_m), thesis)
 
 
 def thesis_body(height_m: float) -> BodyModel:
-    """The thesis's skeleton as a body of `hmc.body`: straight, one length a part, shoulders as high as the neck, ranges as printed.
+    """The thesis's skeleton as a body of `hmc.body`: straight, shoulders as high as the neck (Table 3-2), ranges as printed.
+
+    Lengths are "decided beforehand based on the stature" (section 3.2.1.2) and not printed: those of average people.
 
     Parameters
     ----------
@@ -136,7 +138,8 @@ def thesis_body(height_m: float) -> BodyModel:
     low[places], high[places] = thesis_limits()
     for name in ("torso_x", "torso_y", "torso_z", "r_hip_z", "l_hip_z"):  # the skeleton has none of these
         low[dof_index(name)] = high[dof_index(name)] = 0.0
-    return make_body(canton_body(height_m).dimensions | {"shoulder_drop": 0.0}, JointLimits(low, high))
+    straight = {"shoulder_drop": 0.0, "chest_forward": 0.0, "head_forward": 0.0}
+    return make_body(default_body(height_m).dimensions | straight, JointLimits(low, high))
 
 
 def model_of_body(body: BodyModel, thesis: bool = False) -> SkeletonModel:

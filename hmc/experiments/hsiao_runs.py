@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -15,14 +18,33 @@ from hmc.experiments.truth import stature_m
 from hmc.io.recording import Recording
 from hmc.landmarks import LANDMARKS
 from hmc.pose.follow import FollowOptions
+from hmc.pose.method import PoseMethod, StepResult, Tracked
+from hmc.pose.methods.pso import SWARM_PRESETS, pso_method
 from hmc.pose.registry import pose_method
 from hmc.pose.spectral.graph import color_votes, face_neighbours
+from hmc.pose.steps.swarm.temporal import RestartSettings
+from hmc.pose.views.person_view import PersonView
 from hmc.synthetic.scene import Scene, build_scene
 from hmc.voxels.components import components
 from hmc.voxels.grid import VoxelGrid
 from hmc.voxels.hulls import HullStep, stream_hulls
 
-__all__ = ["VOXEL_M", "limbs_apart", "person_hulls", "pose_cell", "scene_of", "sequences"]
+__all__ = ["VOXEL_M", "WAYS", "limbs_apart", "person_hulls", "pose_cell", "scene_of", "sequences"]
+
+
+def _each_alone() -> PoseMethod:
+    preset = SWARM_PRESETS["hsiao2008"]
+    return pso_method(
+        replace(preset, swarm=replace(preset.swarm, restart=RestartSettings(always=True, alone=True, margin_m=-np.inf, lost_m=np.inf)))
+    )
+
+
+#: The thesis's system; the same without its temporal consistency (3.2.2.5), every frame a new start; and ours.
+WAYS: dict[str, Callable[[], PoseMethod]] = {
+    "hsiao2008": partial(pose_method, "pso", "hsiao2008"),
+    "each frame alone": _each_alone,
+    "default": partial(pose_method, "pso", "default"),
+}
 
 
 def sequences(plan: Plan, names: tuple[str, ...] = tuple(NINE_ACTIONS)) -> tuple[Source, ...]:
@@ -76,17 +98,35 @@ def limbs_apart(points: np.ndarray) -> bool:
 
 
 def pose_cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Results:
-    """The whole method on a recording, from videos alone but for the stature, which the thesis knows beforehand."""
+    """The whole method on a recording, from videos alone but for the stature, which the thesis knows beforehand.
+
+    Parameters
+    ----------
+    parameters : mapping
+        ``recording``, ``way`` (a key of `WAYS`), ``repeat``.
+    inputs : Inputs
+    rng : numpy.random.Generator
+    """
     seen = tracked(inputs, parameters["recording"], 0)
     options = FollowOptions(VOXEL_M, int(rng.integers(2**31)), stature_m(seen.recording))
-    people = run_method(seen, pose_method("pso", parameters["preset"]), options)
+    method = WAYS[parameters["way"]]()
+    spent: list[tuple[int, float]] = []
+
+    def counted(rng: np.random.Generator, before: Tracked, view: PersonView) -> StepResult:
+        begun = time.process_time()
+        after = method.step(rng, before, view)
+        spent.append((after[1].evaluations, time.process_time() - begun))
+        return after
+
+    people = run_method(seen, replace(method, step=counted), options)
     results = pose_results(seen.recording, people)
+    evaluations, seconds = np.mean(spent, axis=0).tolist() if spent else (0.0, 0.0)
     return {
         "estimate_m": results["estimate_m"],
         "truth_m": results["truth_m"],
         "frames": len(results["frames"]),
         "restarts": sum(bool(told.get("started")) for told in people.details),
-        "turned": sum(bool(told.get("turned")) for told in people.details),
         "without_fit": sum(status != "fitted" for status in people.status),
-        "error_mm": [1000 * error for told in people.details if isinstance(error := told.get("error_m"), float) and np.isfinite(error)],
+        "evaluations_per_frame": evaluations,
+        "seconds_per_frame": seconds,
     }

@@ -1,6 +1,7 @@
 """Nine actions like the sequences s1 to s9 of Hsiao (2008), chapter 4, as recipes: eight cameras, images of 320 x 240.
 
-The thesis renders built-in actions of a game; these are motions of our own. The cameras of s1 and s2 stand in a ring of eight (Figure 3-5),
+The thesis renders built-in actions of a game; these are motions of our own, done over and over where the thesis's sequence is longer, in
+as many frames as its table has, at 30 a second as there. The cameras of s1 and s2 stand in a ring of eight (Figure 3-5),
 those of the others in a ring of seven with one overhead (Figure 4-1).
 """
 
@@ -13,19 +14,19 @@ from hmc.synthetic.rigs import RigRecipe
 
 __all__ = ["NINE_ACTIONS", "nine_recipes"]
 
-#: Name of each sequence, what it shows, its motion and its rig.
-NINE_ACTIONS: dict[str, tuple[str, str, str]] = {
-    "s1_wave": ("waves", "wave", "ring8"),
-    "s2_throw_ball": ("throws a ball", "throw_catch", "ring8"),
-    "s3_throw_item": ("throws an item", "throw_item", "ring7_overhead"),
-    "s4_struggle": ("struggles", "struggle", "ring7_overhead"),
-    "s5_sit": ("sits down and gets up", "sit", "ring7_overhead"),
-    "s6_close_door": ("looks out and closes a door", "close_door", "ring7_overhead"),
-    "s7_push_case": ("pushes a case", "push_case", "ring7_overhead"),
-    "s8_walk": ("walks", "walk", "ring7_overhead"),
-    "s9_lift_drop": ("lifts something and throws it down", "lift_and_drop", "ring7_overhead"),
+#: Name of each sequence, what it shows, its motion, its rig, and how many frames the thesis's has.
+NINE_ACTIONS: dict[str, tuple[str, str, str, int]] = {
+    "s1_wave": ("waves", "wave", "ring8", 38),
+    "s2_throw_ball": ("throws a ball", "throw_catch", "ring8", 168),
+    "s3_throw_item": ("throws an item", "throw_item", "ring7_overhead", 400),
+    "s4_struggle": ("struggles", "struggle", "ring7_overhead", 190),
+    "s5_sit": ("sits down and gets up", "sit", "ring7_overhead", 170),
+    "s6_close_door": ("looks out and closes a door", "close_door", "ring7_overhead", 780),
+    "s7_push_case": ("pushes a case", "push_case", "ring7_overhead", 645),
+    "s8_walk": ("walks", "walk", "ring7_overhead", 305),
+    "s9_lift_drop": ("lifts something and throws it down", "lift_and_drop", "ring7_overhead", 1110),
 }
-SECONDS, FPS = 5.0, 30.0
+FPS = 30.0
 #: The quick mode's recordings are shorter and have fewer frames a second.
 QUICK_SUFFIX, QUICK_SECONDS, QUICK_FPS = "_quick", 3.0, 15.0
 _SIZE_PX = (320, 240)
@@ -43,7 +44,7 @@ _ACTOR = ActorRecipe(
 def nine_recipes() -> list[Recipe]:
     """Every sequence, in full and quick."""
     recipes = []
-    for number, (name, (_, motion, rig)) in enumerate(NINE_ACTIONS.items()):
+    for number, (name, (_, motion, rig, frames)) in enumerate(NINE_ACTIONS.items()):
         start = (-0.9, -0.1) if motion == "walk" else (0.0, 0.0)
         actor = replace(
             _ACTOR, motion=motion, start_m=start, heading_deg=10.0 + 37.0 * number, turn_radius_m=0.9 if motion == "walk" else 0.0
@@ -52,7 +53,7 @@ def nine_recipes() -> list[Recipe]:
             name,
             seed=300 + number,
             fps=FPS,
-            seconds=SECONDS,
+            seconds=frames / FPS,
             background_frames=20,
             cell_m=0.02,
             rig=RigRecipe(rig, size_px=_SIZE_PX, target_height_m=1.0),

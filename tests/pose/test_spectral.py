@@ -15,7 +15,7 @@ from hmc.pose.spectral.graph import GraphSettings, adjacency, build_graph, color
 from hmc.pose.spectral.parts import PART_NAMES
 from hmc.pose.spectral.pieces import PieceSettings, limb_pieces
 from hmc.pose.spectral.reading import cut_foot, read_body
-from hmc.pose.spectral.segmentation import baseline_segmentation, segment_body
+from hmc.pose.spectral.segmentation import baseline_segmentation, printed_segmentation, segment_body
 from hmc.pose.spectral.skeleton import curve_through, equally_spaced, extract_skeletons, site_values
 from hmc.voxels.grid import VoxelGrid
 
@@ -160,6 +160,22 @@ def test_parts_of_a_drawn_body():
     assert best > 0.87
     baseline = segment_body(voxels, points, SIZE, baseline_segmentation())
     assert np.mean(baseline.labels == -1) > 0.1  # Sundaresan's leaves the trunk unfitted
+
+
+def test_printed_branches_end_by_their_distance_from_the_origin_alone():
+    """Section 3.1.4.2, B-3, and A-2: the nodes that shrink are those with all six neighbours."""
+    voxels, points, _ = drawn(BODY)
+    settings_ = printed_segmentation()
+    found = segment_body(voxels, points, SIZE, settings_)
+    far = np.linalg.norm(found.places, axis=1)
+    core = core_nodes(voxels, SIZE, settings_.graph.core_m)
+    radius = settings_.grow.origin_radius * np.median(far[core])
+    degree = np.bincount(face_neighbours(voxels).ravel(), minlength=len(voxels))
+    np.testing.assert_array_equal(core, degree == 6)
+    branches = [*found.branches.values()]
+    assert 3 <= len(branches) <= 5
+    assert all(far[branch.nodes].min() > radius for branch in branches)
+    assert (found.labels[far < radius] <= 0).all()
 
 
 def test_touching_hands_are_told_and_parted():

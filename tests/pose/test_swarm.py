@@ -25,6 +25,7 @@ from hmc.body.spin_skeleton import (
     torso_frames,
 )
 from hmc.landmarks import LANDMARKS
+from hmc.pose.methods.pso import SWARM_PRESETS
 from hmc.pose.objectives.curves import KINDS, MODEL_PARTS, observe_curves, pair_errors, skeleton_error
 from hmc.pose.objectives.volume import volume_error
 from hmc.pose.spectral.reading import read_body
@@ -144,7 +145,7 @@ def test_error_is_that_of_the_best_assignment(seed):
     errors, choice = skeleton_error(MODEL, states, observed)
     chains = part_chains(*segment_ends(MODEL, states))
     for k in range(3):
-        matrix = np.full((len(names), 6), np.nan)
+        matrix = np.full((len(names), 6), 1e3)
         for q, (row, part) in enumerate(observed.pairs):
             matrix[row, part] = brute_error(observed.blends[q] @ chains[k, part], observed.nodes[row])
         rows, columns = linear_sum_assignment(matrix)
@@ -158,10 +159,49 @@ def test_named_curves_keep_their_kind():
     observed = observe_curves(MODEL, curves)
     assert len(observed.choices) == 4
     free = observe_curves(MODEL, curves, named=False)
-    assert len(free.choices) == len(list(permutations(range(6))))
+    assert len(free.choices) == len(list(permutations(range(5)))) and free.parts_of(0)["trunk"] == "torso"
     for choice in range(4):
         for name, part in observed.parts_of(choice).items():
             assert MODEL_PARTS.index(part) in KINDS[name]
+
+
+def test_what_a_curve_is_called_is_nothing_to_the_printed_error():
+    """Section 3.2.2.1: the least sum of one-to-one pairs; in a stage with fewer parts, of the curves that fit them best."""
+    state = random_states(3, 1)[0]
+    curves = model_curves(state)
+    turned = dict(zip(("trunk", "leg_1", "other_1", "head", "arm_2", "arm_1"), curves.values(), strict=True))
+    away = random_states(4, 1)
+    for drawn_curves in (curves, turned):
+        observed = observe_curves(MODEL, drawn_curves, named=False)
+        assert skeleton_error(MODEL, state[None], observed)[0][0] == pytest.approx(0, abs=0.01)
+        np.testing.assert_allclose(
+            skeleton_error(MODEL, away, observed)[0], skeleton_error(MODEL, away, observe_curves(MODEL, curves, named=False))[0]
+        )
+    head = observe_curves(MODEL, turned, named=False).only(("trunk", "head"))
+    errors, choice = skeleton_error(MODEL, state[None], head)
+    assert errors[0] == pytest.approx(0, abs=0.01)
+    assert head.parts_of(int(choice[0])) == {"trunk": "torso", "leg_1": "head"}
+
+
+def test_of_more_branches_than_parts_the_longest_count():
+    curves = model_curves(random_states(5, 1)[0]) | {"other_1": np.zeros((4, 3)), "other_2": np.linspace([0, 0, 0], [0, 0, 5], 9)}
+    observed = observe_curves(MODEL, curves, named=False)
+    assert len(observed.names) == 6 and "other_2" in observed.names and "other_1" not in observed.names
+
+
+def test_the_printed_preset_minimises_curves_alone_and_has_a_fit_wherever_there_are_curves():
+    preset = SWARM_PRESETS["hsiao2008"]
+    voxels, points, _ = drawn(BODY)
+    reading = read_body(voxels, points, SIZE, 1.75, preset.reading)
+    assert reading.status == "read" and len(reading.curves) == 6
+    model = model_of_height(1.75, thesis=True)
+    state, info = swarm_step(np.random.default_rng(0), model, None, reading, 30.0, None, preset.swarm)
+    observed = observe_curves(model, reading.curves, preset.swarm.nodes, named=False)
+    assert info.status == "fitted" and info.cost_m == pytest.approx(float(skeleton_error(model, state.state[None], observed)[0][0]))
+    far = replace(state, state=state.state + np.r_[np.full(6, 3.0), np.zeros(17)])
+    after, info = swarm_step(np.random.default_rng(1), model, far, reading, 30.0, None, preset.swarm)
+    assert info.started and info.error_m < 0.2  # Figure 3-22: the start of the frame alone fits better
+    assert np.linalg.norm(after.state[:3] - state.state[:3]) < 0.2
 
 
 def model_curves(state, n=16):
@@ -285,7 +325,7 @@ def test_pairs_do_not_depend_on_the_other_curves():
     curves = model_curves(random_states(9, 1)[0])
     together = observe_curves(MODEL, curves)
     alone = together.only(("arm_1", "head"))
-    rows = [k for k, (row, _) in enumerate(together.pairs) if together.names[row] in ("arm_1", "head")]
+    rows = [k for k, (row, _) in enumerate(together.pairs) if together.names[row] in ("arm_1", "arm_2", "head")]
     chains = part_chains(*segment_ends(MODEL, state))
     np.testing.assert_allclose(pair_errors(chains, alone)[0], pair_errors(chains, together)[0][rows])
     assert len(alone.choices) == 2

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -12,32 +12,52 @@ from hmc.body.spin_skeleton import model_of_body, skeleton_landmarks, thesis_bod
 from hmc.pose.legs import LegSettings, TellLegs
 from hmc.pose.method import Capture, FrameRng, PoseMethod, StartPose
 from hmc.pose.recovery import Recovery
-from hmc.pose.spectral.reading import BodyReading
+from hmc.pose.spectral.reading import ReadingSettings
+from hmc.pose.spectral.segmentation import printed_segmentation
+from hmc.pose.spectral.skeleton import SkeletonSettings
 from hmc.pose.starts.spectral import body_state
 from hmc.pose.starts.window import WindowStart, estimate_height
 from hmc.pose.steps.polish import polished
 from hmc.pose.steps.presets import PosePreset
 from hmc.pose.steps.proposal import as_proposed
+from hmc.pose.steps.swarm.fit import FitSettings
 from hmc.pose.steps.swarm.step import SwarmPreset, read_view, swarm_memory, swarm_subject, swarmed, swarmed_near
 from hmc.pose.steps.swarm.temporal import RestartSettings, SwarmSettings, swarm_step
 from hmc.pose.views.person_view import PersonView
 
 __all__ = ["SWARM_PRESETS", "ReadingStart", "pso_method"]
 
-#: Frames of the first window in which a start is tried.
-ANCHORS = 3
 NEEDS = frozenset({"hulls", "voxels"})
 
-#: `hsiao2008` has limits as printed, curves alone, and a start tried beside every frame's fit; in `default` the voxels count too.
-SWARM_PRESETS: dict[str, SwarmPreset] = {
-    "default": SwarmPreset(),
-    "hsiao2008": SwarmPreset(swarm=SwarmSettings(restart=RestartSettings(always=True), voxels=False), thesis=True),
-}
+#: The thesis's system as printed. What it does not print has our value: lengths of the body (average people's, by stature: Table 3-1
+#: names them), t1 to t3, particles and iterations of every stage, how far the temporal constraint reaches, and by how much the start of a
+#: frame must fit better to take the place of the pose that is followed ("some threshold", 3.2.2.5).
+PRINTED = SwarmPreset(
+    reading=ReadingSettings(
+        segmentation=printed_segmentation(),  # 3.1.4.2
+        skeleton=SkeletonSettings(trunk_trim=0.0, trunk_along_axis=False),  # 3.1.5.2: of every part the first eigenvector
+        longest_limb=np.inf,  # no curve is left out for its length,
+        least_limb=0.0,
+        least_curves=2,  # and the trunk's and any other are a body
+        named=False,
+    ),
+    swarm=SwarmSettings(
+        fit=FitSettings(limbs_stay=False),  # 3.2.2.4
+        spin_weight=0.0,  # Eq. 3-27 is all that is minimised
+        rest_weight=0.0,
+        facing_m=0.0,
+        named=False,  # 3.2.2.1: the one-to-one assignment decides which curve is which part
+        restart=RestartSettings(always=True, alone=True, backwards=-np.inf, lost_m=np.inf),  # Figure 3-22
+        voxels=False,
+    ),
+    thesis=True,  # Tables 3-2 and 3-4
+)
+SWARM_PRESETS: dict[str, SwarmPreset] = {"default": SwarmPreset(), "hsiao2008": PRINTED}
 
 
 @dataclass(frozen=True)
 class ReadingStart:
-    """The thesis's start: the frame of the window whose curves show most, and the skeleton fitted to them (section 3.2.2.2).
+    """The thesis's start: the skeleton fitted to the curves of a frame alone (section 3.2.2.2), of the first that can be read.
 
     Parameters
     ----------
@@ -49,29 +69,19 @@ class ReadingStart:
     def __call__(
         self, frame_rng: FrameRng, views: Sequence[PersonView], capture: Capture, height_m: float | None = None
     ) -> StartPose | None:
-        """The thesis's body and the pose in the frame that shows most; None where no frame can be read."""
+        """The thesis's body and the pose in that frame; None where no frame can be read."""
         height_m = height_m or estimate_height([view.target for view in views], capture.floor_z)
         body = thesis_body(height_m)
         model = model_of_body(body, self.preset.thesis)
-        readings = [read_view(view, height_m, self.preset.reading) for view in views]
-        scores = [2 * r.segmentation.whole + 0.2 * len(r.curves) if r is not None and r.status == "read" else -1.0 for r in readings]
-        feet = np.concatenate([np.zeros((0, 3)), *(r.feet for r in readings if r is not None)])
-        # A frame can be misread and look whole: of those that show most, the one whose pose costs least.
-        found = []
-        for k in np.argsort(-np.array(scores), kind="stable")[:ANCHORS].tolist():
-            opening: BodyReading | None = readings[k]
-            if opening is None or scores[k] <= 0:
+        for k, view in enumerate(views):
+            reading = read_view(view, height_m, self.preset.reading)
+            if reading is None:
                 continue
-            # At the start, the feet of the whole window say which way the person faces.
-            opening = replace(opening, feet=feet)
-            swarm, info = swarm_step(frame_rng(k), model, None, opening, capture.fps, views[k].velocity, self.preset.swarm)
+            swarm, _ = swarm_step(frame_rng(k), model, None, reading, capture.fps, view.velocity, self.preset.swarm)
             if swarm is not None:
-                found.append((info.cost_m, k, swarm))
-        if not found:
-            return None
-        _, anchor, best = min(found, key=lambda one: one[0])
-        state = body_state(body, skeleton_landmarks(model, best.state))
-        return StartPose(swarm_subject(body, capture, self.preset), anchor, state, swarm_memory(best))
+                state = body_state(body, skeleton_landmarks(model, swarm.state))
+                return StartPose(swarm_subject(body, capture, self.preset), k, state, swarm_memory(swarm))
+        return None
 
 
 def pso_method(preset: SwarmPreset, house: PosePreset | None = None) -> PoseMethod:

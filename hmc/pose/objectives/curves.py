@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import permutations
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -50,8 +49,8 @@ class SampledCurves:
         Curve and part of the model that may belong together.
     blends : ndarray, shape (q, n, 3)
         The model's node that corresponds to each of the curve's, as shares of the start, the joint and the end of the part.
-    choices : ndarray of int, shape (k, m)
-        Every one-to-one assignment that is allowed: the pair of each curve.
+    choices : ndarray of int, shape (k, r)
+        Every one-to-one assignment of as many curves and parts as go together: its pairs.
     volume : BodyVolume or None
         The voxels, where they count beside the curves.
     """
@@ -64,16 +63,15 @@ class SampledCurves:
     volume: BodyVolume | None = None
 
     def only(self, names: tuple[str, ...]) -> SampledCurves:
-        """Some of the curves, without the voxels: those are of the whole body."""
-        rows = [k for k, name in enumerate(self.names) if name in names]
-        kept = np.flatnonzero(np.isin(self.pairs[:, 0], rows))
-        pairs = np.stack([np.searchsorted(rows, self.pairs[kept, 0]), self.pairs[kept, 1]], axis=1)
-        choices = np.unique(np.searchsorted(kept, self.choices[:, rows]), axis=0)
-        return SampledCurves(tuple(self.names[k] for k in rows), self.nodes[rows], pairs, self.blends[kept], choices)
+        """What may be the parts of some names, without the voxels: those are of the whole body."""
+        kept = np.flatnonzero(np.isin(self.pairs[:, 1], [part for name in names for part in KINDS[name]]))
+        rows, number = np.unique(self.pairs[kept, 0], return_inverse=True)
+        pairs = np.stack([number, self.pairs[kept, 1]], axis=1)
+        return SampledCurves(tuple(self.names[k] for k in rows), self.nodes[rows], pairs, self.blends[kept], best_assignments(pairs))
 
     def parts_of(self, choice: int) -> dict[str, str]:
         """The part of the model that each curve is in an assignment."""
-        return {name: MODEL_PARTS[self.pairs[pair, 1]] for name, pair in zip(self.names, self.choices[choice], strict=True)}
+        return {self.names[curve]: MODEL_PARTS[part] for curve, part in self.pairs[self.choices[choice]].tolist()}
 
 
 def observe_curves(
@@ -94,21 +92,25 @@ def observe_curves(
     n : int
         Nodes of each that count.
     named : bool
-        Whether a curve's name says what it may be: arms stay arms. Else every one-to-one assignment is allowed.
+        Whether a curve's name says what it may be: arms stay arms. Else, as in the thesis, the trunk's is the torso's (it is what no branch
+        has), and of the others every one-to-one assignment to head, arms and legs is allowed; of more than five, the longest count.
     from_tip : bool
         Whether the curve of a limb is that of its outer end and as much of the rest as it is long: a limb's curve begins where it leaves
         the trunk. Else curve and part correspond from end to end, as in the thesis.
     volume : BodyVolume, optional
         The voxels, to count beside the curves.
     """
+    if not named:
+        longest = sorted((name for name in curves if name != "trunk"), key=lambda name: -_length(curves[name]))[: len(MODEL_PARTS) - 1]
+        curves = {name: curve for name, curve in curves.items() if name in ("trunk", *longest)}
     names = tuple(curves)
-    allowed = tuple(KINDS[name] for name in names) if named else (tuple(range(6)),) * len(names)
+    allowed = tuple(KINDS[name] if named or name == "trunk" else tuple(range(1, 6)) for name in names)
     pairs = np.array([(k, part) for k, parts in enumerate(allowed) for part in parts], int).reshape(-1, 2)
     lengths, joints = part_lengths(model), joint_shares(model)
     nodes, blends = np.zeros((len(names), n, 3)), np.zeros((len(pairs), n, 3))
     for k, curve in enumerate(curves.values()):
-        length = float(np.linalg.norm(np.diff(curve, axis=0), axis=1).sum())
-        limb = from_tip and allowed[k][0] >= 2
+        length = _length(curve)
+        limb = from_tip and named and allowed[k][0] >= 2
         # What a curve has beyond the length of the limb is inside the trunk.
         nodes[k] = equally_spaced(curve, n, max(length - lengths[allowed[k][0]], 0.0) if limb else 0.0)
         share = np.clip(length / lengths[allowed[k][0]], LEAST_SHARE, 1.0) if limb else 1.0
@@ -117,13 +119,28 @@ def observe_curves(
             joint = joints[pairs[q, 1]]
             lower, upper = np.clip((at - joint) / (1 - joint), 0, 1), np.clip(at / joint, 0, 1)
             blends[q] = np.stack([1 - upper, upper - lower, lower], axis=1)
-    return SampledCurves(names, nodes, pairs, blends, best_assignments(pairs, allowed), volume)
+    return SampledCurves(names, nodes, pairs, blends, best_assignments(pairs), volume)
 
 
-def curves_of(reading: BodyReading) -> dict[str, np.ndarray]:
-    """The curves of a reading that have a name, legs up to the ankle."""
+def _length(curve: np.ndarray) -> float:
+    return float(np.linalg.norm(np.diff(curve, axis=0), axis=1).sum())
+
+
+def curves_of(reading: BodyReading, named: bool = True, feet: bool = False) -> dict[str, np.ndarray]:
+    """The curves of a reading.
+
+    Parameters
+    ----------
+    reading : BodyReading
+    named : bool
+        Those alone that have a name.
+    feet : bool
+        Legs with the foot, as in the thesis; else up to the ankle.
+    """
     return {
-        part: cut_foot(curve, reading.foot_m)[0] if part[:3] == "leg" else curve for part, curve in reading.curves.items() if part in KINDS
+        part: cut_foot(curve, reading.foot_m)[0] if part[:3] == "leg" and not feet else curve
+        for part, curve in reading.curves.items()
+        if part in KINDS or not named
     }
 
 
@@ -165,17 +182,15 @@ def curves_near(model: SkeletonModel, state: np.ndarray, reading: BodyReading, f
     return found
 
 
-def best_assignments(pairs: np.ndarray, allowed: tuple[tuple[int, ...], ...]) -> np.ndarray:
-    """Every one-to-one assignment of curves to allowed parts, as rows of `pairs`: (k, m)."""
-    row = {(int(k), int(part)): q for q, (k, part) in enumerate(pairs)}
-    if not allowed:
-        return np.zeros((1, 0), int)
-    found = [
-        [row[k, part] for k, part in enumerate(one)]
-        for one in permutations(range(len(MODEL_PARTS)), len(allowed))
-        if all(part in may for part, may in zip(one, allowed, strict=True))
-    ]
-    return np.array(found, int).reshape(-1, len(allowed))
+def best_assignments(pairs: np.ndarray) -> np.ndarray:
+    """Every one-to-one assignment of as many curves and parts as possible, as rows of `pairs` (q, 2): (k, r)."""
+    found: list[list[int]] = [[]]
+    for curve in range(int(pairs[:, 0].max(initial=-1)) + 1):
+        own = np.flatnonzero(pairs[:, 0] == curve).tolist()
+        taken = [{int(pairs[q, 1]) for q in one} for one in found]
+        found = found + [[*one, q] for one, parts in zip(found, taken, strict=True) for q in own if int(pairs[q, 1]) not in parts]
+    most = max(map(len, found))
+    return np.array([one for one in found if len(one) == most], int).reshape(-1, most)
 
 
 def pair_errors(chains: np.ndarray, observed: SampledCurves) -> np.ndarray:

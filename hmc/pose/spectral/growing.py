@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from hmc.pose.spectral.pieces import Branches, PieceSettings, limb_pieces
 
-__all__ = ["Branch", "GrowSettings", "baseline_growing", "ends_near_origin", "grow_branches"]
+__all__ = ["Branch", "GrowSettings", "baseline_growing", "ends_near_origin", "grow_branches", "printed_growing", "trunk_radius"]
 
 
 @dataclass(frozen=True)
@@ -24,14 +24,15 @@ class GrowSettings:
 
     Parameters
     ----------
-    stop : {"origin", "outliers"}
-        "outliers" is Sundaresan's termination, "origin" the modified one.
+    stop : {"origin", "radius", "outliers"}
+        "outliers" is Sundaresan's termination, "radius" the modified one as printed, "origin" ours, where branches end too when they meet.
     first_nodes, next_nodes : int
         P and N: nodes of the first fit, and of each step.
     turn_deg : float
         A new principal direction is taken where it differs by more than this from the old one, degrees.
     origin_radius : float
-        A branch ends where it is nearer to the origin than this, in median distances of the core from the origin, or meets another.
+        A branch ends where it is nearer to the origin than this, in median distances of the core from the origin. The thesis says "a
+        pre-defined threshold".
     pieces : PieceSettings
         When branches meet.
     outlier_error, most_outliers : float, int
@@ -39,10 +40,10 @@ class GrowSettings:
     reach : float
         How far a step looks for the next nodes of a branch, as a share of its first node's distance from the origin.
     most_branches, least_nodes : int
-        How many branches Sundaresan's method takes, and how small they may be.
+        How many branches are grown where they do not meet, and how small they may be.
     """
 
-    stop: Literal["origin", "outliers"] = "origin"
+    stop: Literal["origin", "radius", "outliers"] = "origin"
     first_nodes: int = 14
     next_nodes: int = 14
     turn_deg: float = 10.0
@@ -76,6 +77,11 @@ def baseline_growing() -> GrowSettings:
     return replace(GrowSettings(), stop="outliers", most_branches=6)
 
 
+def printed_growing() -> GrowSettings:
+    """The modified termination as printed, by the distance from the origin alone; five branches and the trunk are the six parts."""
+    return replace(GrowSettings(), stop="radius", most_branches=5)
+
+
 def ends_near_origin(places: np.ndarray, edges: np.ndarray, core: np.ndarray, settings: GrowSettings | None = None) -> Branches:
     """Where branches end: near the origin, or where they meet. Arguments as for `grow_branches`, and:
 
@@ -90,11 +96,18 @@ def ends_near_origin(places: np.ndarray, edges: np.ndarray, core: np.ndarray, se
     """
     settings = settings or GrowSettings()
     far = np.linalg.norm(places, axis=1)
-    trunk = float(np.median(far[core] if core.any() else far))
-    return limb_pieces(edges, far, settings.origin_radius * trunk, settings.pieces)
+    return limb_pieces(edges, far, trunk_radius(places, core, settings), settings.pieces)
 
 
-def grow_branches(places: np.ndarray, pieces: Branches | None = None, settings: GrowSettings | None = None) -> list[Branch]:
+def trunk_radius(places: np.ndarray, core: np.ndarray, settings: GrowSettings) -> float:
+    """How far from the origin branches end; arguments as for `ends_near_origin`."""
+    far = np.linalg.norm(places, axis=1)
+    return settings.origin_radius * float(np.median(far[core] if core.any() else far))
+
+
+def grow_branches(
+    places: np.ndarray, pieces: Branches | None = None, settings: GrowSettings | None = None, radius: float = 0.0
+) -> list[Branch]:
     """All branches of an embedding, the one with the farthest tip first.
 
     Parameters
@@ -102,8 +115,10 @@ def grow_branches(places: np.ndarray, pieces: Branches | None = None, settings: 
     places : ndarray, shape (n, k)
         Of the nodes in the eigenspace.
     pieces : Branches, optional
-        Where branches end (`ends_near_origin`); left out, each ends by Sundaresan's outliers.
+        Where branches end (`ends_near_origin`); left out, each ends by Sundaresan's outliers or near the origin.
     settings : GrowSettings, optional
+    radius : float
+        No branch grows nearer to the origin than this (`trunk_radius`).
 
     Returns
     -------
@@ -119,9 +134,11 @@ def grow_branches(places: np.ndarray, pieces: Branches | None = None, settings: 
             branch = _grow(places[own], far[own], np.ones(len(own), bool), settings)
             branches.append(_with_rest(places[own], branch, own))
         return branches
-    branches, free = [], np.ones(len(places), bool)
+    branches, free = [], far > radius
     while len(branches) < settings.most_branches and np.count_nonzero(free) > settings.first_nodes:
         branch = _grow(places, far, free, settings)
+        if settings.stop == "radius":
+            branch = _with_near(places, branch, free, settings.reach * far[branch.nodes[0]])
         free[branch.nodes] = False
         if len(branch.nodes) >= settings.least_nodes:
             branches.append(branch)
@@ -133,6 +150,16 @@ def _with_rest(places: np.ndarray, branch: Branch, nodes: np.ndarray) -> Branch:
     rest = np.setdiff1d(np.arange(len(nodes)), branch.nodes)
     nearest = cKDTree(places[branch.nodes]).query(places[rest])[1] if len(rest) else rest
     return Branch(nodes[np.concatenate([branch.nodes, rest])], np.concatenate([branch.sites, branch.sites[nearest]]))
+
+
+def _with_near(places: np.ndarray, branch: Branch, free: np.ndarray, reach: float) -> Branch:
+    """A branch with the free nodes beside it: what steps of N nodes left out would be branches of its own."""
+    own = free.copy()
+    own[branch.nodes] = False
+    rest = np.flatnonzero(own)
+    away, nearest = cKDTree(places[branch.nodes]).query(places[rest]) if len(rest) else (np.zeros(0), rest)
+    near = away < reach
+    return Branch(np.concatenate([branch.nodes, rest[near]]), np.concatenate([branch.sites, branch.sites[nearest[near]]]))
 
 
 def _grow(places: np.ndarray, far: np.ndarray, free: np.ndarray, settings: GrowSettings) -> Branch:

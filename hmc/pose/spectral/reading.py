@@ -29,6 +29,8 @@ class ReadingSettings:
         A limb's curve that is shorter than this, over the stature, says too little.
     least_curves : int
         Fewer curves, that of the trunk among them, are no body.
+    named : bool
+        Whether only curves with a name count for that.
     """
 
     segmentation: LimbSegmentationSettings = field(default_factory=LimbSegmentationSettings)
@@ -37,6 +39,7 @@ class ReadingSettings:
     longest_limb: float = 0.75
     least_limb: float = 0.1
     least_curves: int = 3
+    named: bool = True
 
 
 @dataclass(frozen=True)
@@ -118,7 +121,7 @@ def read_body(
         curves[part] = curve
     foot_m = settings.foot_share * height_m
     feet = [cut_foot(curve, foot_m)[1] for part, curve in curves.items() if part[:3] == "leg"]
-    named = [part for part in curves if part[:3] != "oth"]
+    named = [part for part in curves if part[:3] != "oth" or not settings.named]
     status = "read"
     if "trunk" not in curves:
         status = "no trunk found"

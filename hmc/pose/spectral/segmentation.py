@@ -11,12 +11,20 @@ from scipy.spatial import cKDTree
 
 from hmc.pose.spectral.eigenmap import eigenmap
 from hmc.pose.spectral.graph import GraphSettings, VoxelGraph, adjacency, build_graph, core_nodes
-from hmc.pose.spectral.growing import Branch, GrowSettings, baseline_growing, ends_near_origin, grow_branches
+from hmc.pose.spectral.growing import (
+    Branch,
+    GrowSettings,
+    baseline_growing,
+    ends_near_origin,
+    grow_branches,
+    printed_growing,
+    trunk_radius,
+)
 from hmc.pose.spectral.parts import PART_NAMES, BranchShape, branch_shape, name_branches
 from hmc.pose.spectral.pieces import Branches
 from hmc.pose.spectral.touching import contacts, touching_parts
 
-__all__ = ["LimbSegmentationSettings", "Segmentation", "baseline_segmentation", "segment_body"]
+__all__ = ["LimbSegmentationSettings", "Segmentation", "baseline_segmentation", "printed_segmentation", "segment_body"]
 
 
 @dataclass(frozen=True)
@@ -97,6 +105,15 @@ def baseline_segmentation() -> LimbSegmentationSettings:
     return LimbSegmentationSettings(GraphSettings(shrink=0.0), baseline_growing())
 
 
+def printed_segmentation() -> LimbSegmentationSettings:
+    """The modified method as printed (section 3.1.4.2, A-1 to B-3): nodes with all six neighbours shrink, nothing is cut or joined.
+
+    Not printed, and as in ours: the weight of the shrinking (2 in the example of Figure 3-12), a, b, c and the thresholds of Eq. 3-15, P,
+    N, the angle of a new direction and the distance from the origin.
+    """
+    return LimbSegmentationSettings(GraphSettings(core_m=0.0), printed_growing(), bridge_m=0.0, hip_m=0.0)
+
+
 def segment_body(
     voxels: np.ndarray,
     points: np.ndarray,
@@ -147,7 +164,8 @@ def segment_body(
             if trial.labels.max() == 0:
                 graph, places, met = apart, trial.vectors, limbs
                 limbs = ends_near_origin(places, graph.edges, core, settings.grow)
-    branches = grow_branches(places, limbs, settings.grow)
+    radius = trunk_radius(places, core, settings.grow) if settings.grow.stop == "radius" else 0.0
+    branches = grow_branches(places, limbs, settings.grow, radius)
     labels = _labels_of(branches, graph.edges, len(inside))
     shapes = [branch_shape(branch, points[inside], voxel_size_m) for branch in branches]
     rest = points[inside][labels < 0]

@@ -37,6 +37,8 @@ class SkeletonSettings:
         Inner knots of the spline.
     trunk_trim : float
         Share of the trunk's site values left out at either end, where they run off into a shoulder or a hip.
+    trunk_along_axis : bool
+        Whether the trunk's site values are of the eigenvector that goes from the legs to the head; else of the first, as in the thesis.
     least_voxels : int
         Smaller parts have no curve.
     """
@@ -44,6 +46,7 @@ class SkeletonSettings:
     nodes: int = 16
     knots: int = 3
     trunk_trim: float = 0.12
+    trunk_along_axis: bool = True
     least_voxels: int = 12
 
 
@@ -157,7 +160,7 @@ def extract_skeletons(segmentation: Segmentation, points: np.ndarray, settings: 
     curves: dict[str, np.ndarray] = {}
     share = settings.trunk_trim / max(1 - 2 * settings.trunk_trim, 1e-9)
     straight = replace(settings, knots=0)
-    axis = _trunk_axis(segmentation)
+    axis = _trunk_axis(segmentation) if settings.trunk_along_axis else None
     trunk = segmentation.voxels_of("trunk")
     middle = points[trunk].mean(0) if len(trunk) else points.mean(0)
     parts = {part: np.flatnonzero(segmentation.labels == label) for label, part in enumerate(PART_NAMES)}

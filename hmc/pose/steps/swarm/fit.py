@@ -92,6 +92,8 @@ class FitSettings:
     tune_m, tune_rad : float
         How far the first round of fine tuning looks for positions and angles; each further one half as far.
     tune_rounds : int
+    limbs_stay : bool
+        Whether limbs stay where they are while the torso is tuned (`torso_moves`); the thesis does not say.
     """
 
     stages: tuple[tuple[int, int], ...] = ((12, 12), (24, 20), (24, 12), (40, 40), (50, 50))
@@ -101,6 +103,7 @@ class FitSettings:
     tune_m: float = 0.05
     tune_rad: float = 0.6
     tune_rounds: int = 2
+    limbs_stay: bool = True
 
 
 @dataclass(frozen=True)
@@ -267,11 +270,14 @@ def fit_flat(
     start: np.ndarray,
     swarm: PsoSettings,
     spin_range: float = np.pi,
+    weight: float = 0.004,
 ) -> SkeletonFit:
     """All 23 parameters at once, for comparison; arguments as for `fit_hierarchical`."""
     low, high = bounds_around(model, start, 0.25, 4 * np.pi)
     low[6], high[6] = start[6] - spin_range, start[6] + spin_range
-    state, evaluations = _optimise(rng, _Goal(model, observed, Prior(start)), start[None], np.arange(N_PARAMETERS), (low, high), swarm)
+    state, evaluations = _optimise(
+        rng, _Goal(model, observed, Prior(start, weight)), start[None], np.arange(N_PARAMETERS), (low, high), swarm
+    )
     return _fitted(model, observed, state, evaluations)
 
 
@@ -290,7 +296,7 @@ def fine_tune(
         share = 0.5**number
         for free in PARTS:
             box = bounds_around(model, state, share * settings.tune_m, share * settings.tune_rad)
-            moves = torso_moves(model, state) if free == _TORSO else None
+            moves = torso_moves(model, state) if free == _TORSO and settings.limbs_stay else None
             state, more = _optimise(rng, goal, state[None], np.array(free), box, swarm, moves)
             evaluations += more
     return _fitted(model, observed, state, evaluations)

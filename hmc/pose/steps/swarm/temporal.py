@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hmc.body.spin_skeleton import SkeletonModel
-from hmc.pose.objectives.curves import curves_near, curves_of, observe_curves
+from hmc.pose.objectives.curves import SampledCurves, curves_near, curves_of, observe_curves
 from hmc.pose.spectral.reading import BodyReading
 from hmc.pose.steps.swarm.fit import (
     FitSettings,
@@ -38,6 +38,8 @@ class RestartSettings:
     ----------
     always : bool
         Try a start in every frame, as the thesis does.
+    alone : bool
+        A start is of one frame's curves alone, as in the thesis; else the last pose and the heading, by feet and walk, count too.
     doubt_m, doubt_ratio : float
         Else one is tried when the cost is larger than the first, metres, and than the second times the cost that was usual.
     margin_m : float
@@ -51,6 +53,7 @@ class RestartSettings:
     """
 
     always: bool = False
+    alone: bool = False
     doubt_m: float = 0.055
     doubt_ratio: float = 1.4
     margin_m: float = 0.012
@@ -79,10 +82,15 @@ class SwarmSettings:
         By how much facing straight backwards raises the error of a start, metres.
     farthest_m : float
         A curve that is farther than this from every part of the last pose is not taken for one, metres.
+    named : bool
+        Whether a curve's shape says whether it is a head, an arm or a leg, and the nearest part of the last pose once there is one. Else
+        Eq. 3-27's one-to-one assignment alone does, as in the thesis, of curves and parts from end to end, feet with the legs.
+    rest_weight : float
+        How much the pose at rest counts in a start (`Prior`).
     spin_weight : float
         How much a change of the spin from one frame to the next counts, metres a radian.
     restart : RestartSettings or None
-        None: the default ones in `swarm_step`; `fit_near`, for methods that recover in another way, has none.
+        None: every frame has the fit near the last pose; for methods that recover in another way.
     voxels : bool
         Whether the voxels count beside their curves; the thesis fits curves alone, and has no fit where they are not those of a body.
     """
@@ -97,6 +105,8 @@ class SwarmSettings:
     iterations: int = 15
     facing_m: float = 0.02
     farthest_m: float = 0.25
+    named: bool = True
+    rest_weight: float = 0.004
     spin_weight: float = 0.01
     restart: RestartSettings | None = None
     voxels: bool = True
@@ -176,10 +186,12 @@ def start_fits(
     last : ndarray, shape (23,), optional
         The last pose: it is what is likely where curves are missing, as much as `settings.restart` says.
     """
-    observed = observe_curves(model, curves_of(reading), settings.nodes, volume=reading.volume if settings.voxels else None)
+    observed = _observed(model, reading, settings)
     trunk = reading.curves["trunk"]
     rest = rest_state(model, trunk.mean(0), trunk[-1] - trunk[0])
-    weight = 0.004
+    weight = settings.rest_weight
+    if settings.restart is not None and settings.restart.alone:
+        return [fit_hierarchical(rng, model, observed, rest, settings.fit, np.pi, weight)]
     if last is not None:
         rest[6:], weight = last[6:], (settings.restart or RestartSettings()).last_weight
         spins = [last[6], last[6] + np.pi]
@@ -225,15 +237,15 @@ def swarm_step(
     velocity : ndarray, shape (3,), optional
         Of the person's track, metres a second.
     settings : SwarmSettings, optional
-        A restart that is None is the default one: where the fit is doubtful.
+        By default with a restart where the fit is doubtful.
 
     Returns
     -------
     state : SwarmState or None
     info : SwarmInfo
     """
-    settings = settings or SwarmSettings()
-    restart = settings.restart or RestartSettings()
+    settings = settings or SwarmSettings(restart=RestartSettings())
+    restart = settings.restart
     segmentation = reading.segmentation
     doubts = (*segmentation.doubts, *(f"{one} touch" for one in segmentation.touching), *reading.left_out)
     volume = reading.volume if settings.voxels else None
@@ -242,7 +254,7 @@ def swarm_step(
     heading = heading_of(reading.feet, velocity)
     if state is None:
         trials = start_fits(rng, model, reading, heading, settings)
-        first = next((one for one in trials if is_upright(one.state)), None)
+        first = next((one for one in trials if (restart is not None and restart.alone) or is_upright(one.state)), None)
         if first is None:
             return None, SwarmInfo("no fit: no person is upright in the curves", np.nan, False, False, 0, doubts)
         facing = facing_evidence(first.state, heading)
@@ -252,14 +264,14 @@ def swarm_step(
     facing = state.facing + facing_evidence(found.state, heading)
     started = turned = False
     spent = 0
-    backwards = facing < restart.backwards and facing_evidence(found.state, heading) < 0
+    backwards = restart is not None and facing < restart.backwards and facing_evidence(found.state, heading) < 0
     whole = segmentation.whole and reading.status == "read"
     # Parts that were left out because they are far away count here, where the frame shows everything.
     cost_m = found.cost_m
     if whole:
-        cost_m = float(fit_cost(model, found.state[None], observe_curves(model, curves_of(reading), settings.nodes, volume=volume))[0])
-    doubtful = cost_m > max(restart.doubt_m, restart.doubt_ratio * state.usual_m)
-    if reading.status == "read" and (((doubtful or backwards) and whole) or restart.always):
+        cost_m = float(fit_cost(model, found.state[None], _observed(model, reading, settings))[0])
+    doubtful = restart is not None and cost_m > max(restart.doubt_m, restart.doubt_ratio * state.usual_m)
+    if restart is not None and reading.status == "read" and (((doubtful or backwards) and whole) or restart.always):
         trial = start_fits(rng, model, reading, heading, settings, None if backwards else state.state)[0]
         spent = trial.evaluations
         margin = -settings.facing_m if backwards and facing_evidence(trial.state, heading) > 0 else restart.margin_m
@@ -268,7 +280,7 @@ def swarm_step(
             facing = facing_evidence(trial.state, heading)
         elif backwards:
             facing = 0.0
-    if found.cost_m > restart.lost_m:
+    if restart is not None and found.cost_m > restart.lost_m:
         read = reading.status == "read"
         why = FAR if read else reading.status
         error_m = found.error_m if read else np.nan
@@ -300,11 +312,20 @@ def fit_near(
     box = bounds_around(model, state.state, metres, min(radians, np.pi))
     swarm = replace(settings.fit.swarm, particles=settings.particles, iterations=settings.iterations)
     starts = np.stack([state.state, state.state + state.velocity])
-    near = curves_near(model, state.state, reading, settings.farthest_m)
-    observed = observe_curves(model, near, settings.nodes, volume=reading.volume if settings.voxels else None)
+    near = curves_near(model, state.state, reading, settings.farthest_m) if settings.named else None
+    observed = _observed(model, reading, settings, near)
     found = fit_around(rng, model, observed, starts, box, swarm, prior)
     tuned = fine_tune(rng, model, observed, found.state, settings.fit, prior)
     return replace(tuned, evaluations=found.evaluations + tuned.evaluations)
+
+
+def _observed(
+    model: SkeletonModel, reading: BodyReading, settings: SwarmSettings, curves: dict[str, np.ndarray] | None = None
+) -> SampledCurves:
+    """The curves of a reading, or those given, and where they count its voxels, as a fit wants them."""
+    named = settings.named
+    curves = curves_of(reading, named, feet=not named) if curves is None else curves
+    return observe_curves(model, curves, settings.nodes, named, named, reading.volume if settings.voxels else None)
 
 
 def is_upright(state: np.ndarray) -> bool:
