@@ -7,6 +7,7 @@ on CLEAR 2007; they are repeated as printed, except for the naive row's mismatch
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 from hmc.experiments import table_4_3
 from hmc.experiments import tracking_runs as runs
@@ -55,9 +56,9 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     empty: dict[str, Any] = {"MOTA_low": None, "MOTA_high": None, "centroid_MOTP_mm": None}
     nothing: dict[str, Any] = {"preset": "", "chosen": "", "best_case": "", "runs": None}
     rows += [{"method": name} | nothing | _columns((None,) * 5, paper) | empty for name, paper in OTHERS.items()]
-    names = ", ".join(source.name for source in runs.sources(plan))
+    recordings = ", ".join(source.name for source in runs.sources(plan))
     caption = (
-        f"Each tracker's best case, against the heads, on {names}: the configuration that is the paper's best, at the finest voxels that "
+        f"Each tracker's best case, against the heads, on {recordings}: the configuration that is the paper's best, at the finest voxels that "
         "were run, and the best one here, which is chosen on the same clips. The paper's (Canton, Table 4.4) on CLEAR 2007."
     )
     return Report((Table("table-4.4", caption, rows),), {}, tuple(claims))
