@@ -214,9 +214,9 @@ def test_what_a_report_says_of_the_input_is_told_as_it_is(toy, tmp_path, error, 
 
 def test_computing_again_gives_the_same(toy, tmp_path):
     run_experiment(str(toy), tmp_path)
-    before = files_of(tmp_path / "cells")
+    before = cells_of(tmp_path)
     assert run_experiment(str(toy), tmp_path, again=True).computed == 12
-    assert files_of(tmp_path / "cells") == before
+    assert cells_of(tmp_path) == before
 
 
 def test_keys_depend_on_values_alone(toy):
