@@ -58,8 +58,8 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     rows += [{"method": name} | nothing | _columns((None,) * 5, paper) | empty for name, paper in OTHERS.items()]
     recordings = ", ".join(source.name for source in runs.sources(plan))
     caption = (
-        f"Each tracker's best case, against the heads, on {recordings}: the configuration that is the paper's best, at the finest voxels that "
-        "were run, and the best one here, which is chosen on the same clips. The paper's (Canton, Table 4.4) on CLEAR 2007."
+        f"Each tracker's best case, against the heads, on {recordings}: the configuration that is the paper's best, at the finest "
+        "voxels that were run, and the best one here, which is chosen on the same clips. The paper's (Canton, Table 4.4) on CLEAR 2007."
     )
     return Report((Table("table-4.4", caption, rows),), {}, tuple(claims))
 

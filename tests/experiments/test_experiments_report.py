@@ -166,6 +166,16 @@ def test_counts_tell_the_scopes_apart(tmp_path):
         assert told in words
 
 
+def test_a_run_of_earlier_cells_is_no_longer_told(out, tmp_path):
+    shutil.copytree(out / "fig-B.1-quick", tmp_path / "fig-B.1-quick")
+    path = tmp_path / "fig-B.1-quick" / "run.toml"
+    version = find_experiment("fig-B.1").version
+    for told, verdict in ((version, HOLDS), (version + 1, NOT_RUN)):
+        text = re.sub(r"(?m)^cells_version = .*\n", "", path.read_text(encoding="utf-8"))
+        path.write_text(text.replace("[parameters]\n", f"[parameters]\ncells_version = {told}\n"), encoding="utf-8")
+        assert next(row for row in summarise(tmp_path) if row.entry.id == "fig-B.1").verdict == verdict
+
+
 def test_page_is_whole_and_needs_nothing_beside_it(out):
     rows = summarise(out)
     page = Reader(to_html(rows))

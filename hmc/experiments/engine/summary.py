@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from hmc.errors import InputError
 from hmc.experiments.engine.catalogue import CATALOGUE, OWN_REASONS, UNKNOWN, Entry
-from hmc.experiments.engine.experiment import Claim, Plan, Source
+from hmc.experiments.engine.experiment import Claim, Experiment, Plan, Source
 from hmc.experiments.engine.library import EXPERIMENTS, find_experiment
 from hmc.experiments.engine.writing import report_folder
 from hmc.io.results import read_run
@@ -108,7 +108,7 @@ def summarise(out: Path) -> list[Row]:
     Parameters
     ----------
     out : Path
-        Folder of the reports, as `run` wrote them.
+        Folder of the reports, as `run` wrote them; those of cells of an earlier version are left out.
 
     Returns
     -------
@@ -136,7 +136,8 @@ def _row(out: Path, entry: Entry) -> Row:
     results = []
     for own in ((), (Source("any@0"),)):
         folders = [report_folder(out, experiment, Plan(quick, own, seeds)) for seeds in (None, 1) for quick in (False, True)]
-        found = [_result(folder) for folder in folders if (folder / "run.toml").is_file()]
+        runs = [(folder, read_run(folder / "run.toml")) for folder in folders if (folder / "run.toml").is_file()]
+        found = [_result(folder, run) for folder, run in runs if not _is_old(experiment, run)]
         results += sorted(found, key=lambda run: SCOPES.index(run.scope))[:1]
     if not results:
         return Row(entry, NOT_RUN)
@@ -151,8 +152,13 @@ def _verdict(entry: Entry, run: StoredRun) -> str:
     return REPRODUCED if run.scope == IN_FULL and entry.work != OURS else HOLDS
 
 
-def _result(folder: Path) -> StoredRun:
-    run = read_run(folder / "run.toml")
+def _is_old(experiment: Experiment, run: Mapping[str, Any]) -> bool:
+    """Whether a run is of cells of an earlier version, which no longer hold."""
+    version = run.get("parameters", {}).get("cells_version")
+    return version is not None and version != experiment.version
+
+
+def _result(folder: Path, run: Mapping[str, Any]) -> StoredRun:
     parameters: dict[str, Any] = run.get("parameters", {})
     try:
         claims = tuple(Claim(one["claim"], one["holds"], one.get("detail", "")) for one in run.get("claims", []))
