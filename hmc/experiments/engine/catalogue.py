@@ -174,7 +174,7 @@ CATALOGUE = (
     ),
     Entry(
         "hsiao-3.8", HSIAO, "visual hull from 8 and from 4 cameras", "ghost legs with 4", _OWN_VIDEOS,
-        "Its four cameras are the first of the eight, and so are ours now; before, every second one gave no third leg at the shanks.",
+        "Its four cameras are the first of the eight, and so are ours. Who waves has no third leg with these, nor with every second one.",
     ),
     Entry(
         "hsiao-3.15", HSIAO, "segmentation into parts: Sundaresan's and the modified eigenmap", "trunk found, left arm found", _OWN_VIDEOS,
