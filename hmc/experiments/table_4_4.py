@@ -33,7 +33,7 @@ COLUMNS = ("MOTP_mm", "MOTA_percent", "FP_percent", "miss_percent", "mismatch_pe
 
 def report(cells: Sequence[Cell], plan: Plan) -> Report:
     """The paper's best cases, on which it is decided, and the best cases here, by MOTA and then by MOTP."""
-    groups, rows, claims = table_4_3.groups(cells), [], list[Claim]()
+    groups, rows, claims = table_4_3.groups(cells), list[dict](), list[Claim]()
     for preset in runs.PRESETS:
         printed = {family: _printed_case(preset, family, groups) for family in PAPER}
         for family, paper in PAPER.items():
@@ -44,16 +44,20 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
                 score, between = own[key], score_interval(groups[key], "MOTA")
                 ours = (score.motp_mm, *(100 * rate for rate in (score.mota, score.false_positives, score.misses, score.mismatches)))
                 case = f"{100 * voxel:g} cm" + (f", {n}, {'color' if method.endswith('color') else 'raw'}" if n else "")
-                names = {"method": family, "preset": preset, "chosen": chosen, "best_case": case, "runs": len(groups[key])}
-                rows.append(names | _columns(ours, paper) | {"MOTA_low": between.low, "MOTA_high": between.high,
-                            "centroid_MOTP_mm": score.centroid_motp_mm})  # fmt: skip
+                rows.append(
+                    {
+                        "method": family, "preset": preset, "chosen": chosen, "best_case": case, "runs": len(groups[key]),
+                        **_columns(ours, paper),
+                        "MOTA_low": between.low, "MOTA_high": between.high, "centroid_MOTP_mm": score.centroid_motp_mm,
+                    }
+                )  # fmt: skip
         for better, worse in (("SS", "PF"), ("PF", "naive")):
             first, second = (groups[printed[family]] for family in (better, worse))
             by = ("recording",) if worse == "naive" else ("recording", "repeat")
             claims += [ahead(f"{preset}: {better} ahead of {worse} in {score}", first, second, score, by) for score in ("MOTA", "MOTP")]
     empty = {"MOTA_low": None, "MOTA_high": None, "centroid_MOTP_mm": None}
     rows += [
-        {"method": name, "preset": "", "chosen": "", "best_case": "", "runs": None} | _columns((None,) * 5, paper) | empty
+        {"method": name, "preset": "", "chosen": "", "best_case": "", "runs": None, **_columns((None,) * 5, paper), **empty}
         for name, paper in OTHERS.items()
     ]
     names = ", ".join(source.name for source in runs.sources(plan))

@@ -133,7 +133,7 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
 
 def errors_of(tracks: TrackTable, truth: TrackTable) -> Results:
     """What CLEAR MOT counts, against each of `REFERENCES`."""
-    places = {"head": truth.heads, "centroid": truth.positions}
+    places = {"head": truth.positions if truth.heads is None else truth.heads, "centroid": truth.positions}
     scores = {name: evaluate_tracks(tracks, replace(truth, positions=places[name])) for name in REFERENCES}
     return {
         name: {

@@ -74,8 +74,8 @@ CATALOGUE = (
         "table-4.2", CANTON, "seven person classifiers",
         "F: decision tree .988, the best; mixture of 12 .897, Parzen .880, PCA .438, K-means .383, neural network and Gaussian .035",
         _CLEAR,
-        "With standardised features the network and the Gaussian work; in the thesis they take nearly everything for a person (recall .90 at "
-        "a precision of .018).",
+        "With standardised features the network and the Gaussian work; in the thesis they take nearly everything for a person (recall .90 "
+        "at a precision of .018).",
     ),
     Entry(
         "fig-4.4", CANTON, "the decision tree", "is built of weight, height and the bounding box", _CLEAR,
