@@ -17,6 +17,7 @@ import numpy as np
 from hmc.body.inverse import fit_landmarks
 from hmc.body.proportions import canton_body
 from hmc.body.scalable_models import PRINTED_1, PRINTED_2
+from hmc.errors import InputError
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs
 from hmc.experiments.markerless_runs import FRONTEND, MASKS_KEY, VOXEL_M, action_sources, tracked
@@ -70,7 +71,8 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
     counts, drifts = [], []
     for hull in hulls:
         pose, info = step(rng, pose, views_of(recording, room_grid, truth_track(truth), hull)[0])
-        assert info.structural is not None
+        if info.structural is None:
+            raise InputError(f"{parameters['recording']}: frame {hull.index} shows nobody, and figure 7.8 reads off what the filter does")
         layers = [layer for model in info.structural.layers for layer in model]
         counts.append([layer.evaluations for layer in layers])
         drifts.append([layer.drift for layer in layers])

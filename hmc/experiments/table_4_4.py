@@ -46,9 +46,13 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
                 score, between = own[key], score_interval(groups[key], "MOTA")
                 ours = (score.motp_mm, *(100 * rate for rate in (score.mota, score.false_positives, score.misses, score.mismatches)))
                 case = f"{100 * voxel:g} cm" + (f", {n}, {'color' if method.endswith('color') else 'raw'}" if n else "")
-                names = {"method": family, "preset": preset, "chosen": chosen, "best_case": case, "runs": len(groups[key])}
-                rows.append(names | _columns(ours, paper) | {"MOTA_low": between.low, "MOTA_high": between.high,
-                            "centroid_MOTP_mm": score.centroid_motp_mm})  # fmt: skip
+                rows.append(
+                    {
+                        "method": family, "preset": preset, "chosen": chosen, "best_case": case, "runs": len(groups[key]),
+                        **_columns(ours, paper),
+                        "MOTA_low": between.low, "MOTA_high": between.high, "centroid_MOTP_mm": score.centroid_motp_mm,
+                    }
+                )  # fmt: skip
         for better, worse in (("SS", "PF"), ("PF", "naive")):
             first, second = (groups[printed[family]] for family in (better, worse))
             by = ("recording",) if worse == "naive" else ("recording", "repeat")
