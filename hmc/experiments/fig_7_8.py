@@ -70,8 +70,7 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
     counts, drifts = [], []
     for hull in hulls:
         pose, info = step(rng, pose, views_of(recording, room_grid, truth_track(truth), hull)[0])
-        assert info.structural is not None
-        layers = [layer for model in info.structural.layers for layer in model]
+        layers = [layer for model in (info.structural.layers if info.structural else ()) for layer in model]
         counts.append([layer.evaluations for layer in layers])
         drifts.append([layer.drift for layer in layers])
     moved = np.sqrt(np.mean(np.square(drifts), axis=0))
