@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import matplotlib.pyplot as plt
 import numpy as np
 
+from hmc.errors import InputError
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs
 from hmc.experiments.five_actions import action_recipes
@@ -20,7 +21,7 @@ from hmc.experiments.run_means import gains, mean_interval
 from hmc.experiments.truth import first_truth
 from hmc.io.masks import kept_masks
 from hmc.io.recording import iterate_frames
-from hmc.synthetic.scene import build_scene
+from hmc.synthetic.scene import Scene, build_scene
 from hmc.synthetic.truth import true_colors
 from hmc.tracking.resumable import person_grid
 from hmc.voxels.color import color_voxels, visibility
@@ -40,7 +41,9 @@ GAMMA, LEAST = 2.2, 1e-3
 
 def grid(plan: Plan) -> list[dict]:
     """Some frames of the five actions by both actors (quick: by the actors in turn), as shares of the length."""
-    sources = [source for k, source in enumerate(action_sources(Plan(plan.quick))) if not plan.quick or k % 2 == k // 2 % 2]
+    sources = action_sources(plan)
+    if plan.quick and not plan.recordings:
+        sources = [source for k, source in enumerate(sources) if k % 2 == k // 2 % 2]
     return [{"recording": source.label, "at": at} for source in sources for at in ((0.2, 0.8) if plan.quick else (0.1, 0.3, 0.5, 0.7, 0.9))]
 
 
@@ -64,13 +67,20 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
     points = around.centres(shell)
     rig = seen.recording.rig
     colors = {"plain": color_voxels(around, rig, images, shell), "visible": color_voxels(around, rig, images, shell, sight)}
-    name = parameters["recording"].rpartition("@")[0]
-    scene = build_scene(next(recipe for recipe in action_recipes() if recipe.name == name))
-    paint = true_colors(scene, frame, points)
+    paint = true_colors(_scene_of(parameters["recording"]), frame, points)
     known = np.isfinite(colors["visible"]).all(axis=1) & np.isfinite(colors["plain"]).all(axis=1)
     angles = {way: float(angles_deg((own[known] / 255) ** GAMMA, paint[known]).mean()) for way, own in colors.items()}
     picture = {"points": points[known], "paint": paint[known] ** (1 / GAMMA)} | {way: own[known] / 255 for way, own in colors.items()}
     return {"voxels": int(known.sum()), "angle_deg": angles, "shown": picture if parameters["at"] < 0.25 else None}
+
+
+def _scene_of(label: str) -> Scene:
+    """The scene of a rendered recording, which knows how the actor is painted."""
+    name = label.rpartition("@")[0]
+    for recipe in action_recipes():
+        if recipe.name == name:
+            return build_scene(recipe)
+    raise InputError(f"{name}: the true colors of a body are known of rendered actions only; leave --recordings out")
 
 
 def angles_deg(colors: np.ndarray, paint: np.ndarray) -> np.ndarray:

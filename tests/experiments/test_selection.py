@@ -77,7 +77,7 @@ def test_what_an_experiment_does_not_have_is_told(changes, message):
 
 
 def test_experiments_without_seeds_or_recordings_say_so():
-    plan = find_experiment("fig-7.8")
+    plan = find_experiment("fig-4.4")
     with pytest.raises(InputError, match="leave --seeds out"):
         grid_of(plan, changed_plan(Plan(), 3))
     with pytest.raises(InputError, match="leave --actions out"):

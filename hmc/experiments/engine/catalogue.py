@@ -169,7 +169,7 @@ CATALOGUE = (
     ),
     Entry(
         "fig-B.1", CANTON, "compactness of a rotated square", "84 % of the pixels at 45 degrees with alpha 1; alpha .7 restores them",
-        why="How many pixels are left depends on the square's side and on where it lies: 83.1 to 83.2 % on average over places (a row a "
+        why="How many pixels are left depends on the square's side and on where it lies: 83.2 to 83.3 % on average over places (a row a "
         "side), 84.2 and 84.3 % of squares of 31 and 41 pixels with their middle on a pixel's.",
     ),
     Entry(
