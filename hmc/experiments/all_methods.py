@@ -180,4 +180,4 @@ def _draw(rows: Sequence[dict[str, Any]]) -> plt.Figure:
     return figure
 
 
-EXPERIMENT = Experiment("all-methods", "all pose methods side by side", "ours; README.md", grid, cell, report, version=3)
+EXPERIMENT = Experiment("all-methods", "all pose methods side by side", "ours; README.md", grid, cell, report, version=4)
