@@ -168,4 +168,4 @@ def _printed_spread(models: int, layers: int, model: int) -> float:
     return 0.8**later * 0.5 ** (layers * later + layers - 1)
 
 
-EXPERIMENT = Experiment("fig-7.8", "effective particles and spread by model", "Canton, Figure 7.8", grid, cell, report, version=2)
+EXPERIMENT = Experiment("fig-7.8", "effective particles and spread by model", "Canton, Figure 7.8", grid, cell, report, version=3)

@@ -35,7 +35,7 @@ __all__ = [
 
 FAMILY = "pose"
 #: Of these cells.
-VERSION = 3
+VERSION = 4
 #: Methods and what figures call them.
 METHODS = {
     "canton2009": "markerless, the thesis's parameters",
