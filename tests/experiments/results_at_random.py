@@ -20,10 +20,16 @@ from hmc.experiments.fig_4_2 import RANGES
 from hmc.experiments.fig_4_9 import SHOWN as SHOWN_STEPS
 from hmc.experiments.fig_4_9 import STEPS
 from hmc.experiments.fig_6_11 import PANELS, SIDE
+from hmc.experiments.fig_7_8 import MODELS as HIERARCHIES
+from hmc.experiments.fig_b_1 import SHOWN as SHOWN_SQUARES
+from hmc.experiments.filter_study import CHAINS, MARKERS
 from hmc.experiments.hiding import ENDS
+from hmc.experiments.hsiao_3_15 import MODIFIED, OURS, SCORES, SUNDARESAN
 from hmc.experiments.hsiao_pso import METHODS as OPTIMISERS
 from hmc.experiments.kehl_4 import THRESHOLDS
-from hmc.experiments.toy_likelihood import BOUNDS
+from hmc.experiments.kehl_9 import METHODS as SAMPLINGS
+from hmc.experiments.toy_likelihood import BOUNDS, drawn_peaks
+from hmc.experiments.tracking_runs import REFERENCES
 from hmc.landmarks import LANDMARKS
 from hmc.pose.spectral.parts import PART_NAMES
 from hmc.tracking.person_tree import LEAF, default_tree
@@ -57,11 +63,26 @@ def pose(rng, parameters, noise):
         off = 10 ** rng.uniform(-2, 0.5, (FRAMES, 1, 1))
     else:  # a fifth of the landmarks is lost
         off = amount(rng, noise, 0.02) * np.where(rng.random(truth.shape[:2]) < 0.2 * rng.random(), 8, 1)[..., None]
-    gone = {"gone": GONE if parameters["gone_s"] else []} if "gone_s" in parameters else {}
-    return {
-        "frames": np.arange(FRAMES), "fps": FPS, "estimate_m": truth + off * rng.normal(size=truth.shape), "truth_m": truth,
-        "filter_s_per_frame": amount(rng, noise, 0.1), "frame_s": amount(rng, noise, 0.1), "problem": "",
-    } | gone  # fmt: skip
+    return {"frames": np.arange(FRAMES), "fps": FPS, "estimate_m": truth + off * rng.normal(size=truth.shape), "truth_m": truth}
+
+
+def marked(rng, parameters, noise):
+    return pose(rng, parameters, noise) | {"problem": ""}
+
+
+def filtered(rng, parameters, noise):
+    if parameters["method"] in MARKERS:
+        return marked(rng, parameters, noise)
+    times = {} if parameters["method"] in CHAINS else {"filter_s_per_frame": float(amount(rng, noise, 0.1))}
+    return pose(rng, parameters, noise) | times
+
+
+def timed(rng, parameters, noise):
+    return pose(rng, parameters, noise) | {"frame_s": float(amount(rng, noise, 0.1))}
+
+
+def unseen(rng, parameters, noise):
+    return pose(rng, parameters, noise) | {"gone": GONE if parameters["gone_s"] else []}
 
 
 def descended(rng, parameters, noise):
@@ -70,8 +91,15 @@ def descended(rng, parameters, noise):
 
 
 def swarmed(rng, parameters, noise):
-    counts = {name: int(rng.integers(FRAMES // 2)) for name in ("restarts", "turned", "without_fit")}
-    return pose(rng, parameters, noise) | {"frames": FRAMES, "error_mm": amount(rng, noise, 40.0, FRAMES)} | counts
+    counts = {name: int(rng.integers(FRAMES // 2)) for name in ("restarts", "without_fit")}
+    rates = {"evaluations_per_frame": float(amount(rng, noise, 9000.0)), "seconds_per_frame": float(amount(rng, noise, 0.5))}
+    found = pose(rng, parameters, noise)
+    estimate, truth = found["estimate_m"], found["truth_m"]
+    if noise:  # bodies that face anywhere
+        turns = np.exp(1j * rng.uniform(0, 2 * np.pi, (FRAMES, 1)))
+        turned = turns * (estimate[..., 0] + 1j * estimate[..., 1])
+        estimate = np.stack([turned.real, turned.imag, estimate[..., 2]], axis=-1)
+    return {"estimate_m": estimate, "truth_m": truth, "frames": FRAMES} | counts | rates
 
 
 def behind_furniture(rng, parameters, noise):
@@ -90,9 +118,21 @@ def lost_arm(rng, parameters, noise):
 
 
 def peaks(rng, parameters, noise):
-    layers = [{"x": rng.uniform(*BOUNDS, 100), "weight": np.full(100, 0.01)} for _ in range(3)]
-    estimate = rng.uniform(*BOUNDS) if noise else rng.choice([5.5, -0.5, -4.5]) + 0.1 * rng.normal()
-    return {"estimate": float(estimate), "layers": layers if parameters["repeat"] == 0 else []}
+    layers = [{"x": rng.uniform(*BOUNDS, 100), "weight": np.full(100, 0.01)} for _ in range(parameters["layers"])]
+    # As it is of any function: on one of its peaks.
+    places = [place for _, place, _ in drawn_peaks(int(rng.integers(12)))]
+    estimate = rng.uniform(*BOUNDS) if noise else rng.choice(places) + 0.1 * rng.normal()
+    return {"estimate": float(estimate), "layers": layers if parameters["repeat"] == parameters["function"] == 0 else []}
+
+
+def colored(rng, parameters, noise):
+    angles = {way: float(amount(rng, noise, 10.0)) for way in ("plain", "visible")}
+    picture = {name: rng.random((50, 3)) for name in ("points", "paint", *angles)}
+    return {"voxels": 50, "angle_deg": angles, "shown": picture if parameters["at"] < 0.25 else None}
+
+
+def over_annealed(rng, parameters, noise):
+    return {"score": float(rng.random()), "mean_error": float(amount(rng, noise, 0.5))}
 
 
 def components(rng, parameters, noise):
@@ -105,7 +145,11 @@ def components(rng, parameters, noise):
 
 def classified(rng, parameters, noise):
     scores = {name: float(rng.random() if noise else rng.choice([0.98, 0.92, 0.8])) for name in ("precision", "recall", "f_measure")}
-    return scores | {f"{part}_{label}": int(rng.integers(1, 999)) for part in ("train", "test") for label in ("people", "others")}
+    # Of every recording: either as good as the run is, or anything.
+    n = len(parameters["test"])
+    both, shares = rng.integers(50, 400, n), rng.random(n) if noise else np.full(n, scores["f_measure"])
+    counts = {f"{part}_{label}": int(rng.integers(1, 999)) for part in ("train", "test") for label in ("people", "others")}
+    return scores | counts | {"by_recording": [[round(share * total), total] for share, total in zip(shares, both.tolist(), strict=True)]}
 
 
 def tree(rng, parameters, noise):
@@ -121,21 +165,37 @@ def ellipsoid(rng, parameters, noise):
 def samples(rng, parameters, noise):
     spread = amount(rng, noise, 0.6, STEPS + 1) if noise else amount(rng, noise, 0.6) * np.ones(STEPS + 1)
     shown = {str(step): rng.uniform(-1, 1, (400, 3)) for step in SHOWN_STEPS}
-    return {"spread": spread, "error_mm": amount(rng, noise, 50.0, STEPS + 1), "n_samples": [400] * (STEPS + 1), "shown_m": shown}
+    return {"spread": spread, "error_mm": amount(rng, noise, 50.0, STEPS + 1), "n_samples": [400] * (STEPS + 1),
+            "shown_m": shown if parameters["repeat"] == 0 else {}}  # fmt: skip
+
+
+def errors_of_tracks(rng, noise):
+    """What CLEAR MOT counts; few are lost, or anything up to everybody."""
+    usual = {"misses": 400 if noise else 30, "false_positives": 400 if noise else 30, "mismatches": 3}
+    counts = {name: int(amount(rng, noise, size)) for name, size in usual.items()}
+    matches = max(800 - counts["misses"], 1)
+    return counts | {"objects": 800, "matches": matches, "distance_m": float(matches * amount(rng, noise, 0.1))}
 
 
 def tracks(rng, parameters, noise):
-    counts = {name: int(amount(rng, noise, usual)) for name, usual in (("misses", 30), ("false_positives", 30), ("mismatches", 3))}
-    matches = int(amount(rng, noise, 700)) + 1
     times = {"filter_s": float(amount(rng, noise, 2.0)), "color_s": float(amount(rng, noise, 1.0))}
-    return counts | times | {"objects": 800, "matches": matches, "distance_m": float(matches * amount(rng, noise, 0.1)),
-                             "frames": 300, "fps": 15.0, "rows": 800}  # fmt: skip
+    return {name: errors_of_tracks(rng, noise) for name in REFERENCES} | times | {"frames": 300, "fps": 15.0, "rows": 800}
 
 
 def crossing(rng, parameters, noise):
     plain = {"frames": np.arange(10), "persons": np.zeros(10, int), "positions": rng.uniform(-1, 1, (10, 3))}
-    counts = {"mismatches": int(rng.integers(0, 9 if noise else 3)), "wrong": int(rng.integers(90)), "persons": int(rng.integers(1, 5))}
-    return counts | {"objects": 100, "tracks": plain, "truth": plain}
+    kept = {"tracks": plain, "truth": plain} if parameters["repeat"] == 0 else {}
+    counts = {"rows": 200, "filter_s": float(amount(rng, noise, 2.0)), "persons": int(rng.integers(1, 5))}
+    return {name: errors_of_tracks(rng, noise) for name in REFERENCES} | counts | kept
+
+
+def behind(rng, parameters, noise):
+    """Who walks may be far behind, or hardly; or anywhere around."""
+    standing, walking = rng.integers(50, 500, 2).tolist()
+    walking_m = float(walking * amount(rng, noise, 0.1))
+    share = rng.uniform(-1, 1) if noise else rng.choice([0.8, 0.1])
+    return {"standing": standing, "standing_m": float(standing * amount(rng, noise, 0.05)), "walking": walking, "walking_m": walking_m,
+            "behind_m": float(share * walking_m)}  # fmt: skip
 
 
 def maps(rng, parameters, noise):
@@ -149,15 +209,22 @@ def maps(rng, parameters, noise):
 
 
 def schedule(rng, parameters, noise):
-    particles = rng.permutation([300, 300, 500]) if not noise else rng.integers(100, 900, 3)
-    return {"particles": particles, "effective": rng.permutation(2 * particles), "spread": rng.random((6, 3)), "layers": 2}
+    """Layers and models of the filter in any order."""
+    group = HIERARCHIES[parameters["model"]].group
+    models, layers = int(group.max()) + 1, 2
+    falls = [0.5**step for step in range(layers * models)]
+    moved = np.column_stack([np.r_[np.zeros(layers * k), falls[: layers * (models - k)]] for k in range(models)])
+    drift_of_model, evaluations = rng.permutation(moved.ravel()).reshape(moved.shape), rng.permutation(np.repeat([300, 500, 300], layers))
+    if noise:
+        drift_of_model, evaluations = amount(rng, noise, 0.3, moved.shape) + 1e-9, rng.integers(100, 900, layers * models)
+    return {"evaluations": evaluations, "drift": drift_of_model[:, group], "drift_of_model": drift_of_model, "group": group}
 
 
 def square(rng, parameters, noise):
-    angles = np.arange(0, 91, 3.0)
+    angles = np.arange(0, 90 + 1e-9, parameters["step_deg"])
     left = rng.random(len(angles)) if noise else np.full(len(angles), rng.uniform(0.8, 1.0))
-    return {"angle_deg": angles, "area_left": left, "holes": np.maximum(amount(rng, noise, 0.1, len(angles)) - 0.1, 0),
-            "picture": rng.integers(-25, 25, (300, 2))}  # fmt: skip
+    picture = rng.integers(-25, 25, (300 if parameters["alpha"] in SHOWN_SQUARES else 0, 2))
+    return {"angle_deg": angles, "area_left": left, "holes": np.maximum(amount(rng, noise, 0.1, len(angles)) - 0.1, 0), "picture": picture}
 
 
 def ghosts(rng, parameters, noise):
@@ -166,16 +233,19 @@ def ghosts(rng, parameters, noise):
 
 
 def parts(rng, parameters, noise):
-    shares = rng.random((6, 6)) if noise else np.clip(amount(rng, noise, 0.75, (6, 6)), 0, 1)
-    rows = np.column_stack([np.arange(6), rng.integers(0, 2, 6), shares[:, :3], rng.integers(0, 2, 6), shares[:, 3:5]])
-    n, truth = 200, _truth(0)[0]
-    names = [name for name in PART_NAMES if rng.random() < 0.5]
+    n, ways, truth = 6, (MODIFIED, OURS, SUNDARESAN), _truth(0)[0]
+    shape = (n, len(ways), 4)
+    shares = rng.random(shape) if noise else np.clip(amount(rng, noise, 0.75, shape), 0, 1)
+    scores = np.concatenate([shares, amount(rng, noise, 0.06, (n, len(ways), len(SCORES) - 4))], axis=2)
     near = 1.0 if noise else 0.1
-    curves = {name: truth[rng.choice(15, 5)] + near * rng.normal(size=(5, 3)) for name in names}
-    shown = {name: rng.normal(size=(n, 3)) for name in ("points", "places", "plain_places")}
-    shown |= {name: rng.integers(0, 6, n) for name in ("ours", "baseline")}
-    shown |= {"joints": truth, "curves": curves, "plain_curves": curves}
-    return {"rows": rows, "shown": shown}
+
+    def picture():
+        names = [name for name in PART_NAMES if rng.random() < 0.5]
+        curves = {name: truth[rng.choice(15, 5)] + near * rng.normal(size=(5, 3)) for name in names}
+        return {"labels": rng.integers(-1, len(PART_NAMES) + 1, 200), "places": rng.normal(size=(200, 3)), "curves": curves}
+
+    shown = {"points": rng.normal(size=(200, 3)), "joints": truth, "ways": {way: picture() for way in ways}}
+    return {"frames": list(range(n)), "apart": rng.integers(0, 2, n).tolist(), "scores": scores, "shown": shown}
 
 
 def optimised(rng, parameters, noise):
@@ -184,33 +254,35 @@ def optimised(rng, parameters, noise):
 
 
 def carved(rng, parameters, noise):
-    times = {name: float(amount(rng, noise, 5.0)) for name in ("incremental", "scratch", "blocks", "texturing")}
+    names = ("incremental", "scratch", "blocks", "texturing")
+    usual = {name: 5.0 if noise else float(amount(rng, noise, 5.0)) for name in names}
+    times = {name: amount(rng, noise, size, parameters["frames"]).tolist() for name, size in usual.items()}
     return {"ms": times, "identical": bool(rng.random() < 0.5), "surface_voxels": int(rng.integers(100, 9999))}
 
 
 def edges(rng, parameters, noise):
-    def curve():
-        return rng.random(14) if noise else np.sort(rng.random(14))[::-1]
+    def curve(name):
+        n = len(THRESHOLDS[name])
+        return rng.random(n) if noise else np.sort(rng.random(n))[::-1]
 
-    recall = {name: np.maximum(curve(), 0.01) for name in THRESHOLDS}
+    hits = {name: np.round(1000 * curve(name)) for name in THRESHOLDS}
     image = rng.integers(0, 255, (40, 40, 3))
-    return {"recall": recall, "clutter_px": {name: 100 * curve() for name in THRESHOLDS}, "images": 9,
-            "example": {"image": image, "box": [5, 35, 5, 35]}}  # fmt: skip
+    return {"hits": hits, "outline_px": 1000, "clutter_px": {name: 100 * curve(name) for name in THRESHOLDS},
+            "images": parameters["images"], "example": {"image": image, "box": [5, 35, 5, 35]}}  # fmt: skip
 
 
 def displaced(rng, parameters, noise):
-    names = ("SMD", "deterministic")
-    return {"distance_m": {name: amount(rng, noise, 0.05, 50) for name in names}, "degrees": rng.uniform(15, 45, 50)}
+    n = parameters["displacements"]
+    return {"distance_m": {name: amount(rng, noise, 0.05, n) for name in SAMPLINGS}, "degrees": rng.uniform(15, 45, n)}
 
 
 #: By the folder of the cells: ``draw(rng, parameters, noise) -> results``.
 RESULTS = {
-    "fig-3.3": peaks, "fig-3.5": lambda rng, parameters, noise: {"score": float(rng.random()), "mean_error": float(rng.random())},
-    "fig-4.2": components, "table-4.2": classified, "fig-4.4": tree, "fig-4.7": ellipsoid, "fig-4.9": samples, "tracking": tracks,
-    "fig-4.12": crossing, "pose": pose, "fig-6.11": maps, "markers": pose, "filters": pose, "markerless": pose,
-    "fig-7.8": schedule, "fig-7.15": behind_furniture, "lost-arm": lost_arm, "over-time": pose,
-    "all-methods": pose, "fig-B.1": square, "hsiao-3.8": ghosts, "hsiao-parts": parts, "hsiao-4": swarmed, "hsiao-pso": optimised,
-    "kehl-1": carved, "kehl-4": edges, "kehl-9": displaced, "kehl": descended,
+    "fig-2.4": colored, "fig-3.3": peaks, "fig-3.5": over_annealed, "fig-4.2": components, "table-4.2": classified, "fig-4.4": tree,
+    "fig-4.7": ellipsoid, "fig-4.9": samples, "tracking": tracks, "fig-4.12": crossing, "why-behind": behind, "pose": pose,
+    "fig-6.11": maps, "markers": marked, "filters": filtered, "markerless": pose, "fig-7.8": schedule, "fig-7.15": behind_furniture,
+    "lost-arm": lost_arm, "over-time": unseen, "all-methods": timed, "fig-B.1": square, "hsiao-3.8": ghosts, "hsiao-parts": parts,
+    "hsiao-4": swarmed, "hsiao-pso": optimised, "kehl-1": carved, "kehl-4": edges, "kehl-9": displaced, "kehl": descended,
 }  # fmt: skip
 
 

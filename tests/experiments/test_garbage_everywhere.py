@@ -9,21 +9,8 @@ from hmc.experiments import EXPERIMENTS, find_experiment
 DRAWS = 5
 #: Claims that hold on all draws but one at most, by experiment, for want of better ones. The list may only become shorter.
 CANNOT_FAIL: dict[str, set[str]] = {
-    # That something does not hold is what noise shows.
-    "fig-3.3": {"the particle filter's does not"},
-    # Four of six features, anywhere in three levels of a tree.
-    "fig-4.4": {"weight, height or bounding box are asked for first"},
-    # Frames are chosen by what is then claimed of them.
-    "fig-5.3": {
-        "of the good estimate MMTP is the mean error, and MMTA 1",
-        "of the poor one MMTP is free of what is lost, and the mean is not",
-    },
-    "fig-5.6": {"both tests choose about the same threshold for most methods"},
-    "fig-5.7": {"matched landmarks alone give smaller angular errors than all"},
     # No difference beyond its error is what equal methods show.
     "over-time": {"no other motion prior or start is better than the default's, beyond twice the error of the difference"},
-    # Of the truth, whatever is estimated.
-    "kehl-14": {"turns of 31 degrees and more between frames"},
 }
 
 
