@@ -13,6 +13,7 @@ import numpy as np
 from hmc.experiments import filter_study as runs
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
 from hmc.experiments.engine.style import COLORS
+from hmc.experiments.table_6_4 import READINGS
 from hmc.experiments.table_6_4 import grid as table_grid
 from hmc.experiments.truth import estimates
 from hmc.landmarks import LANDMARKS
@@ -28,16 +29,18 @@ def grid(plan: Plan) -> list[dict]:
     """The first recording of table-6.4, one run of every method."""
     cells = table_grid(plan)
     own = [parameters for parameters in cells if parameters["recording"] == cells[0]["recording"]]
-    return list({parameters["method"]: parameters for parameters in reversed(own)}.values())[::-1]
+    return list({(parameters["method"], parameters.get("annealing")): parameters for parameters in reversed(own)}.values())[::-1]
 
 
 def report(cells: Sequence[Cell], plan: Plan) -> Report:
     """Curves of every method, and the error a joint and coordinate."""
     rows, figures, medians = [], {}, {}
     for one in cells:
-        method = one.parameters["method"]
+        method = READINGS.get(one.parameters.get("annealing", ""), str(one.parameters["method"]))
         estimate, truth = estimates(one)
-        figures[f"fig-6.19-{method.replace(', ', '-')}"] = _draw(estimate, truth, np.array(one.results["frames"]) / one.results["fps"])
+        figures[f"fig-6.19-{method.replace(', ', '-').replace(' ', '-')}"] = _draw(
+            estimate, truth, np.array(one.results["frames"]) / one.results["fps"]
+        )
         off = 1000 * np.abs(estimate - truth)
         for name in SHOWN:
             values = np.nanmean(off[:, LANDMARKS.index(name)], axis=0) if np.isfinite(off).any() else np.full(3, np.nan)

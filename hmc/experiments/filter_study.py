@@ -2,8 +2,10 @@
 
 Source: Canton (2009), sections 6.5, 6.7, 7.3 to 7.5 and 8.1. A filter starts from the first frame's true pose, read as a pose of the
 thesis's body, and the hull is that around the true person, so that neither the tracker nor the start is measured. P0 is the action's, from
-data on which nothing is measured (`hmc.experiments.exploratory`). Two ways of annealing: ``printed``, all as in the preset `canton2009`;
-and ``strong``, with the schedules and scalable models of the preset `default`, which concentrate 27 dimensions in few layers.
+data on which nothing is measured (`hmc.experiments.exploratory`).
+
+Three ways of annealing: ``printed``, all as in the preset `canton2009`; ``variances``, the same with the factors of spreads read as those
+of variances; and ``strong``, with the schedules and scalable models of the preset `default`, which concentrate 27 dimensions in few layers.
 """
 
 from __future__ import annotations
@@ -57,8 +59,18 @@ __all__ = [
 
 FAMILY = "filters"
 VERSION = 1
-#: Ways of annealing, and the presets that they are taken from.
-ANNEALING = {"printed": "canton2009", "strong": "default"}
+_PRINTED = PRESETS["canton2009"]
+#: Ways of annealing. The thesis calls P0 of Eq. 3.22 a covariance matrix and the factors of section 7.5.1 rates of variance: read so,
+#: deviations shrink by the square roots.
+ANNEALING: dict[str, PosePreset] = {
+    "printed": _PRINTED,
+    "variances": replace(
+        _PRINTED,
+        annealed=replace(_PRINTED.annealed, spread="variance"),
+        structural=replace(_PRINTED.structural, inner=_PRINTED.structural.inner**0.5, structural=_PRINTED.structural.structural**0.5),
+    ),
+    "strong": PRESETS["default"],
+}
 APF = "APF"
 #: Methods, and what they are on the command line.
 METHODS: dict[str, tuple[str, tuple[str, ...]]] = {
@@ -140,9 +152,9 @@ def others_grid(plan: Plan, methods: Sequence[str]) -> list[dict[str, Any]]:
 
 def study_preset(parameters: Parameters) -> PosePreset:
     """The filter of a cell: the preset `canton2009` with a cell's settings; strong annealing has schedules and models of `default`."""
-    base, annealing = PRESETS["canton2009"], PRESETS[ANNEALING[parameters["annealing"]]]
+    annealing = ANNEALING[parameters["annealing"]]
     preset = replace(
-        base,
+        _PRINTED,
         likelihood=parameters["likelihood"],
         density=parameters["density"],
         annealed=replace(annealing.annealed, layers=parameters["layers"], particles=parameters["particles"]),

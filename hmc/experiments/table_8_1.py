@@ -69,7 +69,8 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
         ),
         Table("table-8.1-at-70-mm", "MMTP and MMTA at 70 mm (Canton, section 8.1).", _strict(groups)),
     )
-    shown = {"table-8.1": [*PAPERS], "table-8.1-strong": [name for name in groups if name not in PAPERS]}
+    others = {word: [name for name in groups if word in name] for word in ("variances", "strong")}
+    shown = {"table-8.1": [*PAPERS], **{f"table-8.1-{word}": names for word, names in others.items()}}
     return Report(tables, {name: action_bars(rows, methods, PAPERS) for name, methods in shown.items()}, tuple(claims))
 
 

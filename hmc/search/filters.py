@@ -108,8 +108,9 @@ class AnnealedSettings:
         Particles a layer, one number or one for each layer.
     survival_rate : float or sequence of float
         Wanted survival rate a layer, above 0 and at most 1.
-    spread : ``"survival"`` or float
-        How the drift shrinks: by the survival rates of the layers already run (Eq. 3.22), or by this factor a layer.
+    spread : ``"survival"``, ``"variance"`` or float
+        How the drift shrinks: by the survival rates of the layers already run (Eq. 3.22); by their square roots, which reads the P of that
+        equation as the covariance matrix that the text calls it; or by this factor a layer.
 
     Raises
     ------
@@ -120,7 +121,7 @@ class AnnealedSettings:
     layers: int = 6
     particles: int | Sequence[int] = 600
     survival_rate: float | Sequence[float] = 0.5
-    spread: Literal["survival"] | float = "survival"
+    spread: Literal["survival", "variance"] | float = "survival"
 
     def __post_init__(self) -> None:
         if self.layers < 1:
@@ -133,8 +134,8 @@ class AnnealedSettings:
             raise InputError(f"`particles` must be at least 1 in every layer; got {self.particles}")
         if not (np.min(self.survival_rate) > 0 and np.max(self.survival_rate) <= 1):
             raise InputError(f"`survival_rate` must be above 0 and at most 1; got {self.survival_rate}")
-        if self.spread != "survival" and not (isinstance(self.spread, (int, float)) and 0 < self.spread < np.inf):
-            raise InputError(f"`spread` must be 'survival' or a positive factor a layer; got {self.spread!r}")
+        if self.spread not in ("survival", "variance") and not (isinstance(self.spread, (int, float)) and 0 < self.spread < np.inf):
+            raise InputError(f"`spread` must be 'survival', 'variance' or a positive factor a layer; got {self.spread!r}")
 
     def layer_particles(self, layer: int) -> int:
         """Particles in a layer, counted from 0."""
@@ -266,13 +267,15 @@ def sir_step(
     return filter_layer(rng, state, log_likelihood, propagate, particles, None, resample)
 
 
-def spread_scale(spread: Literal["survival"] | float, survival_rates: Sequence[float]) -> float:
+def spread_scale(spread: Literal["survival", "variance"] | float, survival_rates: Sequence[float]) -> float:
     """What the drift of the next layer is multiplied by, after layers with these survival rates (Eq. 3.22).
 
-    The first layer's drift is P0; then it shrinks by the survival rates of the layers already run, or by a fixed factor for
-    each of them.
+    The first layer's drift is P0; then it shrinks by the survival rates of the layers already run, by their square roots, or by a fixed
+    factor for each of them.
     """
-    return float(np.prod(survival_rates)) if spread == "survival" else float(spread) ** len(survival_rates)
+    if isinstance(spread, str):
+        return float(np.prod(survival_rates)) ** (0.5 if spread == "variance" else 1.0)
+    return float(spread) ** len(survival_rates)
 
 
 def annealed_step(

@@ -330,6 +330,8 @@ def test_annealed_estimate_with_one_layer_at_power_one_is_the_posterior_mean():
 def test_drift_shrinks_by_the_survival_rates_run_or_by_a_factor():
     assert spread_scale("survival", []) == 1
     assert spread_scale("survival", [0.5, 0.4]) == pytest.approx(0.2)
+    # A covariance that falls by the rates (Eq. 3.22) has deviations that fall by their roots.
+    assert spread_scale("variance", [0.5, 0.4]) ** 2 == pytest.approx(0.2) and spread_scale("variance", []) == 1
     assert spread_scale(0.7, [0.1, 0.9]) == pytest.approx(0.49)
     varied = AnnealedSettings(layers=4, particles=[50, 200, 100, 80], survival_rate=[0.5, 0.3, 0.2, 0.1])
     state, info = annealed_step(np.random.default_rng(0), particle_init([[0.0, 0.0]]), lambda x: -np.sum(x**2, axis=1), 1.0, -9, 9, varied)
