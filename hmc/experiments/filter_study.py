@@ -159,6 +159,9 @@ def study_preset(parameters: Parameters) -> PosePreset:
         density=parameters["density"],
         annealed=replace(annealing.annealed, layers=parameters["layers"], particles=parameters["particles"]),
         structural=replace(annealing.structural, gamma=parameters["gamma"]),
+        hull=parameters.get("hull", _PRINTED.hull),
+        motion=parameters.get("motion", _PRINTED.motion),
+        drift_scale=parameters.get("drift_scale", _PRINTED.drift_scale),
         hierarchies=annealing.hierarchies,
         hidden_limbs=annealing.hidden_limbs,
     )
@@ -182,7 +185,7 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
         ``recording``, ``method`` (of `METHODS`; or one of `MARKERS` or `CHAINS`, which have no other settings), ``repeat``, and as in
         `BASE`: ``cameras`` and ``frames`` (0: all), ``voxel_mm``, ``annealing``, ``layers`` and ``particles`` (of the plain filter),
         ``gamma`` (particles a dimension, of models of rising detail), ``likelihood``, ``density``, ``removed_percent`` of the silhouettes
-        and ``removed`` (`hmc.experiments.removal`).
+        and ``removed`` (`hmc.experiments.removal`); and, where they differ from the preset's, ``hull``, ``motion`` and ``drift_scale``.
     inputs : Inputs
     rng : numpy.random.Generator
 
