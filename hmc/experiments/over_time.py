@@ -19,6 +19,7 @@ from hmc.experiments.engine.inputs import Inputs, rendered
 from hmc.experiments.engine.style import COLORS
 from hmc.experiments.five_actions import LONG_SUFFIX, action_name, action_title
 from hmc.experiments.markerless_runs import VOXEL_M, action_sources, change_hulls, pose_results, run_method, tracked
+from hmc.experiments.pose_intervals import none_better, score_difference
 from hmc.experiments.truth import estimates
 from hmc.metrics.landmarks import landmark_errors
 from hmc.pose.follow import FollowOptions
@@ -112,15 +113,15 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     whole = [one for one in cells if not one.parameters["gone_s"]]
     gaps = [one for one in cells if one.parameters["gone_s"]]
     ways, smooth, (found, figure) = _way_rows(whole), _smoothing_rows(whole), _gap_rows(gaps)
-    motion = [row for row in ways if row["action"] == "all" and row["way"].startswith(("motion", "start"))]
-    better = [row for row in motion if row["costs_mm"] < -2 * row["costs_error_mm"]]
+    by_way = _by_way(whole)
     back = {way: [row["back_after_s"] for row in found if row["way"] == way] for way in (DEFAULT, NO_RECOVERY)}
     as_is, short = (next(row for row in smooth if (row["action"], row["window_s"]) == ("all", window)) for window in (0.0, 0.3))
     claims = (
-        Claim(
-            "no other motion prior or start is better than the default's, beyond twice the error of the difference",
-            not better,
-            "; ".join(f"{row['way']} {row['costs_mm']:+.1f} +- {row['costs_error_mm']:.1f} mm" for row in motion),
+        none_better(
+            "no other motion prior or start is better than the default's by a millimetre or more",
+            by_way[DEFAULT],
+            {way: own for way, own in by_way.items() if way.startswith(("motion", "start"))},
+            ("way",),
         ),
         Claim(
             "who was out of sight while walking on is found again, and is not without recovery",
@@ -135,7 +136,7 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     )
     captions = {
         "ways": f"Mean joint error of `default` with another motion prior or start, {CAMERAS} cameras, {SEEDS} seeds, and its spread over "
-        "them; what that costs, with the standard error of the difference.",
+        "them; what that costs, with its interval of 95 % over clips and seeds.",
         "smoothing": "Estimates of `default` smoothed over some seconds: mean error, and its second difference from frame to frame.",
         "found-again": f"A walker whom no camera sees from {GONE_S[0]} to {GONE_S[1]} s: the mean error of the frames after that, and when "
         f"it is below {BACK_MM:.0f} mm for good.",
@@ -152,25 +153,31 @@ def _by_action(cells: Sequence[Cell]) -> dict[str, list[Cell]]:
     return {**groups, "all": list(cells)}
 
 
+def _by_way(cells: Sequence[Cell]) -> dict[str, list[Cell]]:
+    groups: dict[str, list[Cell]] = {}
+    for one in cells:
+        groups.setdefault(one.parameters["way"], []).append(one)
+    return groups
+
+
 def _way_rows(cells: Sequence[Cell]) -> list[dict[str, Any]]:
     rows: list[dict[str, Any]] = []
     for action, group in _by_action(cells).items():
-        means: dict[str, list[float]] = {}
-        near: dict[str, list[float]] = {}
-        for way in dict.fromkeys(one.parameters["way"] for one in group):
-            own = [one for one in group if one.parameters["way"] == way]
+        by_way = _by_way(group)
+        for way, own in by_way.items():
             scores = [pose_scores([one for one in own if one.parameters["repeat"] == repeat]) for repeat in range(SEEDS)]
-            means[way], near[way] = ([score[name] for score in scores] for name in ("mean_mm", "MMTA_50_percent"))
-        for way, values in means.items():
+            means, near = ([score[name] for score in scores] for name in ("mean_mm", "MMTA_50_percent"))
+            cost = score_difference(own, by_way[DEFAULT], "mean_mm", ("way",))
             rows.append(
                 {
                     "action": action,
                     "way": way,
-                    "mean_mm": float(np.mean(values)),
-                    "mean_spread_mm": float(np.std(values, ddof=1)),
-                    "costs_mm": float(np.mean(values) - np.mean(means[DEFAULT])),
-                    "costs_error_mm": float(np.sqrt((np.var(values, ddof=1) + np.var(means[DEFAULT], ddof=1)) / SEEDS)),
-                    "MMTA_50_percent": float(np.mean(near[way])),
+                    "mean_mm": float(np.mean(means)),
+                    "mean_spread_mm": float(np.std(means, ddof=1)),
+                    "costs_mm": cost.value,
+                    "costs_low_mm": cost.low,
+                    "costs_high_mm": cost.high,
+                    "MMTA_50_percent": float(np.mean(near)),
                 }
             )
     return rows

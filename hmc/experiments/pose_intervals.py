@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -14,10 +14,12 @@ from hmc.experiments.engine.selection import REPEAT
 from hmc.experiments.truth import estimates
 from hmc.metrics.landmarks import landmark_errors
 
-__all__ = ["SCORES", "ahead", "is_followed", "score_difference", "score_interval"]
+__all__ = ["SCORES", "WORTH_MM", "ahead", "is_followed", "none_better", "score_difference", "score_interval"]
 
 #: As `hmc.experiments.by_action.pose_scores` calls them.
 SCORES = ("mean_mm", "MMTP_mm", "MMTA_percent", "MMTP_70_mm", "MMTA_70_percent", "MMTA_50_percent")
+#: Mean errors that differ by less are as good as each other, millimetres.
+WORTH_MM = 1.0
 #: By what a score's name says, how far a landmark may be to be matched.
 _WITHIN = {"_70_": STRICT_MM, "_50_": NEAR_MM}
 
@@ -80,6 +82,23 @@ def ahead(text: str, better: Sequence[Cell], worse: Sequence[Cell], score: str =
     unit = "mm" if error else "%"
     detail = f"{score.split('_')[0]} {score_interval(better, score)} {unit} for {score_interval(worse, score)}: better by {gain}"
     return Claim(text, gain.above_zero, detail)
+
+
+def none_better(text: str, chosen: Sequence[Cell], others: Mapping[str, Sequence[Cell]], but: Sequence[str] = ("method",)) -> Claim:
+    """The claim that no other group is better than the chosen one by `WORTH_MM` or more: what intervals too wide to tell do not show.
+
+    Parameters
+    ----------
+    text : str
+    chosen : sequence of Cell
+    others : mapping of name to sequence of Cell
+    but : sequence of str
+        As for `score_difference`.
+    """
+    costs = {name: score_difference(own, chosen, "mean_mm", but) for name, own in others.items()}
+    shown = {name: cost for name, cost in costs.items() if cost.low <= -WORTH_MM} or costs
+    holds = bool(costs) and all(cost.low > -WORTH_MM for cost in costs.values())
+    return Claim(text, holds, "; ".join(f"{name} costs {cost} mm" for name, cost in shown.items()))
 
 
 def is_followed(cells: Sequence[Cell], least_percent: float = 50.0) -> bool:

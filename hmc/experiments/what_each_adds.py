@@ -14,8 +14,9 @@ import numpy as np
 
 from hmc.experiments import markerless_runs as runs
 from hmc.experiments.by_action import pose_scores
-from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
+from hmc.experiments.engine.experiment import Cell, Experiment, Plan, Report, Table
 from hmc.experiments.engine.style import COLORS
+from hmc.experiments.pose_intervals import none_better, score_difference
 
 __all__ = ["EXPERIMENT"]
 
@@ -42,39 +43,47 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     rows: list[dict[str, Any]] = []
     cameras = CAMERAS[plan.quick]
     for number in cameras:
-        whole = _over_seeds(cells, number, runs.EVERYTHING)
         for switch in runs.SWITCHES:
             own = _over_seeds(cells, number, switch)
+            cost = score_difference(_of(cells, number, switch), _of(cells, number, runs.EVERYTHING), "mean_mm", ("without",))
             rows.append(
                 {
                     "cameras": number or "all",
                     "without": switch or "nothing (the whole)",
                     "mean_mm": float(np.mean(own["mean_mm"])),
                     "mean_spread_mm": float(np.std(own["mean_mm"], ddof=1)),
-                    "costs_mm": float(np.mean(own["mean_mm"]) - np.mean(whole["mean_mm"])),
-                    "costs_error_mm": float(np.sqrt((np.var(own["mean_mm"], ddof=1) + np.var(whole["mean_mm"], ddof=1)) / SEEDS)),
+                    "costs_mm": cost.value,
+                    "costs_low_mm": cost.low,
+                    "costs_high_mm": cost.high,
                     "MMTA_percent": float(np.mean(own["MMTA_percent"])),
                     "MMTA_50_percent": float(np.mean(own["MMTA_50_percent"])),
                     "MMTA_50_spread_percent": float(np.std(own["MMTA_50_percent"], ddof=1)),
                 }
             )
-    parts = [row for row in rows if row["without"] in runs.SWITCHES]
-    harmful = [row for row in parts if row["costs_mm"] < -2 * row["costs_error_mm"]]
-    claim = Claim(
-        "no part is better left out, beyond twice the error of its difference",
-        not harmful,
-        "; ".join(f"{row['cameras']} cameras without {row['without']}: {row['costs_mm']:+.1f} mm" for row in harmful or parts),
+    parts = [switch for switch in runs.SWITCHES if switch != runs.EVERYTHING]
+    claims = tuple(
+        none_better(
+            f"{number or 'all'} cameras: no part is better left out by a millimetre or more",
+            _of(cells, number, runs.EVERYTHING),
+            {switch: _of(cells, number, switch) for switch in parts},
+            ("without",),
+        )
+        for number in cameras
     )
     caption = (
         f"Mean joint error of `default` with one part switched off, {SEEDS} seeds: mean, standard deviation over seeds, and what leaving "
-        "the part out costs, with the standard error of that difference."
+        "the part out costs, with its interval of 95 % over clips and seeds."
     )
-    return Report((Table("what-each-adds", caption, rows),), {"what-each-adds": _draw(rows, cameras)}, (claim,))
+    return Report((Table("what-each-adds", caption, rows),), {"what-each-adds": _draw(rows, cameras)}, claims)
+
+
+def _of(cells: Sequence[Cell], cameras: int, switch: str) -> list[Cell]:
+    return [one for one in cells if (one.parameters["cameras"], one.parameters["without"]) == (cameras, switch)]
 
 
 def _over_seeds(cells: Sequence[Cell], cameras: int, switch: str) -> dict[str, list[float]]:
     """Scores over all recordings, one value a seed."""
-    own = [one for one in cells if (one.parameters["cameras"], one.parameters["without"]) == (cameras, switch)]
+    own = _of(cells, cameras, switch)
     scores = [pose_scores([one for one in own if one.parameters["repeat"] == seed]) for seed in range(SEEDS)]
     return {name: [score[name] for score in scores] for name in scores[0]}
 

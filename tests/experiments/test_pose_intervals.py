@@ -8,7 +8,7 @@ import pytest
 from hmc.errors import InputError
 from hmc.experiments.by_action import pose_scores
 from hmc.experiments.engine.experiment import Cell
-from hmc.experiments.pose_intervals import SCORES, is_followed, score_difference, score_interval
+from hmc.experiments.pose_intervals import SCORES, is_followed, none_better, score_difference, score_interval
 
 
 def cells(scatter_m, rng, clips=6, seeds=3, lost=0.0, frames=12):
@@ -40,6 +40,17 @@ def test_a_better_method_is_told_and_equal_ones_are_not():
     equal = score_difference(same, good, "mean_mm")
     assert equal.low < 0 < equal.high
     assert score_difference(good[::-1], good, "mean_mm").value == 0  # by clip and seed, not by order
+
+
+def test_that_none_is_better_is_shown_and_not_merely_not_refuted():
+    rng = np.random.default_rng(4)
+    good, same, bad = cells(0.003, rng), cells(0.003, rng), cells(0.01, rng)
+    assert none_better("", good, {"same": same, "bad": bad}).holds
+    told = none_better("", bad, {"same": bad, "good": good})
+    assert not told.holds and "good" in told.detail and "same" not in told.detail
+    few = [cells(0.5, rng, clips=1, seeds=3) for _ in range(2)]
+    assert not none_better("", few[0], {"same": few[1]}).holds  # too few and too far off to tell
+    assert not none_better("", good, {}).holds
 
 
 def test_only_what_both_have_is_compared():
