@@ -17,7 +17,7 @@ from hmc.experiments.engine.experiment import Cell
 from hmc.experiments.engine.inputs import rendered
 from hmc.experiments.engine.style import house_style
 from hmc.experiments.five_actions import ACTIONS, ACTORS, action_name, action_recipes, action_title
-from hmc.experiments.truth import estimate_of, first_truth, standing_state
+from hmc.experiments.truth import estimate_of, standing_state
 from hmc.io.results import PoseTable
 from hmc.pose.steps.presets import PRESETS
 
@@ -140,7 +140,7 @@ def test_filter_presets_are_the_theses_but_for_what_a_cell_says():
         preset = filter_study.study_preset(parameters)
         assert preset.body == "canton" and preset.refine is None and preset.likelihood == parameters["likelihood"]
         assert (preset.annealed.layers, preset.annealed.particles) == (parameters["layers"], parameters["particles"])
-        assert preset.annealed.survival_rate == (0.5 if parameters["annealing"] == "printed" else PRESETS["default"].annealed.survival_rate)
+        assert preset.annealed.survival_rate == (PRESETS["default"].annealed.survival_rate if parameters["annealing"] == "strong" else 0.5)
 
 
 def test_modes_of_a_map_are_counted():
@@ -207,7 +207,7 @@ def test_a_filter_cell_starts_from_the_truth(small, monkeypatch):
     monkeypatch.setattr(filter_study, "study_preset", lambda parameters: preset)
     one = filter_study.cell(few, inputs, np.random.default_rng(0))
     assert len(one["frames"]) == 1 and one["filter_s_per_frame"] > 0
-    first = first_truth(inputs.recording(source.label)).positions[0]
+    first = exploratory.measured_truth(inputs.recording(source.label), source.label).positions[0]
     assert np.linalg.norm(one["estimate_m"][0] - first, axis=1).mean() < 0.08  # the thesis's body has other lengths
     assert np.array_equal(one["estimate_m"], filter_study.cell(few, inputs, np.random.default_rng(0))["estimate_m"])
 
