@@ -7,6 +7,7 @@ what is made appears under its name only when it is whole; so a run may be kille
 from __future__ import annotations
 
 import contextlib
+import functools
 import os
 import shutil
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -214,11 +215,14 @@ def write_hulls(folder: Path, steps: Iterable[HullStep]) -> None:
 
 def _recipe_of(name: str) -> tuple[Recipe, bool]:
     """A recipe, and whether its furniture comes in after the empty room was filmed."""
+    return _own_recipes().get(name) or (load_recipe(name), False)
+
+
+@functools.cache
+def _own_recipes() -> dict[str, tuple[Recipe, bool]]:
+    """The recipes that experiments make of the shipped ones, by name."""
     as_filmed = ((recipe, False) for recipe in (*action_recipes(), *nine_recipes(), *drill_recipes()))
-    for recipe, brought_in in (*training_recipes(), *as_filmed):
-        if recipe.name == name:
-            return recipe, brought_in
-    return load_recipe(name), False
+    return {recipe.name: (recipe, brought_in) for recipe, brought_in in reversed([*training_recipes(), *as_filmed])}
 
 
 def _hulls(recording: Recording, grid: VoxelGrid) -> Iterator[HullStep]:
