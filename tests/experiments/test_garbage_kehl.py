@@ -10,6 +10,9 @@ from hmc.experiments.engine.experiment import Cell
 from hmc.experiments.engine.style import house_style
 from hmc.landmarks import LANDMARKS
 
+#: The quick tests draw the results of all experiments at random (`test_garbage_everywhere`).
+pytestmark = pytest.mark.slow
+
 FOLLOWED = ("kehl-11", "kehl-13", "kehl-14", "kehl-17")
 STUDIES = ("kehl-1", "kehl-4", "kehl-9", *FOLLOWED)
 

@@ -11,6 +11,9 @@ from hmc.experiments import Plan, find_experiment
 from hmc.experiments.engine.experiment import Cell
 from hmc.experiments.engine.style import house_style
 
+#: The quick tests draw the results of all experiments at random (`test_garbage_everywhere`).
+pytestmark = pytest.mark.slow
+
 PLAN = Plan(quick=True)
 BODY = default_body(1.75)
 N = 60

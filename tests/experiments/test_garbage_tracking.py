@@ -8,6 +8,9 @@ from hmc.experiments import Plan, find_experiment
 from hmc.experiments.engine.experiment import Cell
 from hmc.experiments.engine.style import house_style
 
+#: The quick tests draw the results of all experiments at random (`test_garbage_everywhere`).
+pytestmark = pytest.mark.slow
+
 STUDIES = ("table-4.3", "table-4.4", "fig-4.12", "fig-4.13", "fig-4.14")
 
 

@@ -11,6 +11,9 @@ from hmc.experiments.engine.style import house_style
 from hmc.experiments.hsiao_3_15 import SCORES
 from hmc.experiments.hsiao_pso import METHODS
 
+#: The quick tests draw the results of all experiments at random (`test_garbage_everywhere`).
+pytestmark = pytest.mark.slow
+
 STUDIES = ("hsiao-3.8", "hsiao-3.15", "hsiao-3.16", "hsiao-4", "hsiao-pso")
 
 
