@@ -9,6 +9,9 @@ from hmc.experiments import Plan, find_experiment
 from hmc.experiments.engine.experiment import Cell
 from hmc.experiments.engine.style import house_style
 
+#: The quick tests draw the results of all experiments at random (`test_garbage_everywhere`).
+pytestmark = pytest.mark.slow
+
 STUDIES = ("fig-6.16", "fig-6.17", "fig-6.18", "fig-7.13", "table-7.1", "table-8.1", "fig-8.1", "missing-data")
 
 
