@@ -59,9 +59,7 @@ def grid(plan: Plan) -> list[dict]:
 
     Seed after seed, so that a run that is stopped holds all methods.
     """
-    sources = action_sources(plan)
-    if not plan.recordings and plan.quick:
-        sources = [source for k, source in enumerate(sources) if k % 4 in (0, 3)]
+    sources = action_sources(plan, in_turn=plan.quick)
     return [
         {"recording": source.label, "method": name, "preset": preset, "repeat": repeat} | _version_of(name)
         for repeat in range(SEEDS[plan.quick])

@@ -41,9 +41,7 @@ GAMMA, LEAST = 2.2, 1e-3
 
 def grid(plan: Plan) -> list[dict]:
     """Some frames of the five actions by both actors (quick: by the actors in turn), as shares of the length."""
-    sources = action_sources(plan)
-    if plan.quick and not plan.recordings:
-        sources = [source for k, source in enumerate(sources) if k % 2 == k // 2 % 2]
+    sources = action_sources(plan, in_turn=plan.quick)
     return [{"recording": source.label, "at": at} for source in sources for at in ((0.2, 0.8) if plan.quick else (0.1, 0.3, 0.5, 0.7, 0.9))]
 
 

@@ -45,8 +45,7 @@ BEST_LAYERS = 3
 
 def grid(plan: Plan) -> list[dict]:
     """Every detector with every number of layers and particles, on every action, the actors and seeds in turn."""
-    sources = action_sources(plan, QUICK_ACTIONS if plan.quick else ACTIONS)
-    sources = sources if plan.recordings else [source for k, source in enumerate(sources) if k % 2 == k // 2 % 2]
+    sources = action_sources(plan, QUICK_ACTIONS if plan.quick else ACTIONS, in_turn=True)
     return [
         {"recording": source.label, "frames": FRAMES, "start": "true", "detection_rate": RATE, "preset": "canton2009", "reprojection": 0.0,
          REPEAT: place % SEEDS} | dict(zip(VARIED, map(float, values[:2]), strict=False)) | dict(zip(VARIED[2:], values[2:], strict=True))

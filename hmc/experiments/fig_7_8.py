@@ -20,6 +20,7 @@ from hmc.body.scalable_models import PRINTED_1, PRINTED_2
 from hmc.errors import InputError
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs
+from hmc.experiments.five_actions import ACTIONS
 from hmc.experiments.markerless_runs import FRONTEND, MASKS_KEY, VOXEL_M, action_sources, tracked
 from hmc.experiments.run_means import mean_interval
 from hmc.experiments.truth import HEIGHT_M, first_truth, standing_state, stature_m, truth_track
@@ -44,9 +45,7 @@ FRAMES = 5
 
 def grid(plan: Plan) -> list[dict]:
     """Both hierarchies on some actions, by the actors in turn."""
-    sources = action_sources(plan, ("walk", "gesture") if plan.quick else ("walk", "jog", "throw_catch", "gesture", "box"))
-    if not plan.recordings:
-        sources = [source for k, source in enumerate(sources) if k % 2 == k // 2 % 2]
+    sources = action_sources(plan, ("walk", "gesture") if plan.quick else ACTIONS, in_turn=True)
     return [
         {"recording": source.label, "model": model, "frames": FRAMES, "repeat": repeat}
         for source in sources

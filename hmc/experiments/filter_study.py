@@ -127,9 +127,8 @@ def study_grid(
         Of the runs in full, the same for all settings: on each recording one of the seeds, in turn; or that on each action, the actors in
         turn.
     """
-    sources = action_sources(plan, [action for action in actions if not plan.quick or action in QUICK_ACTIONS])
-    if not plan.recordings and (plan.quick or share == "sixth"):
-        sources = [source for k, source in enumerate(sources) if k % 2 == k // 2 % 2]
+    shown = [action for action in actions if not plan.quick or action in QUICK_ACTIONS]
+    sources = action_sources(plan, shown, in_turn=plan.quick or share == "sixth")
     base = QUICK_BASE if plan.quick else BASE | {"frames": frames}
     return [
         {"recording": source.label} | base | dict(setting) | {REPEAT: repeat}

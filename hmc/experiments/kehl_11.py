@@ -53,10 +53,8 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
 def _edges_help(groups: dict[str, list[Cell]], ending: str) -> Claim:
     """The paper's: the surface alone loses an arm at the body, with edges the whole sequence is followed and nearer."""
     alone, edges = groups[f"surface{ending}"], groups[f"surface, edges{ending}"]
-    gain = kehl_runs.joint_gain(edges, alone, ARMS)
-    detail = f"{kehl_runs.error_interval(edges, ARMS)} mm for {kehl_runs.error_interval(alone, ARMS)}: nearer by {gain}"
     text = f"with edges{ending} the sequence is followed, and elbows and wrists are nearer than with the surface alone"
-    return Claim(text, kehl_runs.is_followed(edges) and gain.above_zero, detail)
+    return kehl_runs.nearer(text, edges, alone, ARMS)
 
 
 EXPERIMENT = Experiment(

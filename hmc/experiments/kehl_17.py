@@ -55,10 +55,8 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
 def _colors_help(groups: dict[str, list[Cell]], ending: str) -> Claim:
     """The paper's: the person with the cube is followed, and colors keep the cube out of the arm."""
     colors, without = groups[f"SMD{ending}"], groups[f"surface, edges{ending}"]
-    gain = kehl_runs.joint_gain(colors, without, ARM)
-    detail = f"{kehl_runs.error_interval(colors, ARM)} mm for {kehl_runs.error_interval(without, ARM)}: nearer by {gain}"
     text = f"with colors{ending} the sequence is followed, and the arm that holds the cube is nearer than without"
-    return Claim(text, kehl_runs.is_followed(colors) and gain.above_zero, detail)
+    return kehl_runs.nearer(text, colors, without, ARM)
 
 
 EXPERIMENT = Experiment(

@@ -18,7 +18,7 @@ from hmc.body.kinematics import landmarks
 from hmc.camera.model import project
 from hmc.errors import InputError
 from hmc.experiments.drill_clips import clip_names
-from hmc.experiments.engine.experiment import Cell, Parameters, Plan, Results
+from hmc.experiments.engine.experiment import Cell, Claim, Parameters, Plan, Results
 from hmc.experiments.engine.inputs import Inputs, rendered
 from hmc.experiments.engine.intervals import Interval, difference, interval
 from hmc.experiments.engine.selection import REPEAT
@@ -42,7 +42,7 @@ from hmc.voxels.hulls import FrontendSettings, stream_hulls
 __all__ = [
     "FAMILY", "FOLLOWED_MM", "QUARTER", "REPEATS", "TOLERANCES", "VARIANTS", "VERSION",
     "cell", "cell_grid", "error_interval", "errors_mm", "is_followed", "joint_gain",
-    "lm_name", "observations", "of_variant", "preset_of", "seconds_gain", "shown",
+    "lm_name", "nearer", "observations", "of_variant", "preset_of", "seconds_gain", "shown",
 ]  # fmt: skip
 
 FAMILY, VERSION = "kehl", 2
@@ -223,6 +223,13 @@ def error_interval(cells: Sequence[Cell], joints: Sequence[int] = (), last: floa
 def joint_gain(better: Sequence[Cell], worse: Sequence[Cell], joints: Sequence[int] = ()) -> Interval:
     """By how many millimetres the first group is nearer than the second, on the same clips and runs."""
     return difference(_clips(worse), _errors(worse, joints, 1.0), _errors(better, joints, 1.0))
+
+
+def nearer(text: str, better: Sequence[Cell], worse: Sequence[Cell], joints: Sequence[int]) -> Claim:
+    """The claim that people are followed in the first group, and that it is nearer in some joints than the second."""
+    gain = joint_gain(better, worse, joints)
+    detail = f"{error_interval(better, joints)} mm for {error_interval(worse, joints)}: nearer by {gain}"
+    return Claim(text, is_followed(better) and gain.above_zero, detail)
 
 
 def seconds_gain(faster: Sequence[Cell], slower: Sequence[Cell]) -> Interval:

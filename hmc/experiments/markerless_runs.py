@@ -95,10 +95,11 @@ SWITCHES: dict[str, Callable[[PosePreset], Way]] = {
 }
 
 
-def action_sources(plan: Plan, actions: Iterable[str] = ACTIONS, actors: Iterable[str] = ACTORS) -> list[Source]:
-    """The user's recordings, or the rendered ones of these actions and actors."""
-    names = [action_name(action, actor, plan.quick) for action in actions for actor in actors]
-    return list(plan.recordings) or [rendered(name) for name in names]
+def action_sources(plan: Plan, actions: Iterable[str] = ACTIONS, in_turn: bool = False) -> list[Source]:
+    """The user's recordings, or the rendered ones of these actions: by every actor, or each by one, the actors in turn."""
+    actors = tuple(ACTORS)
+    shown = [(action, actor) for k, action in enumerate(actions) for actor in ((actors[k % len(actors)],) if in_turn else actors)]
+    return list(plan.recordings) or [rendered(action_name(action, actor, plan.quick)) for action, actor in shown]
 
 
 def opened(inputs: Inputs, label: str, cameras: int) -> Recording:

@@ -7,14 +7,14 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from hmc.errors import InputError
-from hmc.experiments.by_action import MATCHED_MM, NEAR_MM, STRICT_MM
+from hmc.experiments.by_action import COLUMNS, MATCHED_MM, NEAR_MM, STRICT_MM
 from hmc.experiments.engine.experiment import Cell, Claim
 from hmc.experiments.engine.intervals import Interval, difference, interval
 from hmc.experiments.engine.selection import REPEAT
 from hmc.experiments.truth import estimates
 from hmc.metrics.landmarks import landmark_errors
 
-__all__ = ["SCORES", "WORTH_MM", "ahead", "is_followed", "none_better", "score_difference", "score_interval"]
+__all__ = ["SCORES", "WORTH_MM", "ahead", "is_followed", "none_better", "reaches", "score_difference", "score_interval"]
 
 #: As `hmc.experiments.by_action.pose_scores` calls them.
 SCORES = ("mean_mm", "MMTP_mm", "MMTA_percent", "MMTP_70_mm", "MMTA_70_percent", "MMTA_50_percent")
@@ -99,6 +99,23 @@ def none_better(text: str, chosen: Sequence[Cell], others: Mapping[str, Sequence
     shown = {name: cost for name, cost in costs.items() if cost.low <= -WORTH_MM} or costs
     holds = bool(costs) and all(cost.low > -WORTH_MM for cost in costs.values())
     return Claim(text, holds, "; ".join(f"{name} costs {cost} mm" for name, cost in shown.items()))
+
+
+def reaches(text: str, cells: Sequence[Cell], paper: Sequence[float]) -> Claim:
+    """The claim that MMTA at 100 mm is that of a paper or better, or that the paper's is in its interval, of people who are followed.
+
+    Parameters
+    ----------
+    text : str
+    cells : sequence of Cell
+        Of one method.
+    paper : sequence of float
+        The paper's figures in the order of `hmc.experiments.by_action.COLUMNS`.
+    """
+    found, mmtp = score_interval(cells, "MMTA_percent"), paper[COLUMNS.index("MMTP_mm")]
+    mmta = paper[COLUMNS.index("MMTA_percent")]
+    holds = bool(found.value >= mmta or (found.high >= mmta and is_followed(cells)))
+    return Claim(text, holds, f"MMTA {found} %, MMTP {score_interval(cells, 'MMTP_mm')} mm; the paper {mmta} %, {mmtp} mm")
 
 
 def is_followed(cells: Sequence[Cell], least_percent: float = 50.0) -> bool:

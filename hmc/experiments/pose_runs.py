@@ -55,9 +55,7 @@ _WIDTH_PX = 640
 
 def grid(plan: Plan) -> list[dict]:
     """Every method on every recording, with every seed."""
-    sources = action_sources(plan, _ACTIONS[plan.quick])
-    if not plan.recordings:
-        sources = [source for k, source in enumerate(sources) if k % 2 == k // 2 % 2]  # one actor an action, in turn
+    sources = action_sources(plan, _ACTIONS[plan.quick], in_turn=True)
     return [
         {"recording": source.label, "method": method, "repeat": repeat}
         for source in sources

@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose
 from scipy.stats import multivariate_normal, norm
 
 from hmc.errors import InputError
+from hmc.pose.objectives.four_scores import log_likelihood_by_part, log_likelihood_factorised
 from hmc.search import combined_cost, log_fitness, log_joint_fitness
 
 
@@ -60,3 +61,11 @@ def test_scores_that_go_together_count_less_than_ones_that_do_not():
 def test_what_is_no_covariance_is_refused(covariance):
     with pytest.raises(InputError, match="covariance"):
         log_joint_fitness(np.zeros((4, 2)), covariance)
+
+
+def test_the_four_scores_are_its_diagonal():
+    rng = np.random.default_rng(8)
+    values, variances = rng.random((6, 10, 4)), 0.1 + rng.random((10, 4))
+    expected = log_joint_fitness(values, variances[..., None] * np.eye(4))
+    assert_allclose(log_likelihood_by_part(values, variances), expected)
+    assert_allclose(log_likelihood_factorised(values, variances), expected.sum(axis=1))

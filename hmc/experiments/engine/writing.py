@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from hmc.experiments.engine.experiment import Experiment, Plan, Report, Table
 from hmc.experiments.engine.selection import grid_of
-from hmc.experiments.engine.store import cell_key
+from hmc.experiments.engine.store import cell_key, digest
 from hmc.io.files import atomic_write
 from hmc.io.results import write_run
 
@@ -69,7 +69,8 @@ def write_report(out: Path, experiment: Experiment, plan: Plan, report: Report) 
         "quick": plan.quick,
         "recordings": sorted({str(cell["recording"]) for cell in grid if "recording" in cell}),
         "cells_version": experiment.version,
-        "cells": {cell_key(experiment, cell): cell for cell in grid},
+        "grid": _axes(grid),
+        "cells": [cell_key(experiment, cell) for cell in grid],
     }
     if plan.changed:
         parameters["changed"] = _changes(experiment, plan, parameters["cells"])
@@ -80,6 +81,12 @@ def write_report(out: Path, experiment: Experiment, plan: Plan, report: Report) 
         figures=list(report.figures), captions=captions,
     )  # fmt: skip
     return folder
+
+
+def _axes(grid: Sequence[Mapping[str, Any]]) -> dict[str, list]:
+    """The values of every parameter in a grid, each once; None, which stands for "has none", is left out."""
+    names = dict.fromkeys(name for cell in grid for name in cell)
+    return {name: list({digest(cell[name]): cell[name] for cell in grid if cell.get(name) is not None}.values()) for name in names}
 
 
 def _changes(experiment: Experiment, plan: Plan, keys: Iterable[str]) -> dict[str, Any]:

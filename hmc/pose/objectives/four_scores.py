@@ -24,7 +24,6 @@ from hmc.body.kinematics import place_segments, segment_transforms
 from hmc.body.model import PARTS, BodyModel
 from hmc.pose.objectives.overlap import OverlapTable, make_overlap_table, quick_overlap
 from hmc.pose.objectives.overlap_exact import exact_overlap
-from hmc.search.fitness import log_joint_fitness
 from hmc.voxels.grid import VoxelGrid
 from hmc.voxels.surface import surface
 
@@ -340,7 +339,7 @@ def _sum_rows(values: np.ndarray) -> np.ndarray:
 
 def log_likelihood_by_part(values: np.ndarray, variances: np.ndarray) -> np.ndarray:
     """The factors of `log_likelihood_factorised`, each part's own: shape (n, n_parts); the arguments are the same."""
-    return _log_joint(values, variances, 2)
+    return -0.5 * np.einsum("nps,ps->np", values**2, 1 / np.asarray(variances))
 
 
 def log_likelihood_factorised(values: np.ndarray, variances: np.ndarray) -> np.ndarray:
@@ -350,14 +349,14 @@ def log_likelihood_factorised(values: np.ndarray, variances: np.ndarray) -> np.n
     ----------
     values : ndarray, shape (n, n_parts, 4)
         From `scores`.
-    variances : ndarray, shape (n_parts, 4) or (n_parts, 4, 4)
-        As `ScoreVariances.by_part` gives them; or covariances, where scores go together (H of Eq. 3.15).
+    variances : ndarray, shape (n_parts, 4)
+        As `ScoreVariances.by_part` gives them: the diagonal of H in Eq. 3.15 (`hmc.search.log_joint_fitness`).
 
     Returns
     -------
     ndarray, shape (n,)
     """
-    return log_likelihood_by_part(values, variances).sum(axis=1)
+    return -0.5 * np.einsum("nps,ps->n", values**2, 1 / np.asarray(variances))
 
 
 def log_likelihood_global(values: np.ndarray, counts: np.ndarray, variances: np.ndarray) -> np.ndarray:
@@ -369,17 +368,12 @@ def log_likelihood_global(values: np.ndarray, counts: np.ndarray, variances: np.
         From `scores`.
     counts : ndarray, shape (n_parts, 4)
         Voxels behind each score (`ScoreTable.counts`).
-    variances : ndarray, shape (4,) or (4, 4)
-        As `ScoreVariances.whole_body` gives them; or a covariance (H of Eq. 3.15).
+    variances : ndarray, shape (4,)
+        As `ScoreVariances.whole_body` gives them.
 
     Returns
     -------
     ndarray, shape (n,)
     """
-    return _log_joint(np.einsum("nps,ps->ns", values, counts / counts.sum(0)), variances, 1)
-
-
-def _log_joint(values: np.ndarray, variances: np.ndarray, axes: int) -> np.ndarray:
-    """Eq. 3.15 by variances, with so many axes, or by covariances, with one more."""
-    variances = np.asarray(variances, float)
-    return log_joint_fitness(values, variances if variances.ndim > axes else variances[..., None] * np.eye(variances.shape[-1]))
+    whole = np.einsum("nps,ps->ns", values, counts / counts.sum(0))
+    return -0.5 * (whole**2 @ (1 / np.asarray(variances)))
