@@ -16,7 +16,8 @@ from scipy.optimize import linear_sum_assignment
 
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs
-from hmc.experiments.engine.intervals import Interval, difference, interval
+from hmc.experiments.engine.intervals import Interval
+from hmc.experiments.engine.ratios import Parts, ratio_gain, ratio_interval
 from hmc.experiments.hsiao_runs import VOXEL_M, limbs_apart, person_hulls, scene_of, sequences
 from hmc.experiments.truth import first_truth
 from hmc.landmarks import LANDMARKS
@@ -33,7 +34,7 @@ from hmc.synthetic.actor import PARTS
 from hmc.synthetic.truth import true_parts
 
 __all__ = [
-    "COLORS_OF_PARTS", "EXPERIMENT", "FAMILY", "MODIFIED", "OURS", "SCORES", "SUNDARESAN", "VERSION", "by_clip", "cell", "gain", "grid",
+    "COLORS_OF_PARTS", "EXPERIMENT", "FAMILY", "MODIFIED", "OURS", "SCORES", "SUNDARESAN", "VERSION", "cell", "gain", "grid", "mean_of",
     "shares_right",
 ]  # fmt: skip
 
@@ -143,22 +144,21 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
     return {"frames": frames, "apart": apart, "scores": np.array(scores).reshape(-1, len(_SETTINGS), len(SCORES)), "shown": shown}
 
 
-def by_clip(cells: Sequence[Cell], way: str, score: str, apart: bool = True) -> tuple[np.ndarray, np.ndarray]:
-    """Sum of a score over the frames of each clip, and how many; of frames with limbs apart alone, if asked for."""
-    sums, counts = [], []
-    for one in cells:
+def mean_of(way: str, score: str, apart: bool = True) -> Parts:
+    """A score over the frames of a clip, and how many there are; of frames with limbs apart alone, if asked for."""
+
+    def parts(one: Cell) -> tuple[float, float]:
         values = np.array(one.results["scores"], float).reshape(-1, len(_SETTINGS), len(SCORES))
         own = values[:, list(_SETTINGS).index(way), SCORES.index(score)]
         own = own[np.array(one.results["apart"], int) > 0] if apart else own
-        sums.append(own.sum())
-        counts.append(len(own))
-    return np.array(sums), np.array(counts)
+        return float(own.sum()), float(len(own))
+
+    return parts
 
 
 def gain(cells: Sequence[Cell], score: str, first: str, second: str, second_score: str = "", apart: bool = True) -> Interval:
     """By how much a score of the first way is above one of the second, with its interval over clips."""
-    clips = [one.parameters["recording"] for one in cells]
-    return difference(clips, by_clip(cells, first, score, apart), by_clip(cells, second, second_score or score, apart))
+    return ratio_gain(cells, cells, mean_of(first, score, apart), smaller_parts=mean_of(second, second_score or score, apart))
 
 
 def report(cells: Sequence[Cell], plan: Plan) -> Report:
@@ -168,9 +168,8 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     for name, own in groups:
         for apart in (True, False):
             for way in _SETTINGS:
-                clips = [one.parameters["recording"] for one in own]
-                values = {score: interval(clips, *by_clip(own, way, score, apart)) for score in SCORES[:4]}
-                frames = int(by_clip(own, way, SCORES[0], apart)[1].sum())
+                values = {score: ratio_interval(own, mean_of(way, score, apart)) for score in SCORES[:4]}
+                frames = int(sum(mean_of(way, SCORES[0], apart)(one)[1] for one in own))
                 if frames:
                     table.append(
                         {"sequence": name, "limbs": "apart" if apart else "all frames", "way": way, "frames": frames}

@@ -12,8 +12,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
-from hmc.experiments.engine.intervals import interval
-from hmc.experiments.hsiao_3_15 import COLORS_OF_PARTS, FAMILY, MODIFIED, OURS, SUNDARESAN, VERSION, by_clip, cell, gain, grid
+from hmc.experiments.engine.ratios import ratio_interval
+from hmc.experiments.hsiao_3_15 import COLORS_OF_PARTS, FAMILY, MODIFIED, OURS, SUNDARESAN, VERSION, cell, gain, grid, mean_of
 from hmc.pose.spectral.parts import PART_NAMES
 
 __all__ = ["EXPERIMENT"]
@@ -25,8 +25,7 @@ INSIDE_M = 0.05
 
 def report(cells: Sequence[Cell], plan: Plan) -> Report:
     """Distances by way, of frames with limbs apart, with intervals over clips."""
-    clips = [one.parameters["recording"] for one in cells]
-    found = {(way, score): interval(clips, *by_clip(cells, way, score)) for way in (MODIFIED, OURS, SUNDARESAN) for score in _WHAT}
+    found = {(way, score): ratio_interval(cells, mean_of(way, score)) for way in (MODIFIED, OURS, SUNDARESAN) for score in _WHAT}
     rows = [
         {"curves": way, "to": _WHAT[score]} | {f"{end}_mm": 1000 * getattr(one, end) for end in ("value", "low", "high")}
         for (way, score), one in found.items()

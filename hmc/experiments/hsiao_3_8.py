@@ -13,7 +13,7 @@ import numpy as np
 
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs
-from hmc.experiments.engine.intervals import difference, interval
+from hmc.experiments.engine.ratios import Parts, ratio_gain, ratio_interval
 from hmc.experiments.hsiao_runs import person_hulls, scene_of, sequences
 from hmc.io.recording import open_recording
 from hmc.pose.spectral.ghosts import check_ghosts, remove_ghosts
@@ -72,10 +72,8 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     table = [_row(one.parameters["recording"].rpartition("@")[0], rig, [one]) for rig, own in of_rig.items() for one in own]
     table += [_row("all", rig, own) for rig, own in of_rig.items() if own]
     few, many = of_rig["1 to 4"], of_rig["eight"]
-    clips = [one.parameters["recording"] for one in few]
-    legs = interval(clips, *_sums(few, "legs"))
-    more = difference(clips, _sums(few, "legs"), _sums(many, "legs"))
-    far = difference(clips, _sums(few, "litres_far_from_body"), _sums(many, "litres_far_from_body"))
+    legs = ratio_interval(few, _mean("legs"))
+    more, far = (ratio_gain(few, many, _mean(column)) for column in ("legs", "litres_far_from_body"))
     claims = (
         Claim("more than two legs with four cameras", legs.low > 2, str(legs)),
         Claim("more legs with four cameras than with eight", more.above_zero, f"more by {more}"),
@@ -88,8 +86,8 @@ def _values(one: Cell, column: str) -> np.ndarray:
     return np.array(one.results["rows"], float).reshape(-1, 1 + len(_COLUMNS))[:, 1 + _COLUMNS.index(column)]
 
 
-def _sums(cells: Sequence[Cell], column: str) -> tuple[np.ndarray, np.ndarray]:
-    return np.array([_values(one, column).sum() for one in cells]), np.array([len(_values(one, column)) for one in cells])
+def _mean(column: str) -> Parts:
+    return lambda one: (float(_values(one, column).sum()), float(len(_values(one, column))))
 
 
 def _row(name: str, rig: str, cells: Sequence[Cell]) -> dict:

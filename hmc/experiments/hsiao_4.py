@@ -14,13 +14,11 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
-from hmc.experiments.engine.intervals import Interval, interval
 from hmc.experiments.engine.style import COLORS
-from hmc.experiments.hsiao_runs import WAYS, pose_cell, sequences
-from hmc.experiments.nine_actions import NINE_ACTIONS, QUICK_SUFFIX
+from hmc.experiments.hsiao_runs import WAYS, facing_interval, pose_cell, sequence_name, sequences
+from hmc.experiments.nine_actions import NINE_ACTIONS
 from hmc.experiments.pose_intervals import SCORES, ahead, is_followed, score_interval
 from hmc.experiments.truth import estimates
-from hmc.landmarks import LANDMARKS
 from hmc.metrics.landmarks import landmark_errors
 
 __all__ = ["EXPERIMENT"]
@@ -41,15 +39,15 @@ def grid(plan: Plan) -> list[dict]:
 
 def report(cells: Sequence[Cell], plan: Plan) -> Report:
     """A row a sequence and way, with intervals; errors over time; of the thesis's system, whether every sequence is followed."""
-    by: dict[tuple[str, str], list[Cell]] = {(_name(one), one.parameters["way"]): [] for one in cells}
+    by: dict[tuple[str, str], list[Cell]] = {(sequence_name(one), one.parameters["way"]): [] for one in cells}
     for one in cells:
-        by[_name(one), one.parameters["way"]].append(one)
+        by[sequence_name(one), one.parameters["way"]].append(one)
     names = list(dict.fromkeys(name for name, _ in by))
     of_way = {way: [one for one in cells if one.parameters["way"] == way] for way in WAYS}
     rows = [_row(name, way, by[name, way]) for name in names for way in WAYS if (name, way) in by]
     rows += [_row(ALL, way, own) for way, own in of_way.items() if own]
     lost = [name for name in names if not is_followed(by.get((name, PRINTED), [])) or len(by[name, PRINTED]) < 2]
-    facing = _facing(of_way[PRINTED])
+    facing = facing_interval(of_way[PRINTED])
     claims = (
         Claim(
             "the thesis's system follows the person in every sequence: of each more than half of all landmarks within 100 mm",
@@ -67,10 +65,6 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     return Report((Table("hsiao-4", "Nine actions by spectral skeletons and swarms.", rows),), {"hsiao-4": draw(by, names)}, claims)
 
 
-def _name(one: Cell) -> str:
-    return one.parameters["recording"].rpartition("@")[0].removesuffix(QUICK_SUFFIX)
-
-
 def _row(name: str, way: str, cells: Sequence[Cell]) -> dict:
     scores = {score: score_interval(cells, score) for score in SCORES}
     frames = sum(one.results["frames"] for one in cells)
@@ -78,28 +72,10 @@ def _row(name: str, way: str, cells: Sequence[Cell]) -> dict:
         {"sequence": name, "way": way, "what": NINE_ACTIONS[name][0] if name in NINE_ACTIONS else "", "seeds and clips": len(cells)}
         | {"frames": frames, "frames_paper": NINE_ACTIONS[name][3] if name in NINE_ACTIONS else None}
         | {score: str(value) for score, value in scores.items()}
-        | {"facing_percent": str(_facing(cells))}
+        | {"facing_percent": str(facing_interval(cells))}
         | {what: sum(one.results[what] for one in cells) for what in ("restarts", "without_fit")}
         | {f"{what}_per_frame": np.mean([one.results[f"{what}_per_frame"] for one in cells]) for what in ("evaluations", "seconds")}
     )
-
-
-def _facing(cells: Sequence[Cell]) -> Interval:
-    """Percentage of frames in which a body faces less than 90 degrees away from how it truly does, of those with a fit."""
-    clips, sums, counts = [], [], []
-    for one in cells:
-        estimate, truth = (_across(points) for points in estimates(one))
-        known = np.isfinite(estimate).all(1) & np.isfinite(truth).all(1)
-        clips.append(one.parameters["recording"])
-        sums.append(100 * np.sum((estimate * truth).sum(1)[known] > 0))
-        counts.append(np.sum(known))
-    return interval(clips, np.array(sums), np.array(counts))
-
-
-def _across(points: np.ndarray) -> np.ndarray:
-    """From right to left over the floor, by hips and shoulders of landmarks (n, 15, 3): (n, 2)."""
-    at = {name: points[:, k, :2] for k, name in enumerate(LANDMARKS)}
-    return at["l_hip"] - at["r_hip"] + at["l_shoulder"] - at["r_shoulder"]
 
 
 def draw(by: dict[tuple[str, str], list[Cell]], names: Sequence[str]) -> plt.Figure:

@@ -18,7 +18,7 @@ from scipy.optimize import differential_evolution, dual_annealing
 from hmc.body.spin_skeleton import model_of_height, skeleton_landmarks
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs
-from hmc.experiments.engine.intervals import difference
+from hmc.experiments.engine.ratios import Parts, ratio_gain
 from hmc.experiments.engine.selection import REPEAT
 from hmc.experiments.engine.style import COLORS
 from hmc.experiments.hsiao_runs import VOXEL_M, person_hulls, sequences
@@ -139,8 +139,7 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
                     "stuck_percent": 100 * np.mean(own[:, 2] > 80), "landmarks_mm": np.median(own[:, 3]), "evaluations": own[:, 4].mean(),
                 }
             )  # fmt: skip
-    clips = [one.parameters["recording"] for one in cells]
-    gain = difference(clips, _errors(cells, FLAT), _errors(cells, HIERARCHICAL))
+    gain = ratio_gain(cells, cells, _errors(FLAT), smaller_parts=_errors(HIERARCHICAL))
     claims = (Claim("hierarchical swarms end with a smaller error than flat ones at equal evaluations", gain.above_zero, f"by {gain} mm"),)
     figure, ax = plt.subplots(figsize=(7, 3.2))
     ax.boxplot([rows[rows[:, 1] == k, 2] for k in range(len(METHODS))], tick_labels=METHODS, medianprops={"color": COLORS["sparse"]})
@@ -149,10 +148,15 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     return Report((Table("hsiao-pso", "Optimisers at equal evaluations.", table),), {"hsiao-pso": figure}, claims)
 
 
-def _errors(cells: Sequence[Cell], method: str) -> tuple[np.ndarray, np.ndarray]:
-    """Sum of the errors with which a method ends, mm, and number of fits, one a cell."""
-    own = [(rows := np.array(one.results["rows"], float).reshape(-1, 5))[rows[:, 1] == METHODS.index(method), 2] for one in cells]
-    return np.array([errors.sum() for errors in own]), np.array([len(errors) for errors in own])
+def _errors(method: str) -> Parts:
+    """Sum of the errors with which a method ends, mm, and number of fits."""
+
+    def parts(one: Cell) -> tuple[float, float]:
+        rows = np.array(one.results["rows"], float).reshape(-1, 5)
+        errors = rows[rows[:, 1] == METHODS.index(method), 2]
+        return float(errors.sum()), float(len(errors))
+
+    return parts
 
 
 EXPERIMENT = Experiment("hsiao-pso", "hierarchical against flat swarms and SciPy", "Hsiao, 3.2.2.2", grid, cell, report, version=2)

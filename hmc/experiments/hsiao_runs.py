@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from hmc.errors import InputError
-from hmc.experiments.engine.experiment import Parameters, Plan, Results, Source
+from hmc.experiments.engine.experiment import Cell, Parameters, Plan, Results, Source
 from hmc.experiments.engine.inputs import Inputs, rendered
+from hmc.experiments.engine.intervals import Interval
+from hmc.experiments.engine.ratios import ratio_interval
 from hmc.experiments.markerless_runs import FRONTEND, VOXEL_M, pose_results, run_method, tracked
 from hmc.experiments.nine_actions import NINE_ACTIONS, QUICK_SUFFIX, nine_recipes
-from hmc.experiments.truth import stature_m
+from hmc.experiments.truth import estimates, stature_m
 from hmc.io.recording import Recording
 from hmc.landmarks import LANDMARKS
 from hmc.pose.follow import FollowOptions
@@ -29,7 +31,9 @@ from hmc.voxels.components import components
 from hmc.voxels.grid import VoxelGrid
 from hmc.voxels.hulls import HullStep, stream_hulls
 
-__all__ = ["VOXEL_M", "WAYS", "limbs_apart", "person_hulls", "pose_cell", "scene_of", "sequences"]
+__all__ = [
+    "VOXEL_M", "WAYS", "facing_interval", "followed", "limbs_apart", "person_hulls", "pose_cell", "scene_of", "sequence_name", "sequences",
+]  # fmt: skip
 
 
 def _each_alone() -> PoseMethod:
@@ -107,9 +111,13 @@ def pose_cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) 
     inputs : Inputs
     rng : numpy.random.Generator
     """
-    seen = tracked(inputs, parameters["recording"], 0)
+    return followed(parameters["recording"], WAYS[parameters["way"]](), inputs, rng)
+
+
+def followed(label: str, method: PoseMethod, inputs: Inputs, rng: np.random.Generator) -> Results:
+    """A recording by any method, as `pose_cell` does it."""
+    seen = tracked(inputs, label, 0)
     options = FollowOptions(VOXEL_M, int(rng.integers(2**31)), stature_m(seen.recording))
-    method = WAYS[parameters["way"]]()
     spent: list[tuple[int, float]] = []
 
     def counted(rng: np.random.Generator, before: Tracked, view: PersonView) -> StepResult:
@@ -130,3 +138,25 @@ def pose_cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) 
         "evaluations_per_frame": evaluations,
         "seconds_per_frame": seconds,
     }
+
+
+def sequence_name(one: Cell) -> str:
+    """The sequence of a cell, in full or quick."""
+    return one.parameters["recording"].rpartition("@")[0].removesuffix(QUICK_SUFFIX)
+
+
+def facing_interval(cells: Sequence[Cell]) -> Interval:
+    """Percentage of frames in which a body faces less than 90 degrees away from how it truly does, of those with a fit."""
+    return ratio_interval(cells, _facing)
+
+
+def _facing(one: Cell) -> tuple[float, float]:
+    estimate, truth = (_across(points) for points in estimates(one))
+    known = np.isfinite(estimate).all(1) & np.isfinite(truth).all(1)
+    return 100 * float(np.sum((estimate * truth).sum(1)[known] > 0)), float(np.sum(known))
+
+
+def _across(points: np.ndarray) -> np.ndarray:
+    """From right to left over the floor, by hips and shoulders of landmarks (n, 15, 3): (n, 2)."""
+    at = {name: points[:, k, :2] for k, name in enumerate(LANDMARKS)}
+    return at["l_hip"] - at["r_hip"] + at["l_shoulder"] - at["r_shoulder"]

@@ -22,7 +22,7 @@ from hmc.experiments import kehl_runs
 from hmc.experiments.drill_clips import clip_names
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs, rendered
-from hmc.experiments.engine.intervals import difference, interval
+from hmc.experiments.engine.ratios import Parts, ratio_gain, ratio_interval
 from hmc.experiments.engine.style import COLORS
 from hmc.experiments.truth import HEIGHT_M, first_truth, standing_state, stature_m
 from hmc.landmarks import LANDMARKS
@@ -104,12 +104,9 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     rows, claims = [], []
     for axes, (preset, family) in zip(panels, PRESETS.items(), strict=True):
         own = [one for one in cells if one.parameters["preset"] == preset]
-        clips = [str(one.parameters["recording"]) for one in own]
-        back = {}
-        for name in METHODS:
-            runs = [np.array(one.results["distance_m"][name], float) for one in own]
-            back[name] = np.array([100.0 * (run < NEAR_M).sum() for run in runs]), np.array([float(len(run)) for run in runs])
-            found, distance = interval(clips, *back[name]), np.concatenate(runs)
+        back = {name: ratio_interval(own, _led_back(name)) for name in METHODS}
+        for name, found in back.items():
+            distance = np.concatenate([np.array(one.results["distance_m"][name], float) for one in own])
             color = COLORS["sparse"] if name == "stochastic" else COLORS["naive"]
             share = np.arange(1, len(distance) + 1) / max(len(distance), 1)
             axes.plot(np.sort(1000 * distance), share, color=color, label=name, drawstyle="steps-post")
@@ -117,8 +114,8 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
                 "sampling": name, "preset": family, "displacements": len(distance), "led_back_percent": found.value, "low": found.low,
                 "high": found.high, "median_distance_mm": float(1000 * np.median(distance)) if len(distance) else None,
             })  # fmt: skip
-        gain = difference(clips, back["stochastic"], back["deterministic"])
-        detail = f"{interval(clips, *back['stochastic'])} and {interval(clips, *back['deterministic'])} %: more by {gain}"
+        gain = ratio_gain(own, own, _led_back("stochastic"), smaller_parts=_led_back("deterministic"))
+        detail = f"{back['stochastic']} and {back['deterministic']} %: more by {gain}"
         claims.append(Claim(f"stochastic sampling, {family}, leads back more often than deterministic", gain.above_zero, detail))
         axes.axvline(1000 * NEAR_M, color=COLORS["paper"], linewidth=1, linestyle="--")
         axes.set(xlabel="elbow or wrist off the best pose, the farther, mm", title=family)
@@ -129,6 +126,16 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
         f"A right arm displaced by {low:.0f} to {high:.0f} degrees; led back: elbow and wrist within {1000 * NEAR_M:.0f} mm. Figure 9."
     )
     return Report((Table("kehl-9", caption, rows),), {"kehl-9": figure}, tuple(claims))
+
+
+def _led_back(name: str) -> Parts:
+    """Percentage of displacements."""
+
+    def parts(one: Cell) -> tuple[float, float]:
+        distance = np.array(one.results["distance_m"][name], float)
+        return 100.0 * float((distance < NEAR_M).sum()), float(len(distance))
+
+    return parts
 
 
 EXPERIMENT = Experiment("kehl-9", "stochastic against deterministic sampling", "Kehl, Figures 9 and 10", grid, cell, report, version=2)

@@ -20,7 +20,8 @@ from hmc.errors import InputError
 from hmc.experiments.drill_clips import clip_names
 from hmc.experiments.engine.experiment import Cell, Claim, Parameters, Plan, Results
 from hmc.experiments.engine.inputs import Inputs, rendered
-from hmc.experiments.engine.intervals import Interval, difference, interval
+from hmc.experiments.engine.intervals import Interval
+from hmc.experiments.engine.ratios import Parts, ratio_gain, ratio_interval
 from hmc.experiments.engine.selection import REPEAT
 from hmc.experiments.engine.style import COLORS
 from hmc.experiments.truth import first_truth, stature_m
@@ -217,12 +218,12 @@ def error_interval(cells: Sequence[Cell], joints: Sequence[int] = (), last: floa
     last : float
         Of each run the last so large a share of the frames.
     """
-    return interval(_clips(cells), *_errors(cells, joints, last))
+    return ratio_interval(cells, _errors(joints, last))
 
 
 def joint_gain(better: Sequence[Cell], worse: Sequence[Cell], joints: Sequence[int] = ()) -> Interval:
     """By how many millimetres the first group is nearer than the second, on the same clips and runs."""
-    return difference(_clips(worse), _errors(worse, joints, 1.0), _errors(better, joints, 1.0))
+    return ratio_gain(worse, better, _errors(joints))
 
 
 def nearer(text: str, better: Sequence[Cell], worse: Sequence[Cell], joints: Sequence[int]) -> Claim:
@@ -234,7 +235,7 @@ def nearer(text: str, better: Sequence[Cell], worse: Sequence[Cell], joints: Seq
 
 def seconds_gain(faster: Sequence[Cell], slower: Sequence[Cell]) -> Interval:
     """By how many milliseconds a frame the first group is quicker than the second."""
-    return difference(_clips(slower), _milliseconds(slower), _milliseconds(faster))
+    return ratio_gain(slower, faster, _milliseconds)
 
 
 def is_followed(cells: Sequence[Cell], last: float = 1.0) -> bool:
@@ -242,24 +243,20 @@ def is_followed(cells: Sequence[Cell], last: float = 1.0) -> bool:
     return error_interval(cells, last=last).high < FOLLOWED_MM
 
 
-def _clips(cells: Sequence[Cell]) -> list[str]:
-    return [str(one.parameters["recording"]) for one in cells]
+def _errors(joints: Sequence[int] = (), last: float = 1.0) -> Parts:
+    """Sum of a run's errors and how many."""
 
-
-def _errors(cells: Sequence[Cell], joints: Sequence[int], last: float) -> tuple[np.ndarray, np.ndarray]:
-    """Sum of errors and how many, a run."""
-    parts = []
-    for one in cells:
+    def parts(one: Cell) -> tuple[float, float]:
         errors = errors_mm(one)
         errors = errors[-max(1, round(last * len(errors))) :, list(joints) or slice(None)]
-        parts.append((errors.sum(), errors.size))
-    sums, counts = np.array(parts, float).reshape(-1, 2).T
-    return sums, counts
+        return float(errors.sum()), float(errors.size)
+
+    return parts
 
 
-def _milliseconds(cells: Sequence[Cell]) -> tuple[np.ndarray, np.ndarray]:
-    seconds = [np.asarray(one.results["seconds"], float) for one in cells]
-    return np.array([1000 * one.sum() for one in seconds]), np.array([one.size for one in seconds], float)
+def _milliseconds(one: Cell) -> tuple[float, float]:
+    seconds = np.asarray(one.results["seconds"], float)
+    return 1000 * float(seconds.sum()), float(seconds.size)
 
 
 def shown(axes, picture: dict, title: str) -> None:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from hmc.errors import InputError
 from hmc.experiments.by_action import COLUMNS, MATCHED_MM, NEAR_MM, STRICT_MM
 from hmc.experiments.engine.experiment import Cell, Claim
-from hmc.experiments.engine.intervals import Interval, difference, interval
-from hmc.experiments.engine.selection import REPEAT
+from hmc.experiments.engine.intervals import Interval
+from hmc.experiments.engine.ratios import Parts, ratio_gain, ratio_interval
 from hmc.experiments.truth import estimates
 from hmc.metrics.landmarks import landmark_errors
 
@@ -34,8 +34,7 @@ def score_interval(cells: Sequence[Cell], score: str) -> Interval:
     score : str
         One of `SCORES`.
     """
-    runs = _runs(cells)
-    return interval([clip for clip, _ in runs], *_sums(runs.values(), score))
+    return ratio_interval(cells, _parts(score))
 
 
 def score_difference(first: Sequence[Cell], second: Sequence[Cell], score: str, but: Sequence[str] = ("method",)) -> Interval:
@@ -55,13 +54,7 @@ def score_difference(first: Sequence[Cell], second: Sequence[Cell], score: str, 
     InputError
         When no two cells agree.
     """
-    one, other = ({_without(cell, but): cell for cell in cells} for cells in (first, second))
-    shared = [key for key in one if key in other]
-    if not shared:
-        raise InputError(f"groups are compared cell by cell, and no two of these agree in all but {', '.join(but)}")
-    runs = [_runs([cells[key] for key in shared]) for cells in (one, other)]
-    sums = [_sums(cells.values(), score) for cells in runs]
-    return difference([clip for clip, _ in runs[0]], sums[0], sums[1])
+    return ratio_gain(first, second, _parts(score), lambda one: _without(one, but))
 
 
 def ahead(text: str, better: Sequence[Cell], worse: Sequence[Cell], score: str = "MMTA_percent", but: Sequence[str] = ("method",)) -> Claim:
@@ -123,33 +116,24 @@ def is_followed(cells: Sequence[Cell], least_percent: float = 50.0) -> bool:
     return score_interval(cells, "MMTA_percent").low > least_percent
 
 
-def _runs(cells: Sequence[Cell]) -> dict[tuple[str, int], list[Cell]]:
-    """Cells by clip and seed: what else differs was chosen, not drawn, and is taken together."""
-    found: dict[tuple[str, int], list[Cell]] = {}
-    for one in cells:
-        found.setdefault((str(one.parameters["recording"]), one.parameters.get(REPEAT, 0)), []).append(one)
-    return found
-
-
 def _without(one: Cell, but: Sequence[str]) -> str:
     return repr(sorted((name, value) for name, value in one.parameters.items() if name not in but))
 
 
-def _sums(runs: Iterable[Sequence[Cell]], score: str) -> tuple[np.ndarray, np.ndarray]:
-    """Numerator and denominator of a score, one a run."""
+def _parts(score: str) -> Parts:
+    """Numerator and denominator of a score of a run."""
     if score not in SCORES:
         raise InputError(f"no interval of {score!r}; there are {', '.join(SCORES)}")
-    parts = [np.sum([_parts(1000 * landmark_errors(*estimates(one)), score) for one in cells], axis=0) for cells in runs]
-    sums, counts = np.array(parts, float).reshape(-1, 2).T
-    return sums, counts
 
+    def parts(one: Cell) -> tuple[float, float]:
+        errors = 1000 * landmark_errors(*estimates(one))
+        if score == "mean_mm":  # of each frame the mean of what is estimated in it (Canton, Eq. 5.1, 5.2)
+            there = np.isfinite(errors)
+            means = np.where(there, errors, 0.0).sum(axis=1)[there.any(axis=1)] / there.sum(axis=1)[there.any(axis=1)]
+            return float(means.sum()), float(len(means))
+        matched = errors <= next((within for name, within in _WITHIN.items() if name in score), MATCHED_MM)
+        if score.startswith("MMTP"):
+            return float(errors[matched].sum()), float(matched.sum())
+        return 100 * float(matched.sum()), float((~np.isnan(errors)).sum())
 
-def _parts(errors: np.ndarray, score: str) -> tuple[float, float]:
-    if score == "mean_mm":  # of each frame the mean of what is estimated in it (Canton, Eq. 5.1, 5.2)
-        there = np.isfinite(errors)
-        means = np.where(there, errors, 0.0).sum(axis=1)[there.any(axis=1)] / there.sum(axis=1)[there.any(axis=1)]
-        return float(means.sum()), float(len(means))
-    matched = errors <= next((within for name, within in _WITHIN.items() if name in score), MATCHED_MM)
-    if score.startswith("MMTP"):
-        return float(errors[matched].sum()), float(matched.sum())
-    return 100 * float(matched.sum()), float((~np.isnan(errors)).sum())
+    return parts

@@ -14,7 +14,7 @@ import numpy as np
 from hmc.experiments import tracking_runs as runs
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs
-from hmc.experiments.engine.intervals import Interval, difference, interval
+from hmc.experiments.engine.ratios import Parts, ratio_gain, ratio_interval
 from hmc.io.results import TrackTable, read_centroids
 from hmc.metrics.scores import evaluate_tracks
 from hmc.tracking.trackers import TRACKERS
@@ -34,6 +34,8 @@ CHANGES: dict[str, tuple[str, dict]] = {
 }
 #: What the whole difference is expected to come from.
 CAUSES = {"SS": "SS, none in an empty voxel and half drawn anew", "PF": "PF, weights to the power of 20"}
+#: Of a run's results: how far the estimate is behind who walks, metres, and in how many frames somebody does.
+BEHIND = ("behind_m", "walking")
 VOXEL_M = 0.05
 NUMBERS = {"sparse": 800, "particle": 100}
 #: Who is slower stands, who is faster walks, metres a second; speeds are over so many frames before and after.
@@ -87,13 +89,13 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     for name in CHANGES:
         own = _of(cells, name)
         standing, walking, behind = (
-            _interval(own, total, count) for total, count in (("standing_m", "standing"), ("walking_m", "walking"), ("behind_m", "walking"))
+            ratio_interval(own, _mean(*names)) for names in (("standing_m", "standing"), ("walking_m", "walking"), BEHIND)
         )
         rows.append({"tracker": name, "runs": len(own), "standing_mm": standing.value, "walking_mm": walking.value,
                      "behind_mm": behind.value, "behind_low": behind.low, "behind_high": behind.high})  # fmt: skip
     claims = []
     for name, changed in CAUSES.items():
-        late, gain = _interval(_of(cells, name), "behind_m", "walking"), _gain(_of(cells, name), _of(cells, changed))
+        late, gain = ratio_interval(_of(cells, name), _mean(*BEHIND)), ratio_gain(_of(cells, name), _of(cells, changed), _mean(*BEHIND))
         claims.append(Claim(f"{name} as printed is behind who walks", late.above_zero, f"by {late} mm"))
         claims.append(Claim(f"{name} is less behind with this changed: {changed.partition(', ')[2]}", gain.above_zero, f"by {gain} mm"))
     caption = (
@@ -107,17 +109,8 @@ def _of(cells: Sequence[Cell], name: str) -> list[Cell]:
     return [one for one in cells if one.parameters["change"] == name]
 
 
-def _sums(cells: Sequence[Cell], total: str, count: str) -> tuple[np.ndarray, np.ndarray]:
-    return np.array([1000 * one.results[total] for one in cells]), np.array([float(one.results[count]) for one in cells])
-
-
-def _interval(cells: Sequence[Cell], total: str, count: str) -> Interval:
-    return interval([one.parameters["recording"] for one in cells], *_sums(cells, total, count))
-
-
-def _gain(late: Sequence[Cell], less: Sequence[Cell]) -> Interval:
-    first, second = (_sums(some, "behind_m", "walking") for some in (late, less))
-    return difference([one.parameters["recording"] for one in late], first, second)
+def _mean(total: str, count: str) -> Parts:
+    return lambda one: (1000 * one.results[total], float(one.results[count]))
 
 
 EXPERIMENT = Experiment("why-behind", "why the printed filters are behind who walks", "ours", grid, cell, report)

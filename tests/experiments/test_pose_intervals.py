@@ -57,7 +57,7 @@ def test_only_what_both_have_is_compared():
     some = cells(0.02, np.random.default_rng(2))
     alone = score_difference(some[:4], some, "MMTP_mm")
     assert alone.value == 0
-    with pytest.raises(InputError, match="no two of these agree in all but method"):
+    with pytest.raises(InputError, match="no two of these agree"):
         score_difference(some[:3], some[3:], "MMTP_mm")
     with pytest.raises(InputError, match="no interval of 'angle_deg'"):
         score_interval(some, "angle_deg")

@@ -25,7 +25,8 @@ from hmc.body.spin_skeleton import (
     torso_frames,
 )
 from hmc.landmarks import LANDMARKS
-from hmc.pose.methods.pso import SWARM_PRESETS
+from hmc.pose.method import Capture
+from hmc.pose.methods.pso import SWARM_PRESETS, pso_method
 from hmc.pose.objectives.curves import KINDS, MODEL_PARTS, observe_curves, pair_errors, skeleton_error
 from hmc.pose.objectives.volume import volume_error
 from hmc.pose.spectral.reading import read_body
@@ -34,6 +35,7 @@ from hmc.pose.spectral.volume import FARTHEST_M, observe_volume
 from hmc.pose.steps.swarm.fit import STAGES, FitSettings, fit_flat, fit_hierarchical, rest_state, torso_moves
 from hmc.pose.steps.swarm.heading import facing_evidence, heading_of, spin_towards
 from hmc.pose.steps.swarm.temporal import RestartSettings, SwarmSettings, is_upright, start_fits, swarm_step
+from hmc.pose.views.person_view import PersonView
 from hmc.search.swarm import PsoSettings, pso_init, pso_run, pso_step
 
 MODEL = model_of_height(1.75)
@@ -428,3 +430,14 @@ def test_who_is_followed_badly_is_started_anew_and_not_where_the_fit_is_good():
         _, info = swarm_step(np.random.default_rng(1), MODEL, replace(good, state=bad), reading, 30.0, None, settings)
         costs[info.started] = info.cost_m
     assert costs[True] < 0.6 * costs[False]
+
+
+def test_what_is_read_in_the_voxels_can_be_given():
+    asked = []
+
+    def read(view, height_m):
+        asked.append((view.frame, height_m))
+
+    start = pso_method(SWARM_PRESETS["hsiao2008"], read=read).start
+    assert start(np.random.default_rng, [PersonView(frame=3), PersonView(frame=4)], Capture(), 1.7) is None
+    assert asked == [(3, 1.7), (4, 1.7)]

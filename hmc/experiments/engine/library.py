@@ -60,6 +60,7 @@ EXPERIMENTS = {
     "hsiao-3.16": "hsiao_3_16",
     "hsiao-4": "hsiao_4",
     "hsiao-pso": "hsiao_pso",
+    "why-hsiao": "why_hsiao",
     "kehl-1": "kehl_1",
     "kehl-4": "kehl_4",
     "kehl-9": "kehl_9",

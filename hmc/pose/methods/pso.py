@@ -21,7 +21,7 @@ from hmc.pose.steps.polish import polished
 from hmc.pose.steps.presets import PosePreset
 from hmc.pose.steps.proposal import as_proposed
 from hmc.pose.steps.swarm.fit import FitSettings
-from hmc.pose.steps.swarm.step import SwarmPreset, read_view, swarm_memory, swarm_subject, swarmed, swarmed_near
+from hmc.pose.steps.swarm.step import Read, SwarmPreset, read_view, swarm_memory, swarm_subject, swarmed, swarmed_near
 from hmc.pose.steps.swarm.temporal import RestartSettings, SwarmSettings, swarm_step
 from hmc.pose.views.person_view import PersonView
 
@@ -62,9 +62,12 @@ class ReadingStart:
     Parameters
     ----------
     preset : SwarmPreset
+    read : callable, optional
+        In place of `hmc.pose.steps.swarm.step.read_view` by the preset.
     """
 
     preset: SwarmPreset
+    read: Read | None = None
 
     def __call__(
         self, frame_rng: FrameRng, views: Sequence[PersonView], capture: Capture, height_m: float | None = None
@@ -73,8 +76,9 @@ class ReadingStart:
         height_m = height_m or estimate_height([view.target for view in views], capture.floor_z)
         body = thesis_body(height_m)
         model = model_of_body(body, self.preset.thesis)
+        read = self.read or partial(read_view, settings=self.preset.reading)
         for k, view in enumerate(views):
-            reading = read_view(view, height_m, self.preset.reading)
+            reading = read(view, height_m)
             if reading is None:
                 continue
             swarm, _ = swarm_step(frame_rng(k), model, None, reading, capture.fps, view.velocity, self.preset.swarm)
@@ -84,7 +88,7 @@ class ReadingStart:
         return None
 
 
-def pso_method(preset: SwarmPreset, house: PosePreset | None = None) -> PoseMethod:
+def pso_method(preset: SwarmPreset, house: PosePreset | None = None, read: Read | None = None) -> PoseMethod:
     """Swarms as the thesis has them, or with the house's start, body, refinement, search, recovery and legs.
 
     Parameters
@@ -92,14 +96,16 @@ def pso_method(preset: SwarmPreset, house: PosePreset | None = None) -> PoseMeth
     preset : SwarmPreset
     house : PosePreset, optional
         Whose start and refinement are used; the thesis's method alone where left out.
+    read : callable, optional
+        Of the thesis's method alone: what is read in a person's voxels, in place of what the preset says.
     """
     equip = partial(swarm_subject, preset=preset)
     if house is None:
         return PoseMethod(
             "pso",
             "Hsiao (2008)",
-            ReadingStart(preset),
-            as_proposed(swarmed(preset)),
+            ReadingStart(preset, read),
+            as_proposed(swarmed(preset, read)),
             NEEDS,
             equip,
             limits=thesis_body(1.7).limits,

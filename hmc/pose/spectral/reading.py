@@ -10,7 +10,7 @@ from hmc.pose.spectral.segmentation import LimbSegmentationSettings, Segmentatio
 from hmc.pose.spectral.skeleton import SkeletonSettings, equally_spaced, extract_skeletons
 from hmc.pose.spectral.volume import BodyVolume, observe_volume
 
-__all__ = ["BodyReading", "ReadingSettings", "cut_foot", "read_body"]
+__all__ = ["BodyReading", "ReadingSettings", "cut_foot", "read_body", "read_parts"]
 
 
 @dataclass(frozen=True)
@@ -100,6 +100,29 @@ def read_body(
     """
     settings = settings or ReadingSettings()
     segmentation = segment_body(voxels, points, voxel_size_m, settings.segmentation, votes)
+    return read_parts(segmentation, voxels, points, voxel_size_m, height_m, settings)
+
+
+def read_parts(
+    segmentation: Segmentation, voxels: np.ndarray, points: np.ndarray, voxel_size_m: float, height_m: float, settings: ReadingSettings
+) -> BodyReading:
+    """Draw the curves of a person's voxels whose parts are known.
+
+    Parameters
+    ----------
+    segmentation : Segmentation
+    voxels : ndarray of int, shape (n, 3)
+    points : ndarray, shape (n, 3)
+        Their centres, world, metres.
+    voxel_size_m : float
+    height_m : float
+        Stature.
+    settings : ReadingSettings
+
+    Returns
+    -------
+    BodyReading
+    """
     if segmentation.status != "segmented":
         return BodyReading(segmentation, {}, 0.0, np.zeros((0, 3)), (), segmentation.status)
     # Voxels that are apart from the body are not the person's.

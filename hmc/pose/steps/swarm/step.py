@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -17,9 +18,11 @@ from hmc.pose.steps.proposal import Proposal, Propose
 from hmc.pose.steps.swarm.temporal import SwarmInfo, SwarmSettings, SwarmState, fit_near, swarm_step
 from hmc.pose.views.person_view import PersonView
 
-__all__ = ["NO_VOXELS", "SwarmPreset", "read_view", "swarm_memory", "swarm_subject", "swarmed", "swarmed_near"]
+__all__ = ["NO_VOXELS", "Read", "SwarmPreset", "read_view", "swarm_memory", "swarm_subject", "swarmed", "swarmed_near"]
 
 NO_VOXELS = "no fit: no voxels of this person in this frame"
+#: What is read in a person's voxels, by the stature in metres: None where there are none.
+Read = Callable[[PersonView, float], BodyReading | None]
 #: The skeleton of 23 parameters among a subject's extras.
 _SKELETON = "skeleton"
 #: What a swarm remembers, in this order, under this name.
@@ -59,23 +62,26 @@ def swarm_subject(body: BodyModel, capture: Capture, preset: SwarmPreset) -> Sub
     return replace(make_subject(body, capture), extras={_SKELETON: model_of_body(body, preset.thesis)})
 
 
-def swarmed(preset: SwarmPreset) -> Propose:
+def swarmed(preset: SwarmPreset, read: Read | None = None) -> Propose:
     """A swarm near the last pose, on the curves of the person's voxels; the skeleton it finds, posed as the subject's body.
 
     Parameters
     ----------
     preset : SwarmPreset
+    read : callable, optional
+        In place of `read_view` by the preset.
 
     Returns
     -------
     callable
         `Propose`, of subjects as from `swarm_subject`.
     """
+    read = read or partial(read_view, settings=preset.reading)
 
     def propose(rng: np.random.Generator, tracked: Tracked, view: PersonView) -> Proposal:
         subject, before = tracked.subject, _before(tracked)
         model: SkeletonModel = subject.extras[_SKELETON]
-        reading = read_view(view, subject.body.height_m, preset.reading)
+        reading = read(view, subject.body.height_m)
         if reading is None:
             missed = replace(before, missed=before.missed + 1)
             return Proposal(tracked.state, tracked.state, status=NO_VOXELS, memory=swarm_memory(missed))
