@@ -34,7 +34,7 @@ ACTORS = {
         long_hair=True, sleeves="long",
     ),
 }  # fmt: skip
-#: Length and rate in full; HumanEva-I has 30 frames a second.
+#: Length and rate in full: the thesis says 30 frames a second of its cameras (section 6.6.1); HumanEva-I was released with 60.
 SECONDS, FPS = 10.0, 30.0
 #: The quick mode's recordings: smaller images and fewer of them.
 QUICK_SUFFIX, QUICK_SECONDS, QUICK_FPS, QUICK_SIZE_PX = "_quick", 1.6, 20.0, (320, 240)

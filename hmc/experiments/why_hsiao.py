@@ -58,6 +58,9 @@ def _true(preset: SwarmPreset) -> Callable[[str], PoseMethod]:
     return lambda label: pso_method(preset, read=true_reading(label, preset.reading))
 
 
+#: Of `default`, the swarm on curves alone, and the house without refinement and search.
+_CURVES = replace(_OURS, swarm=replace(_OURS.swarm, voxels=False))
+_UNREFINED = replace(_HOUSE, refine=RefineSettings(iterations=0), search=None)
 _FOUR_TIMES = tuple((4 * particles, iterations) for particles, iterations in _PRINTED.swarm.fit.stages)
 AS_PRINTED, DEFAULT = "as printed", "default"
 #: What is changed, and how, by a recording's label.
@@ -70,10 +73,9 @@ CHANGES: dict[str, Callable[[str], PoseMethod]] = {
     "true parts, curves named": _true(_with(swarm={"named": True})),
     "true parts, anatomical ranges": _true(_with(thesis=False)),
     DEFAULT: lambda label: pso_method(_OURS, _HOUSE),
-    "default without voxels in the swarm": lambda label: pso_method(replace(_OURS, swarm=replace(_OURS.swarm, voxels=False)), _HOUSE),
-    "default without refinement and search": lambda label: pso_method(
-        _OURS, replace(_HOUSE, refine=RefineSettings(iterations=0), search=None)
-    ),
+    "default without voxels in the swarm": lambda label: pso_method(_CURVES, _HOUSE),
+    "default without refinement and search": lambda label: pso_method(_OURS, _UNREFINED),
+    "default without either": lambda label: pso_method(_CURVES, _UNREFINED),
 }
 
 

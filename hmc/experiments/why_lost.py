@@ -1,6 +1,7 @@
 """Why the printed filter loses who walks, and not who boxes: single changes of it. Ours, not a paper's.
 
 Source of what is changed: Canton (2009), sections 2.2.4 (tolerance of the hull), 3.1.2.2 (motion), 3.2.2 (P0, Eq. 3.22), 6.7.2 (particles).
+The symmetric likelihood and strong annealing are those of `default`.
 """
 
 from __future__ import annotations
@@ -28,6 +29,9 @@ CHANGES: dict[str, Mapping[str, Any]] = {
     "constant velocity": {"motion": "smooth"},
     "tolerant hull": {"hull": "tolerant"},
     "four times the particles": {"particles": 2400},
+    "the symmetric likelihood": {"likelihood": "symmetric"},
+    "strong annealing": {"annealing": "strong"},
+    "strong annealing, eight times the particles": {"annealing": "strong", "particles": 4800},
 }
 
 

@@ -184,9 +184,8 @@ CATALOGUE = (
         why=_TOUCHING,
     ),
     Entry("hsiao-4", HSIAO, "nine actions", "a fitted skeleton in every sequence, over time", _OWN_VIDEOS,
-        why="What touches has no curve, curves alone do not tell which way a body faces, and the thesis prints neither lengths nor the "
-        "thresholds of its segmentation. With the true parts, average people's lengths, anatomical ranges and the heading by feet and walk "
-        "the swarm on curves alone is at 40 mm on a walk where as printed, with our thresholds, it is lost.",
+        why="Limbs that touch the body have no curve, and the thesis prints neither lengths nor the thresholds of its segmentation. With every "
+        "voxel's true part the same system follows who waves, sits and walks (why-hsiao); more particles or other ranges change nothing.",
     ),
     Entry(
         "hsiao-pso", HSIAO, "hierarchical against flat PSO, and against scipy.optimize", "hierarchical better at equal evaluations",

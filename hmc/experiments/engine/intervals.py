@@ -47,7 +47,8 @@ class Interval:
         return bool(self.low > 0)
 
     def __str__(self) -> str:
-        return f"{self.value:.1f} [{self.low:.1f}, {self.high:.1f}]"
+        value = f"{self.value:.1f}"
+        return f"{value} [{self.low:.1f}, {self.high:.1f}]" if np.isfinite([self.low, self.high]).all() else value
 
 
 def interval(clips: Sequence[str], sums: np.ndarray, counts: np.ndarray, draws: int = DRAWS) -> Interval:
