@@ -184,8 +184,9 @@ CATALOGUE = (
         why=_TOUCHING,
     ),
     Entry("hsiao-4", HSIAO, "nine actions", "a fitted skeleton in every sequence, over time", _OWN_VIDEOS,
-        why="Limbs that touch the body have no curve, and the thesis prints neither lengths nor the thresholds of its segmentation. With every "
-        "voxel's true part the same system follows who waves, sits and walks (why-hsiao); more particles or other ranges change nothing.",
+        why="Limbs that touch the body have no curve, and the thesis prints neither lengths nor the thresholds of its segmentation. With "
+        "every voxel's true part the same system follows who waves, sits and walks (why-hsiao); more particles or other ranges change "
+        "nothing.",
     ),
     Entry(
         "hsiao-pso", HSIAO, "hierarchical against flat PSO, and against scipy.optimize", "hierarchical better at equal evaluations",
