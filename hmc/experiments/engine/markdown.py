@@ -29,7 +29,7 @@ def to_markdown(rows: Sequence[Row], link: str = "") -> str:
         lines += [f"## {work}", "", "| | what | the paper | here |", "| --- | --- | --- | --- |"]
         for row in own:
             entry, run = row.entry, f" ({row.results[0].what})" if row.results else ""
-            name = f"[{entry.id}](#{entry.id.replace('.', '')})" if row.results else entry.id
+            name = f"[{entry.id}](#{entry.id.lower().replace('.', '')})" if row.results else entry.id
             lines.append(f"| {name} | {_cell(entry.title)} | {_cell(entry.shows)} | {row.label}{_cell(run)} |")
         lines.append("")
     for row in rows:
