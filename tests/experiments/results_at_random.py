@@ -34,7 +34,7 @@ from hmc.landmarks import LANDMARKS
 from hmc.pose.spectral.parts import PART_NAMES
 from hmc.tracking.person_tree import LEAF, default_tree
 
-__all__ = ["RESULTS", "claims_at_random"]
+__all__ = ["RESULTS", "claims_at_random", "claims_on", "held_always"]
 
 FRAMES, FPS = 60, 20.0
 #: Frames in which nothing is seen, where that is studied.
@@ -287,13 +287,23 @@ RESULTS = {
 }  # fmt: skip
 
 
-def claims_at_random(name, seed, noise):
-    """The claims of an experiment's quick report on results that are drawn at random."""
-    rng, plan = np.random.default_rng(seed), Plan(quick=True)
-    experiment = find_experiment(name)
-    draw = RESULTS[experiment.store_name]
-    cells = [Cell(parameters, draw(rng, parameters, noise)) for parameters in experiment.grid(plan)]
+def claims_on(name, draw, seed=0, quick=True):
+    """The claims of an experiment on results that ``draw(rng, parameters)`` makes of every cell."""
+    rng, plan, experiment = np.random.default_rng(seed), Plan(quick=quick), find_experiment(name)
+    cells = [Cell(parameters, draw(rng, parameters)) for parameters in experiment.grid(plan)]
     with house_style(), np.errstate(all="ignore"):
         report = experiment.report(cells, plan)
         plt.close("all")
+    assert report.claims
     return report.claims
+
+
+def held_always(name, draw, quick=True, seeds=(1, 2, 3)):
+    """The claims that hold in every draw: of intervals of 95 % one in forty is above zero by chance."""
+    return set.intersection(*({claim.text for claim in claims_on(name, draw, seed, quick) if claim.holds} for seed in seeds))
+
+
+def claims_at_random(name, seed, noise):
+    """The claims of an experiment's quick report on results that are drawn at random."""
+    draw = RESULTS[find_experiment(name).store_name]
+    return claims_on(name, lambda rng, parameters: draw(rng, parameters, noise), seed)

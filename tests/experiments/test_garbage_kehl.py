@@ -1,13 +1,11 @@
 """No claim of Kehl's figures holds on garbage: on noise in place of poses, hulls and edges, and on methods that do not differ."""
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from results_at_random import claims_on, held_always
 from test_experiments_chapters_7_8 import walking
 
-from hmc.experiments import Plan, find_experiment, kehl_1, kehl_4
-from hmc.experiments.engine.experiment import Cell
-from hmc.experiments.engine.style import house_style
+from hmc.experiments import kehl_4
 from hmc.landmarks import LANDMARKS
 
 #: The quick tests draw the results of all experiments at random (`test_garbage_everywhere`).
@@ -50,40 +48,28 @@ def displaced(rng, parameters, off_m):
 MADE = {"kehl-1": timed, "kehl-4": seen_edges, "kehl-9": displaced} | dict.fromkeys(FOLLOWED, followed)
 
 
-def claims_on(name, off_m, seed=0):
-    rng, experiment, plan = np.random.default_rng(seed), find_experiment(name), Plan(quick=True)
-    cells = [Cell(parameters, MADE[name](rng, parameters, off_m)) for parameters in experiment.grid(plan)]
-    with house_style():
-        report = experiment.report(cells, plan)
-        plt.close("all")
-    return report.claims
+def off_by(name, size_m):
+    return lambda rng, parameters: MADE[name](rng, parameters, size_m)
 
 
 @pytest.mark.parametrize("name", STUDIES)
 def test_nothing_holds_on_noise(name):
-    held = [{claim.text for claim in claims_on(name, 2.0, seed) if claim.holds} for seed in (1, 2, 3)]
-    assert not set.intersection(*held)
+    assert not held_always(name, off_by(name, 2.0))
 
 
 @pytest.mark.parametrize("name", [name for name in STUDIES if name != "kehl-4"])
 def test_no_method_is_ahead_of_an_equal_one(name):
-    """Of intervals of 95 % one in forty is above zero by chance: three draws must not agree. Being followed is no comparison."""
+    """Being followed is no comparison."""
     alone = ("follow", "carved anew")
-    held = [
-        {claim.text for claim in claims_on(name, 0.02, seed) if claim.holds and not any(word in claim.text.split(",")[0] for word in alone)}
-        for seed in (1, 2, 3)
-    ]
-    assert not set.intersection(*held)
+    assert not {text for text in held_always(name, off_by(name, 0.02)) if not any(word in text.split(",")[0] for word in alone)}
 
 
 def test_who_is_lost_is_not_followed_and_who_is_near_is():
-    assert [claim.holds for claim in claims_on("kehl-14", 2.0)] == [False, False]
-    assert [claim.holds for claim in claims_on("kehl-14", 0.005)] == [True, True]
-    assert claims_on("kehl-13", 0.01)[0].holds
-    assert not claims_on("kehl-13", 0.3)[0].holds
+    assert [claim.holds for claim in claims_on("kehl-14", off_by("kehl-14", 2.0))] == [False, False]
+    assert [claim.holds for claim in claims_on("kehl-14", off_by("kehl-14", 0.005))] == [True, True]
+    assert claims_on("kehl-13", off_by("kehl-13", 0.01))[0].holds
+    assert not claims_on("kehl-13", off_by("kehl-13", 0.3))[0].holds
 
 
 def test_hulls_that_differ_reproduce_nothing():
-    cells = [Cell(one, timed(np.random.default_rng(0), one, 2.0)) for one in kehl_1.grid(Plan())]
-    assert not any(claim.holds for claim in kehl_1.report(cells, Plan()).claims)
-    plt.close("all")
+    assert not any(claim.holds for claim in claims_on("kehl-1", off_by("kehl-1", 2.0), quick=False))
