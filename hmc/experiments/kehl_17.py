@@ -6,11 +6,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import matplotlib.pyplot as plt
-import numpy as np
-
 from hmc.experiments import kehl_runs
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
+from hmc.experiments.kehl_cues import compared_cues
 from hmc.landmarks import LANDMARKS
 
 __all__ = ["EXPERIMENT"]
@@ -32,21 +30,8 @@ def grid(plan: Plan) -> list[dict]:
 
 def report(cells: Sequence[Cell], plan: Plan) -> Report:
     """Errors of the arm that holds the cube, and some frames."""
-    groups = {name: kehl_runs.of_variant(cells, name) for name in CUES}
-    columns = max(len(groups["SMD"][0].results["pictures"]), 1)
-    figure, panels = plt.subplots(len(CUES), columns, figsize=(3 * columns, 12), squeeze=False)
-    rows = []
-    for line, (name, own) in zip(panels, groups.items(), strict=True):
-        for panel, picture in zip(line, own[0].results["pictures"], strict=False):
-            kehl_runs.shown(panel, picture, f"{CUES[name]}, frame {picture['frame']}")
-        errors = [kehl_runs.errors_mm(one) for one in own]
-        arm = kehl_runs.error_interval(own, ARM)
-        rows.append({
-            "cues": CUES[name], "runs": len(own), "mean_error_mm": kehl_runs.error_interval(own).value,
-            "holding_arm_mm": arm.value, "low_mm": arm.low, "high_mm": arm.high,
-            "holding_arm_within_50mm": float(np.mean([(e[:, ARM] <= 50).mean() for e in errors])),
-            "frames_per_s": 1 / float(np.mean([np.mean(one.results["seconds"]) for one in own])), "paper_frames_per_s": PAPER_FPS,
-        })  # fmt: skip
+    groups, rows, figure = compared_cues(cells, CUES, ARM, "holding_arm")
+    rows = [row | {"paper_frames_per_s": PAPER_FPS} for row in rows]
     claims = tuple(_colors_help(groups, ending) for ending in (", as printed", ""))
     caption = "A cube in the right hand; holding arm: right elbow and wrist. The paper shows pictures only: Kehl, Figure 17."
     return Report((Table("kehl-17", caption, rows),), {"kehl-17": figure}, claims)
