@@ -41,8 +41,9 @@ from hmc.experiments.removal import remover
 from hmc.experiments.truth import HEIGHT_M, first_truth, standing_state, stature_m, truth_track
 from hmc.io.masks import MaskStep, kept_masks
 from hmc.io.recording import Recording
+from hmc.io.results import TrackTable
 from hmc.pose.follow import FollowOptions
-from hmc.pose.method import Capture, begin_tracking
+from hmc.pose.method import Capture, Tracked, begin_tracking, particles_of, with_particles
 from hmc.pose.methods.annealed import annealed_pose_step
 from hmc.pose.methods.scalable import method_preset
 from hmc.pose.registry import pose_method
@@ -184,7 +185,8 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
         ``recording``, ``method`` (of `METHODS`; or one of `MARKERS` or `CHAINS`, which have no other settings), ``repeat``, and as in
         `BASE`: ``cameras`` and ``frames`` (0: all), ``voxel_mm``, ``annealing``, ``layers`` and ``particles`` (of the plain filter),
         ``gamma`` (particles a dimension, of models of rising detail), ``likelihood``, ``density``, ``removed_percent`` of the silhouettes
-        and ``removed`` (`hmc.experiments.removal`); and, where they differ from the preset's, ``hull``, ``motion`` and ``drift_scale``.
+        and ``removed`` (`hmc.experiments.removal`); and, where they differ from the preset's, ``hull``, ``motion`` and ``drift_scale``;
+        and ``led``, whether the root of all particles is moved on with the person's true centroid.
     inputs : Inputs
     rng : numpy.random.Generator
 
@@ -217,7 +219,7 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
         view = views_of(recording, grid, where, hull).get(0, PersonView(hull.index))
         before = thread_time()
         if hull.index > first:
-            pose, info = step(rng, pose, view)
+            pose, info = step(rng, _led(pose, where, hull.index) if parameters.get("led") else pose, view)
         seconds += thread_time() - before
         estimates[hull.index] = landmarks(body, pose.state)
         if hull.index > first and info.missing is not None:
@@ -231,6 +233,16 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
         "truth_m": truth.positions[1:],
         "filter_s_per_frame": seconds / max(1, len(truth.frames) - 1),
     }
+
+
+def _led(pose: Tracked, where: TrackTable, frame: int) -> Tracked:
+    """The pose and its particles with their root moved on over the floor as the person's centroid moved since the last frame."""
+    shift, centres = np.zeros(len(pose.state)), dict(zip(where.frames.tolist(), where.positions, strict=True))
+    if frame in centres and frame - 1 in centres:
+        shift[:2] = (centres[frame] - centres[frame - 1])[:2]
+    last = particles_of(pose)
+    moved = with_particles(replace(last, particles=last.particles + shift))
+    return replace(pose, state=pose.state + shift, memory={**pose.memory, **moved})
 
 
 def _around(recording: Recording, voxel_m: float) -> VoxelGrid:

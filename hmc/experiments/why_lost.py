@@ -26,11 +26,13 @@ CHANGES: dict[str, Mapping[str, Any]] = {
     "spreads' factors as variances": {"annealing": "variances"},
     "P0 twice as wide": {"drift_scale": 2.0},
     "both": {"annealing": "variances", "drift_scale": 2.0},
+    "root led by the true centroid": {"led": True},
     "constant velocity": {"motion": "smooth"},
     "tolerant hull": {"hull": "tolerant"},
     "four times the particles": {"particles": 2400},
     "the symmetric likelihood": {"likelihood": "symmetric"},
     "strong annealing": {"annealing": "strong"},
+    "strong annealing, root led": {"annealing": "strong", "led": True},
     "strong annealing, eight times the particles": {"annealing": "strong", "particles": 4800},
 }
 
