@@ -46,8 +46,8 @@ _MEETINGS = (
 _STEPS = (
     "Who stands and moves the arms is followed about as far as in the thesis; who walks or jogs is lost within a second or two by every "
     "printed filter, with markers as without. No single thing cures that (why-lost): not the readings of P0 and Eq. 3.22, the hull, a "
-    "prediction, the root led by the true centroid, our likelihood, nor eight times the particles. The preset `default`, which refines what "
-    "a filter finds, follows all of them."
+    "prediction, the root led by the true centroid, our likelihood, nor eight times the particles. The preset `default`, which refines "
+    "what a filter finds, follows all of them."
 )
 _MARKER_SCORE = (
     "The printed likelihood asks only whether the detections nearest to a landmark agree with one another, not where the landmark lies in "
@@ -168,8 +168,8 @@ CATALOGUE = (
     Entry(
         "table-8.1", CANTON, "all methods together, with table 8.2",
         "MMTP SHBM 2 45.3 mm, marker-based 45.9, SHBM 1 47.5, APF 90.2; MMTA 76.4, 95.3, 76.9, 71.4 %", _HUMANEVA, _STEPS
-        + " Of who walks and jogs the thesis's order comes out, SHBM model 2, model 1, APF, with APF's MMTP no larger: matched "
-        "landmarks are nearer than the thesis's 90 mm.",
+        + " Of who walks and jogs the thesis's order by MMTA comes out, SHBM model 2, model 1, APF, of who stands and moves the arms it does "
+        "not (table-8.1-gains); and what APF matches is as near as what SHBM matches, where the thesis has twice the distance.",
     ),
     Entry(
         "fig-8.1", CANTON, "APF and SHBM-APF against particles", "SHBM better at every count; at 2,200 by 58 % in MMTP and 51 % in MMTA",
