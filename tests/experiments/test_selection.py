@@ -41,6 +41,15 @@ def test_seeds_go_up_and_down():
     assert all(cell in grid_of(TOY, changed_plan(Plan(), 5)) for cell in TOY.grid(Plan()))
 
 
+def test_fewer_seeds_of_cells_with_seeds_in_turn_are_cells_of_the_grid():
+    """A Latin square of clips and seeds: one seed of each is the square itself, and what more is asked for is beside it."""
+    square = [{"recording": f"{name}@12", "repeat": place % 3} for place, name in enumerate(NAMES)]
+    latin = Experiment("latin", "", "", lambda plan: [*square, {"recording": "drawn@1"}], lambda *given: {}, lambda cells, plan: None)
+    assert grid_of(latin, changed_plan(Plan(), 1)) == latin.grid(Plan())
+    twice = grid_of(latin, changed_plan(Plan(), 2))
+    assert len(twice) == 2 * len(square) + 1 and all(cell in twice for cell in latin.grid(Plan()))
+
+
 def test_parameters_are_the_same_for_all_cells_and_equal_cells_are_one():
     grid = grid_of(TOY, changed_plan(Plan(), settings=(None, ("frames", 60), ("layers", 4))))
     assert {(cell["frames"], cell["layers"]) for cell in grid} == {(60, 4)} and len(grid) == len(NAMES) * 2

@@ -168,8 +168,8 @@ CATALOGUE = (
     Entry(
         "table-8.1", CANTON, "all methods together, with table 8.2",
         "MMTP SHBM 2 45.3 mm, marker-based 45.9, SHBM 1 47.5, APF 90.2; MMTA 76.4, 95.3, 76.9, 71.4 %", _HUMANEVA, _STEPS
-        + " Of who walks and jogs the thesis's order by MMTA comes out, SHBM model 2, model 1, APF, of who stands and moves the arms it does "
-        "not (table-8.1-gains); and what APF matches is as near as what SHBM matches, where the thesis has twice the distance.",
+        + " Of who walks and jogs the thesis's order by MMTA comes out, SHBM model 2, model 1, APF, of who stands and moves the arms it "
+        "does not (table-8.1-gains); and what APF matches is as near as what SHBM matches, where the thesis has twice the distance.",
     ),
     Entry(
         "fig-8.1", CANTON, "APF and SHBM-APF against particles", "SHBM better at every count; at 2,200 by 58 % in MMTP and 51 % in MMTA",

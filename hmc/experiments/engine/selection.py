@@ -70,8 +70,23 @@ def grid_of(experiment: Experiment, plan: Plan) -> list[dict[str, Any]]:
     if plan.seeds is not None:
         if not any(REPEAT in cell for cell in grid):
             raise InputError(f"{experiment.id} draws nothing at random from seed to seed; leave --seeds out")
-        grid = _once(cell | {REPEAT: seed} if REPEAT in cell else cell for cell in grid for seed in range(plan.seeds))
+        grid = _with_seeds(grid, plan.seeds)
     return grid
+
+
+def _with_seeds(grid: list[dict[str, Any]], n: int) -> list[dict[str, Any]]:
+    """So many seeds of every cell that draws: the first that the grid has of it, which need not be 0, and then others."""
+    seeds: dict[str, list[int]] = {}
+    for cell in grid:
+        if REPEAT in cell:
+            seeds.setdefault(digest(cell | {REPEAT: 0}), []).append(cell[REPEAT])
+    for own in seeds.values():
+        own += [seed for seed in range(len(own) + n) if seed not in own]
+    return _once(
+        one
+        for cell in grid
+        for one in ([cell | {REPEAT: seed} for seed in seeds[digest(cell | {REPEAT: 0})][:n]] if REPEAT in cell else [cell])
+    )
 
 
 def _of_actions(experiment: Experiment, grid: list[dict[str, Any]], actions: Sequence[str]) -> list[dict[str, Any]]:
