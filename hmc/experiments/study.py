@@ -128,7 +128,7 @@ def action_bars(rows: Sequence[Mapping[str, Any]], methods: Sequence[str], paper
             axes.plot(places + k * width, paper, "_", color="black", markersize=110 * width / len(actions) + 4, markeredgewidth=2)
         axes.set_xticks(places + width * (len(methods) - 1) / 2, actions, rotation=30, ha="right")
         axes.set_ylabel(label)
-    if any(method in papers for method in methods):
+    if any(papers.get(method) for method in methods):
         panels[0].plot([], [], "_", color="black", markersize=8, markeredgewidth=2, label="the paper")
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
     return figure

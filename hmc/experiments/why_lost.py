@@ -47,11 +47,11 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     frame = runs_of(cells)
     frame["change"] = [_change(one) for one in cells]
     table = score_table(frame, ("action", "change"))
-    figure, axes = plt.subplots(figsize=(7.5, 3.2))
+    figure, axes = plt.subplots(figsize=(7.5, 0.34 * len(CHANGES) + 0.9))
     for action, own in table.groupby("action", sort=False):
-        axes.plot(own.change, own.MMTA_percent, "o-", label=action)
-    axes.set(ylabel="MMTA at 100 mm (%)", ylim=(0, 105))
-    axes.tick_params("x", rotation=30)
+        axes.plot(own.MMTA_percent, own.change, "o", label=action)
+    axes.set(xlabel="MMTA at 100 mm (%)", xlim=(0, 105))
+    axes.invert_yaxis()
     axes.legend()
     steps = frame[frame.action != "Box"]
     plain = list(steps[steps.change == AS_PRINTED].run)

@@ -146,7 +146,7 @@ CATALOGUE = (
         "table-6.4", CANTON, "markerless filter by action", "MMTP 72.1 mm (walk), 90.2 on average; MMTA 79.6 %, 71.4; .15 frames a second",
         _HUMANEVA, _STEPS,
     ),
-    Entry("fig-6.19", CANTON, "joint curves against truth (overlays: figure 6.20)", "curves that follow the truth", _HUMANEVA),
+    Entry("fig-6.19", CANTON, "joint curves against truth (overlays: figure 6.20)", "curves that follow the truth", _HUMANEVA, _STEPS),
     Entry("fig-7.8", CANTON, "effective particles and spread by model", "300, 500 and 300 particles; the spread falls in every layer",
         _HUMANEVA,
         "At 50 particles for every dimension that a model adds (6, 10 and 11, the waist in the last one) there are 1,350: Eq. 7.18 counts "
