@@ -24,7 +24,7 @@ from hmc.experiments.engine.intervals import Interval
 from hmc.experiments.engine.ratios import Parts, ratio_gain, ratio_interval
 from hmc.experiments.engine.selection import REPEAT
 from hmc.experiments.engine.style import COLORS
-from hmc.experiments.truth import first_truth, stature_m
+from hmc.experiments.truth import estimates, first_truth, stature_m
 from hmc.io.recording import Recording
 from hmc.landmarks import BONES, LANDMARKS
 from hmc.metrics.landmarks import landmark_errors
@@ -197,8 +197,7 @@ def _picture(recording: Recording, seen: Skin | None, points: np.ndarray, index:
 
 def errors_mm(one: Cell) -> np.ndarray:
     """Errors of a cell, (n, 15), millimetres."""
-    estimate, truth = (np.array(one.results[name], float).reshape(-1, len(LANDMARKS), 3) for name in ("estimate_m", "truth_m"))
-    return 1000 * landmark_errors(estimate, truth)
+    return 1000 * landmark_errors(*estimates(one))
 
 
 def of_variant(cells: Sequence[Cell], variant: str) -> list[Cell]:

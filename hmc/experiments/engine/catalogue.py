@@ -44,9 +44,9 @@ _MEETINGS = (
     "is nearer. Rendered hulls have neither the shadows nor the faulty calibrations of CLEAR."
 )
 _STEPS = (
-    "Who stands and moves the arms is followed about as far as in the thesis; who walks or jogs is lost within a second or two by every "
-    "printed filter, with markers as without. No single thing cures that (why-lost): not the readings of P0 and Eq. 3.22, the hull, a "
-    "prediction, the root led by the true centroid, our likelihood, nor eight times the particles. The preset `default`, which refines "
+    "Who stands and moves the arms is followed about as far as in the thesis; who walks or jogs is soon lost by every printed filter, with "
+    "markers as without (figure 6.19 shows a walk). No single thing cures that (why-lost): not the readings of P0 and Eq. 3.22, the hull, "
+    "a prediction, the root led by the true centroid, our likelihood, nor eight times the particles. The preset `default`, which refines "
     "what a filter finds, follows all of them."
 )
 _MARKER_SCORE = (

@@ -111,13 +111,8 @@ def read_parts(
     Parameters
     ----------
     segmentation : Segmentation
-    voxels : ndarray of int, shape (n, 3)
-    points : ndarray, shape (n, 3)
-        Their centres, world, metres.
-    voxel_size_m : float
-    height_m : float
-        Stature.
-    settings : ReadingSettings
+    voxels, points, voxel_size_m, height_m, settings
+        As for `read_body`.
 
     Returns
     -------
