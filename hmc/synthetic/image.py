@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 
 from hmc.camera.model import Camera, backproject, project
-from hmc.synthetic.rasterise import rasterise
+from hmc.synthetic.rasterise import Fragments, rasterise
 from hmc.synthetic.room import box_mesh, cast_rays
 from hmc.synthetic.scene import Crowd, Scene
 from hmc.synthetic.shading import ShadowMap, contact_map, flat_index, irradiance, look_up, shadow_map, soft_shadow
 
-__all__ = ["Backdrop", "LitCrowd", "develop", "light_crowd", "make_backdrop", "picture", "static_shadows"]
+__all__ = ["Backdrop", "LitCrowd", "develop", "exposure", "light_crowd", "make_backdrop", "picture", "relit", "static_shadows"]
 
 #: Anti-aliasing: every pixel of a person is the mean of this many samples squared.
 SAMPLES = 2
@@ -122,6 +122,16 @@ def make_backdrop(scene: Scene, camera: Camera, furniture: tuple[ShadowMap, ...]
     )  # fmt: skip
 
 
+def relit(backdrop: Backdrop, before: Scene, after: Scene) -> Backdrop:
+    """The empty room of a scene under the lamps of another that differs in their power only."""
+    ambient = before.recipe.light.ambient
+    old, new = (
+        ambient + sum(share[:, None] * lamp.power for share, lamp in zip(backdrop.shares, scene.lights, strict=True))
+        for scene in (before, after)
+    )
+    return replace(backdrop, radiance=(backdrop.radiance * (new / old)).astype(np.float32))
+
+
 def _open_sky(normals: np.ndarray) -> np.ndarray:
     """Share of the ambient light that a surface gets by where it faces."""
     return 0.80 + 0.20 * normals[:, 2]
@@ -184,16 +194,12 @@ def picture(scene: Scene, camera: Camera, backdrop: Backdrop, lit: LitCrowd) -> 
     width, height = camera.size
     radiance = backdrop.radiance.copy()
     _darken(scene, backdrop, lit, radiance)
+    if scene.recipe.room.gloss:
+        _mirror(scene, camera, backdrop, lit, radiance)
     labels = np.zeros(width * height, np.uint8)
     crowd = lit.crowd
     if len(crowd.vertices):
-        uv, valid = project(camera, crowd.vertices)
-        depth = (crowd.vertices @ camera.rotation.T + camera.translation)[:, 2]
-        uv[~valid | (depth < 0.1)] = np.nan
-        fine = (uv + 0.5) * SAMPLES - 0.5
-        seen = rasterise(fine, depth, crowd.triangles, (width * SAMPLES, height * SAMPLES))
-        row, column = np.divmod(seen.pixels, width * SAMPLES)
-        pixel = row // SAMPLES * width + column // SAMPLES
+        seen, pixel = _draw(camera, crowd.vertices, crowd.triangles)
         free = seen.depth < backdrop.depth[pixel]  # furniture and walls may stand before the person
         pixel, triangles, weights = pixel[free], crowd.triangles[seen.triangles[free]], seen.weights[free]
         color = np.einsum("nk,nkc->nc", weights, lit.radiance[triangles]) * backdrop.gain
@@ -207,6 +213,31 @@ def picture(scene: Scene, camera: Camera, backdrop: Backdrop, lit: LitCrowd) -> 
         counts = np.stack([np.bincount(place[whose == k], minlength=len(touched)) for k in range(-1, len(scene.actors))])
         labels[touched] = np.where(coverage >= 0.5, counts.argmax(axis=0), 0)
     return radiance, labels.reshape(height, width)
+
+
+def _draw(camera: Camera, vertices: np.ndarray, triangles: np.ndarray) -> tuple[Fragments, np.ndarray]:
+    """The nearest triangle at each sample on which one falls, and the pixel of each such sample."""
+    width, height = camera.size
+    uv, valid = project(camera, vertices)
+    depth = (vertices @ camera.rotation.T + camera.translation)[:, 2]
+    uv[~valid | (depth < 0.1)] = np.nan
+    seen = rasterise((uv + 0.5) * SAMPLES - 0.5, depth, triangles, (width * SAMPLES, height * SAMPLES))
+    row, column = np.divmod(seen.pixels, width * SAMPLES)
+    return seen, row // SAMPLES * width + column // SAMPLES
+
+
+def _mirror(scene: Scene, camera: Camera, backdrop: Backdrop, lit: LitCrowd, radiance: np.ndarray) -> None:
+    """Mix the people's mirror images into a glossy floor, in place."""
+    crowd = lit.crowd
+    if not len(crowd.vertices):
+        return
+    faces = crowd.triangles[:, ::-1]  # a mirror turns them round
+    seen, pixel = _draw(camera, crowd.vertices * (1, 1, -1), faces)
+    floor = backdrop.floor[pixel] >= 0
+    pixel, triangles, weights = pixel[floor], faces[seen.triangles[floor]], seen.weights[floor]
+    color = np.einsum("nk,nkc->nc", weights, lit.radiance[triangles]) * backdrop.gain * backdrop.vignette[pixel, None]
+    share = np.float32(scene.recipe.room.gloss / SAMPLES**2)
+    np.add.at(radiance, pixel, share * (color - backdrop.radiance[pixel]).astype(np.float32))
 
 
 def _darken(scene: Scene, backdrop: Backdrop, lit: LitCrowd, radiance: np.ndarray) -> None:
@@ -229,7 +260,14 @@ def _darken(scene: Scene, backdrop: Backdrop, lit: LitCrowd, radiance: np.ndarra
     radiance[changed] *= left / full
 
 
-def develop(radiance: np.ndarray, size: tuple[int, int], scene: Scene, rng: np.random.Generator) -> np.ndarray:
+def exposure(radiance: np.ndarray, backdrop: Backdrop, scene: Scene) -> float:
+    """The gain of a camera in the action, as a share of that in the empty scene."""
+    sensor = scene.recipe.image
+    empty, now = (float(np.minimum(light[::7], 1).mean()) for light in (backdrop.radiance, radiance))
+    return sensor.exposure * (empty / now) ** sensor.auto_exposure
+
+
+def develop(radiance: np.ndarray, size: tuple[int, int], scene: Scene, rng: np.random.Generator, exposure: float = 1.0) -> np.ndarray:
     """What the sensor makes of the light: gain, gamma, shot and read noise, eight bits.
 
     Parameters
@@ -240,13 +278,15 @@ def develop(radiance: np.ndarray, size: tuple[int, int], scene: Scene, rng: np.r
     scene : Scene
         Its recipe's `image` has the noise.
     rng : Generator
+    exposure : float
+        By which the light is multiplied.
 
     Returns
     -------
     ndarray of uint8, shape (h, w, 3)
     """
     sensor = scene.recipe.image
-    gain = 1 + sensor.flicker * rng.standard_normal()
+    gain = exposure * (1 + sensor.flicker * rng.standard_normal())
     # The gamma curve from a table: a power for every value would be the slowest step of all.
     place = np.clip(radiance * np.float32(gain * (_GAMMA.size - 1)), 0, _GAMMA.size - 1).astype(np.int32)
     grey = _GAMMA[place]

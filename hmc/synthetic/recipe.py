@@ -49,7 +49,7 @@ class RoomRecipe:
     """Walls and floor; colors are sRGB in [0, 1]. One texture or color serves all four walls, or there are four.
 
     A door is a wall (0 x low, 1 x high, 2 y low, 3 y high) and the place of its middle along it, metres: a dark opening through which the
-    actors of scripts come and go.
+    actors of scripts come and go. `gloss` is the share of what a pixel of the floor shows that is the mirror image of a person.
     """
 
     size_m: tuple[float, float, float] = (6.4, 5.6, 3.2)
@@ -58,25 +58,33 @@ class RoomRecipe:
     floor: str = "tiles"
     floor_color: Color = (0.60, 0.58, 0.56)
     posters: int = 5
+    gloss: float = 0.0
     doors: tuple[tuple[int, float], ...] = ()
 
 
 @dataclass(frozen=True)
 class LightRecipe:
-    """Lamps on the ceiling."""
+    """Lamps on the ceiling; `dimmed` is the first one's light in the action as a share of that in the empty scene."""
 
     lamps: int = 3
     brightness: float = 1.0
     ambient: float = 0.26
+    dimmed: float = 1.0
 
 
 @dataclass(frozen=True)
 class ImageRecipe:
-    """The sensor: noise in grey levels (of 255) at black, what the light adds at white, and the flicker of the gain (a fraction)."""
+    """The sensor: noise in grey levels (of 255) at black, what the light adds at white, and the flicker of the gain (a fraction).
+
+    `exposure` is the light in the action as a share of that in the empty scene. With `auto_exposure` 1 a camera keeps the mean brightness
+    of its images as it was in the empty scene, whoever comes in; with 0 it does not care.
+    """
 
     read_noise: float = 1.8
     shot_noise: float = 2.2
     flicker: float = 0.004
+    exposure: float = 1.0
+    auto_exposure: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ import shutil
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -20,7 +21,7 @@ from hmc.io.files import write_toml
 from hmc.io.results import PoseTable, TrackTable, write_joints, write_tracks
 from hmc.landmarks import LANDMARKS
 from hmc.synthetic.actor import PARTS
-from hmc.synthetic.image import Backdrop, develop, light_crowd, make_backdrop, picture, static_shadows
+from hmc.synthetic.image import Backdrop, develop, exposure, light_crowd, make_backdrop, picture, relit, static_shadows
 from hmc.synthetic.recipe import Recipe, load_recipe
 from hmc.synthetic.scene import Scene, build_scene, crowd_at
 from hmc.synthetic.shading import ShadowMap
@@ -164,25 +165,28 @@ class _Studio:
         self.scene = scene
         self.store = store
         self.furniture: tuple[ShadowMap, ...] = static_shadows(scene)
-        self.backdrops: list[Backdrop] | None = None
+        self.backdrops: list[Backdrop] = []
+        self.action, self.relit = _dimmed(scene), list[Backdrop]()
 
     def store_backdrop(self, camera: int) -> None:
         backdrop = make_backdrop(self.scene, self.scene.rig[camera], self.furniture, _rng(self.scene, 0, camera))
         np.savez(self.store / f"{camera}.npz", **vars(backdrop))
 
-    def load(self) -> list[Backdrop]:
-        if self.backdrops is None:
-            self.backdrops = []
-            for camera in range(len(self.scene.rig)):
-                with np.load(self.store / f"{camera}.npz", allow_pickle=False) as arrays:
-                    self.backdrops.append(Backdrop(**arrays))
-        return self.backdrops
+    def load(self) -> None:
+        for camera in range(len(self.scene.rig)):
+            with np.load(self.store / f"{camera}.npz", allow_pickle=False) as arrays:
+                self.backdrops.append(Backdrop(**arrays))
+        changed = self.action is not self.scene
+        self.relit = [relit(one, self.scene, self.action) for one in self.backdrops] if changed else self.backdrops
 
     def render(self, frame: int) -> Pictures:
         """The images of all cameras, and silhouettes where they are due; negative frames show the empty room."""
-        scene, pictures = self.scene, []
+        if not self.backdrops:
+            self.load()
+        scene, backdrops = (self.scene, self.backdrops) if frame < 0 else (self.action, self.relit)
+        pictures: Pictures = []
         lit = light_crowd(scene, crowd_at(scene, frame), self.furniture) if frame >= 0 or scene.props else None
-        for k, (camera, backdrop) in enumerate(zip(scene.rig, self.load(), strict=True)):
+        for k, (camera, backdrop, empty) in enumerate(zip(scene.rig, backdrops, self.backdrops, strict=True)):
             rng = _rng(scene, 1 + (frame if frame >= 0 else 10**7 - frame), k)
             labels = None
             radiance = backdrop.radiance
@@ -190,8 +194,18 @@ class _Studio:
                 radiance, labels = picture(scene, camera, backdrop, lit)
                 if frame < 0 or frame % scene.recipe.silhouette_every:
                     labels = None
-            pictures.append((develop(radiance, camera.size, scene, rng), labels))
+            gain = exposure(radiance, empty, scene) if frame >= 0 else 1.0
+            pictures.append((develop(radiance, camera.size, scene, rng, gain), labels))
         return pictures
+
+
+def _dimmed(scene: Scene) -> Scene:
+    """The scene with its lamps as they are in the action."""
+    share = scene.recipe.light.dimmed
+    if share == 1:
+        return scene
+    first, *others = scene.lights
+    return replace(scene, lights=(replace(first, power=first.power * share), *others))
 
 
 def _rng(scene: Scene, stage: int, camera: int) -> np.random.Generator:

@@ -1,4 +1,4 @@
-"""People whom no track owns yet, among the voxels of a frame: pieces put together, pairs taken apart.
+"""People whom no track owns yet, among the voxels of a frame: pieces put together.
 
 What makes one a person is decided by `hmc.tracking.likeness.looks_like_person`. Source: Canton (2009), section 4.2.3.
 """
@@ -11,11 +11,10 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from hmc.tracking.blobs import Blobs, Observation, blob_features
-from hmc.tracking.joined import cut_between
 from hmc.tracking.likeness import looks_like_person
 from hmc.tracking.settings import LifecycleSettings
 
-__all__ = ["newcomers", "one_or_two", "unowned_blobs"]
+__all__ = ["newcomers", "unowned_blobs"]
 
 
 def unowned_blobs(observation: Observation, owners: np.ndarray, settings: LifecycleSettings) -> tuple[np.ndarray, Blobs]:
@@ -76,32 +75,3 @@ def newcomers(observation: Observation, owners: np.ndarray, settings: LifecycleS
     """
     labels, blobs = unowned_blobs(observation, owners, settings)
     return [np.flatnonzero(labels == b) for b in np.flatnonzero(looks_like_person(blobs, settings))]
-
-
-def one_or_two(observation: Observation, rows: np.ndarray, settings: LifecycleSettings) -> list[np.ndarray]:
-    """A set of voxels, or the two people in it (`hmc.tracking.joined`), each of whom must look like a person.
-
-    Parameters
-    ----------
-    observation : Observation
-    rows : ndarray of int
-        The set's voxels.
-    settings : LifecycleSettings
-
-    Returns
-    -------
-    list of ndarray of int
-        One or two parts of `rows`.
-    """
-    sure = rows[observation.certain[rows]]
-    cut = (
-        cut_between(observation.points[sure], observation.voxel_size_m)
-        if len(sure) * observation.voxel_size_m**3 > settings.least_joined_m3
-        else None
-    )
-    if cut is None:
-        return [rows]
-    axis, limit = cut
-    second = observation.points[:, :2] @ axis > limit
-    sides = blob_features(observation.points[sure], second[sure].astype(int), 2, observation.voxel_size_m)
-    return [rows[~second[rows]], rows[second[rows]]] if looks_like_person(sides, settings).all() else [rows]

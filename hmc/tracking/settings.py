@@ -40,6 +40,8 @@ class LifecycleSettings:
         And what share of the person's usual volume.
     confirm_s, confirm_frames : float, int
         A candidate becomes a person after this time and at least this many frames.
+    beside_m, confirm_beside_s : float
+        Nearer to a track than this, seen from above, it takes this time: between people there are ghosts that last for some frames.
     patience_s : float
         A track is deleted after this time without support.
     edge_m : float
@@ -81,6 +83,8 @@ class LifecycleSettings:
     keep_share: float = 0.2
     confirm_s: float = 0.3
     confirm_frames: int = 4
+    beside_m: float = 1.2
+    confirm_beside_s: float = 1.0
     patience_s: float = 1.0
     edge_m: float = 0.3
     unlike_s: float = 2.0

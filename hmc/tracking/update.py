@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hmc.tracking.blobs import Blobs, Observation, blob_features
+from hmc.tracking.columns import Columns
 from hmc.tracking.settings import FollowingSettings
 from hmc.tracking.state import Candidate, DepartedTrack, PersonMemory, StaticObjects, Track, TrackerInfo, TrackerState, TrackRow
 
@@ -102,8 +103,10 @@ class FrameUpdate:
         Row of the track that owns each voxel, or -1.
     shared : ndarray of bool, shape (k,)
         The person's component is another's too.
-    parted : dict of int to ndarray of int
-        By row of the track, the voxels of a second person whom it held and let go.
+    columns : Columns
+        The upright people of the frame.
+    matched : ndarray of int, shape (k,)
+        The column of each track, or -1.
     pushed : ndarray of int, shape (n,)
         Row of the track whose person pushes or leans on the object of the voxel, or -1.
     measurement : Measurement
@@ -115,8 +118,8 @@ class FrameUpdate:
         Voxels of person-like sets that no track owns.
     births : tuple of TrackRow
         Where those detections are.
-    parted_births : tuple of TrackRow
-        Where the second persons are whom tracks let go.
+    upright_births : tuple of TrackRow
+        Where the columns are that no track has.
     candidates : tuple of Candidate
     next_person : int
     born : tuple of Track
@@ -156,10 +159,11 @@ class FrameUpdate:
     static: StaticObjects
     departed: tuple[DepartedTrack, ...]
     reidentified: tuple[tuple[int, int], ...]
-    parted: dict[int, np.ndarray] = field(default_factory=dict)
+    columns: Columns = field(default_factory=Columns)
+    matched: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
     detections: tuple[np.ndarray, ...] = ()
     births: tuple[TrackRow, ...] = ()
-    parted_births: tuple[TrackRow, ...] = ()
+    upright_births: tuple[TrackRow, ...] = ()
     born: tuple[Track, ...] = ()
     born_rows: tuple[TrackRow, ...] = ()
     handed_over: tuple[int, ...] = ()
@@ -167,6 +171,11 @@ class FrameUpdate:
     rows: tuple[TrackRow, ...] = ()
     begun_s: float = 0.0
     filter_s: float = 0.0
+
+    @property
+    def newcomers(self) -> tuple[np.ndarray, ...]:
+        """Voxels of each column that no track has."""
+        return tuple(voxels for j, voxels in enumerate(self.columns.voxels) if j not in self.matched)
 
     @property
     def claimed(self) -> np.ndarray:
@@ -219,6 +228,7 @@ def begin_update(state: TrackerState, frame: int, observation: Observation, filt
         owners=np.full(n, -1),
         shared=persons,
         pushed=np.full(n, -1),
+        matched=np.full(k, -1),
         measurement=Measurement(voxels, no_blobs, no_blobs, no_blobs, persons, persons, persons),
         tracks=state.tracks,
         memories=memories,

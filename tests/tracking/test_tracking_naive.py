@@ -6,10 +6,9 @@ import pytest
 from hmc.io.results import TrackTable
 from hmc.tracking.association import assign_voxels
 from hmc.tracking.blobs import observe
+from hmc.tracking.columns import find_columns
 from hmc.tracking.following import advance, finish, init
-from hmc.tracking.joined import cut_between
 from hmc.tracking.naive import NaiveSettings
-from hmc.tracking.newcomers import one_or_two
 from hmc.tracking.settings import FollowingSettings
 from hmc.tracking.trackers import TRACKERS
 from hmc.tracking.tracks import fill_gaps, from_rows, person_voxels, run, velocities
@@ -293,5 +292,4 @@ def test_one_person_is_not_cut():
     for volume in (person(0, 0, radius=0.3), person(0, 0) | arms, person(0, 0) | arms | hands):
         observation = observe(GRID, volume)
         assert len(observation.points) * 0.05**3 > settings.lifecycle.least_joined_m3
-        assert len(one_or_two(observation, np.arange(len(observation.points)), settings.lifecycle)) == 1
-    assert cut_between(np.zeros((1, 3)), 0.05) is None
+        assert len(find_columns(observation)) == 1

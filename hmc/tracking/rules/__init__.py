@@ -21,10 +21,10 @@ from hmc.tracking.rules.printed import (
     move_tracks,
 )
 from hmc.tracking.rules.pushed_objects import release_pushed_objects
-from hmc.tracking.rules.separation import separate_detections, separate_tracks
 from hmc.tracking.rules.state_update import update_tracks
 from hmc.tracking.rules.static_objects import hide_static_objects, learn_static_objects, reject_static_objects
 from hmc.tracking.rules.unseen_by_one import reject_unsolid
+from hmc.tracking.rules.upright import match_columns, share_columns
 from hmc.tracking.update import Rule
 
 __all__ = ["PRINTED", "RULES", "RULE_SETS"]
@@ -32,8 +32,9 @@ __all__ = ["PRINTED", "RULES", "RULE_SETS"]
 RULES: tuple[Rule, ...] = (
     hide_static_objects,
     filter_tracks,
+    match_columns,
     associate_voxels,
-    separate_tracks,
+    share_columns,
     release_pushed_objects,
     measure_tracks,
     update_tracks,
@@ -43,7 +44,6 @@ RULES: tuple[Rule, ...] = (
     reject_static_objects,
     reject_ghosts,
     reject_unsolid,
-    separate_detections,
     locate_births,
     reject_false_tracks,
     propose_candidates,

@@ -19,9 +19,9 @@ __all__ = ["confirm", "confirm_candidates", "locate_births", "propose_candidates
 
 
 def locate_births(update: FrameUpdate, settings: FollowingSettings) -> FrameUpdate:
-    """The update with a row for each detection, and for each second person whom a track let go."""
+    """The update with a row for each detection, and for each upright person who has no track."""
     observation = update.observation
-    sets = (*update.detections, *update.parted.values())
+    sets = (*update.detections, *update.newcomers)
     owners = np.full(len(observation.points), -1)
     for j, voxels in enumerate(sets):
         owners[voxels] = j
@@ -29,18 +29,18 @@ def locate_births(update: FrameUpdate, settings: FollowingSettings) -> FrameUpda
     located = [observation.points[best & (owners == j)] for j in range(len(sets))]
     rows = tuple(TrackRow(update.frame, -1, points.mean(axis=0), head_centre(points)) for points in located)
     n = len(update.detections)
-    return replace(update, births=rows[:n], parted_births=rows[n:])
+    return replace(update, births=rows[:n], upright_births=rows[n:])
 
 
 def propose_candidates(update: FrameUpdate, settings: FollowingSettings) -> FrameUpdate:
     """The update whose candidates are carried on with what was seen in this frame, nearest pairs first, and new ones begun.
 
-    Nothing nearer to a track than `least_distance_m` is a candidate, except a person whom a track let go. Candidates missed
-    more often than seen are gone.
+    Nothing nearer to a track than `least_distance_m` is a candidate, except upright people beside whom the track has a column of its
+    own. Candidates missed more often than seen are gone.
     """
     least = settings.lifecycle.least_distance_m
     births = [row for row in update.births if all(horizontal_distance(row.position, track.position) >= least for track in update.tracks)]
-    births += update.parted_births
+    births += update.upright_births
     pairs = sorted(
         (distance, c, s)
         for c, candidate in enumerate(update.candidates)
@@ -61,7 +61,11 @@ def propose_candidates(update: FrameUpdate, settings: FollowingSettings) -> Fram
 
 def confirm_candidates(update: FrameUpdate, settings: FollowingSettings) -> FrameUpdate:
     """The update with the persons who begin in this frame."""
-    candidates, born, rows = confirm(update.candidates, update.state.next_person, update.state.fps, settings.lifecycle)
+    fps, limits = update.state.fps, settings.lifecycle
+    beside = {id(one): _is_beside(one, update.tracks, limits) for one in update.candidates}
+    sure = tuple(one for one in update.candidates if not beside[id(one)] or len(one.rows) >= limits.confirm_beside_s * fps)
+    candidates, born, rows = confirm(sure, update.state.next_person, fps, limits)
+    candidates += tuple(one for one in update.candidates if not any(one is other for other in sure))
     return replace(update, candidates=candidates, born=born, born_rows=tuple(rows), next_person=update.state.next_person + len(born))
 
 
@@ -92,6 +96,11 @@ def confirm(
         tracks.append(Track(person, last.position, last.head, candidate.velocity * fps, 0.0, first.frame, last.frame))
         rows += [replace(row, person=person) for row in candidate.rows]
     return tuple(left), tuple(tracks), rows
+
+
+def _is_beside(candidate: Candidate, tracks: tuple[Track, ...], limits: LifecycleSettings) -> bool:
+    """Whether a candidate is so near to a track that arms, and silhouettes that meet, may be taken for a person."""
+    return any(horizontal_distance(candidate.rows[-1].position, track.position) < limits.beside_m for track in tracks)
 
 
 def _expected(candidate: Candidate, frame: int) -> np.ndarray:

@@ -14,6 +14,9 @@ from hmc.tracking.newcomers import newcomers
 from hmc.tracking.settings import FollowingSettings
 from hmc.tracking.update import FrameUpdate
 
+#: What is no further than this from an upright person, seen from above, is no other who is not: arms and steps reach so far. Metres.
+ARMS_M = 0.6
+
 __all__ = ["detect_people", "owned_voxels"]
 
 
@@ -24,8 +27,9 @@ def detect_people(update: FrameUpdate, settings: FollowingSettings) -> FrameUpda
 
 
 def owned_voxels(update: FrameUpdate) -> np.ndarray:
-    """Voxels that are of no detection, shape (n,) bool: those of the tracks, of what their persons push, of people who part from them."""
+    """Voxels that are of no detection, shape (n,) bool: those of the tracks, of what their persons push, of upright newcomers."""
     held = update.claimed >= 0
-    for rows in update.parted.values():
-        held[rows] = True
+    places = np.delete(update.columns.centres, update.matched[update.matched >= 0], axis=0)
+    for place in places:
+        held |= np.hypot(*(update.observation.points[:, :2] - place).T) <= ARMS_M
     return held

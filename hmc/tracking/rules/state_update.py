@@ -13,6 +13,7 @@ import numpy as np
 from hmc.tracking.association import head_centre
 from hmc.tracking.likeness import is_established
 from hmc.tracking.rules.death import FORGIVEN
+from hmc.tracking.rules.upright import MATCH_M
 from hmc.tracking.settings import FollowingSettings
 from hmc.tracking.state import PersonMemory, Track, TrackRow
 from hmc.tracking.update import FrameUpdate
@@ -51,9 +52,9 @@ def update_tracks(update: FrameUpdate, settings: FollowingSettings) -> FrameUpda
 
 
 def _corrections(update: FrameUpdate, settings: FollowingSettings) -> list[_Correction]:
-    """The filter's position where it knows the person, else the centroid; of one who held another it stands between the two."""
-    k = len(update.state.tracks)
-    known = update.estimate.seen & ~np.isin(np.arange(k), list(update.parted))
+    """The filter's position where it knows the person, else the centroid; of one whose column is elsewhere it knows nothing."""
+    columns = np.append(update.columns.centres, [[np.nan] * 2], axis=0)[update.matched]
+    known = update.estimate.seen & ~(np.hypot(*(update.estimate.positions[:, :2] - columns).T) > MATCH_M)
     measured = np.where(known[:, None], update.estimate.positions, update.measurement.located.centroid)
     gain = np.where(update.shared, np.where(known, settings.filter_gain, settings.shared_gain), 1.0)
     return [_Correction(*one) for one in zip(measured, gain, known.tolist(), strict=True)]

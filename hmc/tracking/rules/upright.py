@@ -1,0 +1,78 @@
+"""Upright people, counted by all cameras: columns of the strict hull that explain the silhouettes, and whose track each is.
+
+A column is matched with the track that should be there. It keeps that track alive and holds its voxels together, whoever stands beside;
+one without a track is a newcomer. People who lie, crouch or are missed by a camera are left to the rules after this one. Shown by the
+recipes `close_white`, `close_table` and `close_queue`, and by `test_two_who_hold_each_other_from_the_first_frame_are_two`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from hmc.tracking.blobs import blob_features
+from hmc.tracking.columns import BODY_M, Columns, explaining, find_columns
+from hmc.tracking.settings import FollowingSettings, LifecycleSettings
+from hmc.tracking.update import FrameUpdate
+
+__all__ = ["match_columns", "share_columns"]
+
+#: A track's person is in a column no further away than this, seen from above; metres.
+MATCH_M = 0.4
+#: A track without a column has the nearest that no other has, up to this distance: the person was lost for a moment. Metres.
+LOST_M = 0.8
+#: Lower ones are furniture as often as people; the rules after this one judge them by more than their height. Metres.
+LEAST_TOP_M = 1.1
+#: So many per cent of a person's voxels may be noise below.
+NOISE_PERCENT = 5
+
+
+def match_columns(update: FrameUpdate, settings: FollowingSettings) -> FrameUpdate:
+    """The update with the upright people of the frame, and the track of each."""
+    observation = update.observation
+    columns = find_columns(observation)
+    columns = columns.take(_tall(update, columns, settings.lifecycle))
+    if observation.views is not None and len(columns):
+        columns = columns.take(explaining(observation.views, observation.points, columns, observation.voxel_size_m))
+    across = update.predicted[:, None, :2] - columns.centres
+    distance = np.sqrt(np.einsum("kmc,kmc->km", across, across))
+    matched = np.full(len(update.predicted), -1)
+    for reach in (MATCH_M, LOST_M):
+        tracks, free = np.flatnonzero(matched < 0), np.setdiff1d(np.arange(len(columns)), matched)
+        rows, found = linear_sum_assignment(np.minimum(distance[np.ix_(tracks, free)], 2 * reach))
+        rows, found = tracks[rows], free[found]
+        near = distance[rows, found] <= reach
+        matched[rows[near]] = found[near]
+    return replace(update, columns=columns, matched=matched)
+
+
+def share_columns(update: FrameUpdate, settings: FollowingSettings) -> FrameUpdate:
+    """The update in which the voxels of each column are its track's, and a newcomer's are nobody's; after all were shared out."""
+    columns, observation = update.columns, update.observation
+    if not len(columns):
+        return update
+    across = observation.points[:, None, :2] - columns.centres
+    distance = np.einsum("nmc,nmc->nm", across, across)
+    nearest = distance.argmin(axis=1)
+    inside = distance[np.arange(len(nearest)), nearest] <= BODY_M**2
+    whose = np.full(len(columns), -1)
+    whose[update.matched[update.matched >= 0]] = np.flatnonzero(update.matched >= 0)
+    return replace(update, owners=np.where(inside, whose[nearest], update.owners))
+
+
+def _tall(update: FrameUpdate, columns: Columns, limits: LifecycleSettings) -> np.ndarray:
+    """Which columns are as high, and reach as far down, as people do; shape (m,) bool."""
+    observation = update.observation
+    labels = np.concatenate([np.full(len(rows), j) for j, rows in enumerate(columns.voxels)] or [np.zeros(0, int)])
+    rows = np.concatenate([*columns.voxels, np.zeros(0, int)]).astype(int)
+    blobs = blob_features(observation.points[rows], labels, len(columns), observation.voxel_size_m)
+    bottom = np.array([np.percentile(observation.points[one, 2], NOISE_PERCENT) for one in columns.voxels])
+    return (
+        (blobs.top_m >= LEAST_TOP_M)
+        & (blobs.top_m <= limits.most_top_m)
+        & (bottom <= limits.most_bottom_m)
+        & (blobs.height_m >= limits.least_height_m)
+        & (blobs.volume_m3 >= limits.least_volume_m3)
+    )

@@ -1,0 +1,115 @@
+"""Upright people in the strict hull: found though they are one set of voxels, and told from ghosts."""
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hmc.camera.model import Rig, look_at, project
+from hmc.tracking.blobs import observe
+from hmc.tracking.columns import BODY_M, OWN_SHARE, OWN_VIEWS, explaining, find_columns
+from hmc.tracking.views import FrameViews
+from hmc.voxels.carving import carve, make_tables
+from hmc.voxels.grid import VoxelGrid
+
+GRID = VoxelGrid(np.array([-2.4, -2.4, 0.0]), 0.06, (80, 80, 33))
+CORNERS = ((2.3, 2.3), (-2.3, 2.3), (-2.3, -2.3), (2.3, -2.3))
+RIG = Rig(tuple(look_at(f"cam_{k}", (240, 180), [x, y, 2.6], [0, 0, 0.9], 80) for k, (x, y) in enumerate(CORNERS)))
+TABLES = make_tables(GRID, RIG)
+
+
+def body(x, y, height=1.72):
+    """Points on the surface of an upright ellipsoid."""
+    angle, polar = np.meshgrid(np.linspace(0, 2 * np.pi, 60), np.linspace(0, np.pi, 60))
+    around = np.stack([0.21 * np.cos(angle) * np.sin(polar), 0.21 * np.sin(angle) * np.sin(polar), height / 2 * np.cos(polar)], axis=-1)
+    return around.reshape(-1, 3) + (x, y, height / 2)
+
+
+def seen(people):
+    """Silhouettes as filled outlines of the projected points, and the observation of their strict hull."""
+    masks = []
+    for camera in RIG:
+        mask = np.zeros(camera.size[::-1], np.uint8)
+        for points in people:
+            uv, _ = project(camera, points)
+            cv2.fillConvexPoly(mask, cv2.convexHull(uv.astype(np.float32)).astype(np.int32), 1)
+        masks.append(mask.view(bool))
+    hull = carve(TABLES, masks)
+    return observe(GRID, hull, hull, FrameViews(RIG, masks))
+
+
+def real(observation):
+    columns = find_columns(observation)
+    return columns.take(explaining(observation.views, observation.points, columns, observation.voxel_size_m))
+
+
+def test_four_people_who_are_one_set_of_voxels_are_four():
+    places = [(-0.45, -0.2), (0.0, 0.35), (0.5, 0.1), (0.1, -0.4)]
+    observation = seen([body(*place) for place in places])
+    assert observation.blobs.counts.max() > 0.95 * observation.blobs.counts.sum()
+    found = real(observation).centres
+    assert len(found) == 4
+    assert max(np.hypot(*(found - place).T).min() for place in places) < 0.15
+
+
+def test_ghosts_between_people_are_left_out():
+    places = [(-1.0, 0.1), (0.9, 0.2), (0.0, 1.0), (0.1, -1.0), (-0.9, 1.0)]
+    observation = seen([body(*place) for place in places])
+    columns = find_columns(observation)
+    ghosts = [j for j, centre in enumerate(columns.centres) if min(np.hypot(*(centre - place)) for place in places) > 0.3]
+    found = real(observation).centres
+    assert ghosts and len(found) == 5
+    assert max(np.hypot(*(found - place).T).min() for place in places) < 0.15
+
+
+def own_share(observation, columns, chosen, j):
+    """The share of each view that a column has alone, cell by cell."""
+    shares = []
+    for camera, mask in zip(RIG, observation.views.masks, strict=True):
+        depths = [camera.rotation[2] @ observation.points[v] + camera.translation[2] for v in np.unique(np.concatenate(columns.voxels))]
+        side = max(1, int(observation.voxel_size_m * camera.matrix[0, 0] / max(np.median(depths), 1.0)))
+
+        def cells(i, camera=camera, mask=mask, side=side):
+            found = set()
+            for point in observation.points[columns.voxels[i]]:
+                uv = np.floor(project(camera, point[None])[0][0] + 0.5).astype(int)
+                if (uv >= 0).all() and (uv < camera.size).all() and mask[uv[1], uv[0]]:
+                    found.add((uv[0] // side, uv[1] // side))
+            return found
+
+        mine = cells(j)
+        shares.append(len(mine.difference(*(cells(i) for i in chosen if i != j))) / max(1, len(mine)))
+    return sorted(shares)[-OWN_VIEWS]
+
+
+@settings(max_examples=6, deadline=None)
+@given(st.lists(st.tuples(st.floats(-1, 1), st.floats(-1, 1)), min_size=2, max_size=4))
+def test_each_that_is_kept_has_its_own_share_and_who_adds_least_goes_first(places):
+    observation = seen([body(*place) for place in places])
+    columns = find_columns(observation)
+    kept = np.flatnonzero(explaining(observation.views, observation.points, columns, observation.voxel_size_m)).tolist()
+    chosen = list(range(len(columns)))
+    while chosen:
+        shares = [own_share(observation, columns, chosen, j) for j in chosen]
+        if min(shares) >= OWN_SHARE:
+            break
+        chosen.remove(chosen[int(np.argmin(shares))])
+    assert kept == chosen
+
+
+@pytest.mark.parametrize("shape", ["full", "empty", "low"])
+def test_rooms_that_are_full_empty_or_hold_low_things_have_no_columns(shape):
+    volume = np.zeros(GRID.shape, bool)
+    if shape == "full":
+        volume[:] = True
+    if shape == "low":
+        volume[30:40, 30:40, :14] = True
+    assert len(find_columns(observe(GRID, volume))) == 0
+
+
+def test_a_column_s_voxels_are_those_around_its_middle():
+    observation = seen([body(0.3, -0.2)])
+    columns = find_columns(observation)
+    away = np.hypot(*(observation.points[:, :2] - columns.centres[0]).T)
+    assert len(columns) == 1 and np.array_equal(columns.voxels[0], np.flatnonzero(away <= BODY_M))
