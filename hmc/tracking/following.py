@@ -26,13 +26,15 @@ __all__ = ["advance", "finish", "init", "original_number"]
 WAITING = 0.5
 
 
-def init(fps: float) -> TrackerState:
+def init(fps: float, most: int | None = None) -> TrackerState:
     """The state before the first frame: without tracks.
 
     Parameters
     ----------
     fps : float
         Frames a second.
+    most : int, optional
+        People who are there at once at most.
 
     Raises
     ------
@@ -41,7 +43,7 @@ def init(fps: float) -> TrackerState:
     """
     if not np.isfinite(fps) or fps <= 0:
         raise InputError(f"`fps` must be a positive number of frames a second; got {fps}")
-    return TrackerState(float(fps))
+    return TrackerState(float(fps), most=most)
 
 
 def advance(

@@ -20,6 +20,7 @@ from hmc.io.journal import append_journal, open_journal
 from hmc.io.masks import keep_masks
 from hmc.io.recording import Recording
 from hmc.io.results import TrackTable
+from hmc.tracking.account import Account, account_of, remarks
 from hmc.tracking.blobs import Observation, observe
 from hmc.tracking.following import finish, init
 from hmc.tracking.state import TrackerState, TrackRow
@@ -61,6 +62,8 @@ def track_recording(
     on_timing : callable, optional
         Called at the end with the time that was spent.
 
+    What a run says of itself when it is over (`hmc.tracking.account`) goes where its problems go.
+
     Returns
     -------
     TrackTable
@@ -89,7 +92,7 @@ def track_recording(
     if run.masks is not None:
         stream = keep_masks(run.masks, run.key, done.next_frame, stream, note)
     hulls: Iterable[HullStep] = stream if done.next_frame < end else ()
-    timing, before = done.timing, perf_counter()
+    timing, account, before = done.timing, done.account, perf_counter()
     for hull in run.progress(hulls, end - done.next_frame) if run.progress else hulls:
         observation = observe_step(recording, grid, hull, images=tracker.color)
         begun = thread_time()
@@ -99,15 +102,19 @@ def track_recording(
         timing = timing.plus(Timing(1, max(0.0, now - before - info.filter_s - lifecycle_s), info.filter_s, lifecycle_s))
         before = now
         rows += info.rows
+        account = account.plus(account_of(observation, info))
         n_frames = hull.index + 1 - recording.start
         if run.journal is not None and (n_frames % CHECKPOINT_FRAMES == 0 or n_frames == recording.n_frames):
-            now_done = CompletedFrames(hull.index + 1, state, tuple(rows), tuple(problems), timing)
+            now_done = CompletedFrames(hull.index + 1, state, tuple(rows), tuple(problems), timing, account)
             append_journal(run.journal, _record(now_done, since=done))
             done, before = now_done, perf_counter()
     rows += finish(state, recording.n_frames, tracker.following)
     if on_timing is not None:
         on_timing(timing)
-    return table_of(rows, recording.fps, reidentified=state.reidentified)
+    table = table_of(rows, recording.fps, reidentified=state.reidentified)
+    for line in remarks(account, table, recording.fps, recording.persons):
+        run.on_problem(line)
+    return table
 
 
 def person_grid(recording: Recording, voxel_size_m: float) -> VoxelGrid:
@@ -169,11 +176,12 @@ class CompletedFrames:
     rows: tuple[TrackRow, ...] = ()
     problems: tuple[str, ...] = ()
     timing: Timing = field(default_factory=Timing)
+    account: Account = field(default_factory=Account)
 
 
 def _resumed(journal: str | Path | None, key: str, recording: Recording) -> CompletedFrames:
     """What the journal says is done."""
-    done = CompletedFrames(recording.start, init(recording.fps))
+    done = CompletedFrames(recording.start, init(recording.fps, recording.persons))
     for record in open_journal(journal, key):
         new = from_plain(CompletedFrames, record)
         done = replace(new, rows=done.rows + new.rows, problems=done.problems + new.problems)

@@ -161,6 +161,8 @@ class TrackerState:
     static : StaticObjects
     arrays : mapping of str to ndarray
         Whatever a tracker of another kind remembers of the whole frame, by names of its own; the shared rules leave it as it is.
+    most : int or None
+        People who are there at once at most, where that is known (``persons`` in ``recording.toml``).
     """
 
     fps: float
@@ -173,6 +175,7 @@ class TrackerState:
     false_tracks: tuple[TrackRow, ...] = ()
     static: StaticObjects = field(default_factory=StaticObjects)
     arrays: Mapping[str, np.ndarray] = field(default_factory=dict)
+    most: int | None = None
 
 
 @dataclass(frozen=True)

@@ -64,6 +64,8 @@ def confirm_candidates(update: FrameUpdate, settings: FollowingSettings) -> Fram
     fps, limits = update.state.fps, settings.lifecycle
     beside = {id(one): _is_beside(one, update.tracks, limits) for one in update.candidates}
     sure = tuple(one for one in update.candidates if not beside[id(one)] or len(one.rows) >= limits.confirm_beside_s * fps)
+    room = len(sure) if update.state.most is None else max(0, update.state.most - len(update.tracks))
+    sure = tuple(sorted(sure, key=lambda one: -len(one.rows)))[:room]
     candidates, born, rows = confirm(sure, update.state.next_person, fps, limits)
     candidates += tuple(one for one in update.candidates if not any(one is other for other in sure))
     return replace(update, candidates=candidates, born=born, born_rows=tuple(rows), next_person=update.state.next_person + len(born))

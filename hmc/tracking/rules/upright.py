@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from hmc.tracking.blobs import blob_features
-from hmc.tracking.columns import BODY_M, Columns, explaining, find_columns
+from hmc.tracking.columns import BODY_M, Columns, explaining, find_columns, missed
 from hmc.tracking.settings import FollowingSettings, LifecycleSettings
 from hmc.tracking.update import FrameUpdate
 
@@ -34,8 +34,15 @@ def match_columns(update: FrameUpdate, settings: FollowingSettings) -> FrameUpda
     observation = update.observation
     columns = find_columns(observation)
     columns = columns.take(_tall(update, columns, settings.lifecycle))
-    if observation.views is not None and len(columns):
-        columns = columns.take(explaining(observation.views, observation.points, columns, observation.voxel_size_m))
+    if observation.views is not None:
+        places = observation.views, observation.points
+        columns = columns.take(explaining(*places, columns, observation.voxel_size_m, update.state.most)) if len(columns) else columns
+        others = find_columns(observation, strict=False)
+        apart = (np.hypot(*(others.centres[:, None] - columns.centres).transpose(2, 0, 1)) > MATCH_M).all(axis=1)
+        others = others.take(apart & _tall(update, others, settings.lifecycle))
+        if len(others):
+            others = others.take(missed(*places, columns, others, observation.voxel_size_m, update.state.most))
+        columns = Columns(np.concatenate([columns.centres, others.centres]), columns.voxels + others.voxels)
     across = update.predicted[:, None, :2] - columns.centres
     distance = np.sqrt(np.einsum("kmc,kmc->km", across, across))
     matched = np.full(len(update.predicted), -1)
