@@ -19,7 +19,7 @@ from hmc.cli.common import (
     whole_number,
 )
 from hmc.cli.pose_markers import MARKERS_JOURNAL, add_marker_options, read_markers
-from hmc.cli.track import JOURNAL, add_tracker_options, selected_tracker
+from hmc.cli.track import JOURNAL, add_tracker_options, selected_frontend, selected_tracker
 from hmc.pose.registry import INITS, METHODS, pose_method
 
 __all__ = ["add_parser", "run"]
@@ -101,7 +101,6 @@ def run(args: argparse.Namespace) -> int:
     from hmc.pose.follow import FollowOptions, follow
     from hmc.pose.smoothing import smooth_people
     from hmc.tracking.resumable import person_grid, track_recording
-    from hmc.voxels.hulls import FrontendSettings
     from hmc.voxels.run_options import RunOptions
 
     plugins = load_given_plugins(args)
@@ -109,7 +108,7 @@ def run(args: argparse.Namespace) -> int:
     recording = open_selected(args)
     if args.out.is_file():
         raise InputError(f"--out {args.out}: is a file; give a folder")
-    height, tracked, frontend = _height(args.height, recording), method.needs_tracks, FrontendSettings()
+    height, tracked, frontend = _height(args.height, recording), method.needs_tracks, selected_frontend(args)
     parameters: dict[str, Any] = {
         "start": recording.start,
         "frames": recording.n_frames,

@@ -19,7 +19,7 @@ from hmc.cli.common import (
     whole_number,
 )
 
-__all__ = ["add_parser", "add_tracker_options", "run", "selected_tracker"]
+__all__ = ["add_parser", "add_tracker_options", "run", "selected_frontend", "selected_tracker"]
 
 #: The journal of a run that is not finished.
 JOURNAL = ".track.journal"
@@ -55,7 +55,7 @@ class _TrackerHelp(str):
 
 
 def add_tracker_options(parser: argparse.ArgumentParser) -> None:
-    """Add ``--tracker``, ``--color``, ``--particles`` and ``--track-preset``."""
+    """Add ``--tracker``, ``--color``, ``--particles``, ``--track-preset`` and ``--complete``."""
     parser.add_argument("--tracker", metavar="NAME", help=_TrackerHelp("method; {names}"))
     parser.add_argument(
         "--color", action=argparse.BooleanOptionalAction, default=None, help="use colors (default, where the tracker can), or do not"
@@ -69,6 +69,19 @@ def add_tracker_options(parser: argparse.ArgumentParser) -> None:
             "the tracker's parameters ({presets}); canton2009: the thesis's printed ones; alike: people who are dressed alike"
         ),
     )
+    parser.add_argument(
+        "--complete",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="let the other cameras decide where one takes pale clothes for a shadow (default), or use each camera's own silhouette",
+    )
+
+
+def selected_frontend(args: argparse.Namespace):
+    """How silhouettes and hulls are made, as the options say."""
+    from hmc.voxels.hulls import FrontendSettings
+
+    return FrontendSettings(complete=args.complete)
 
 
 def selected_tracker(args: argparse.Namespace):
@@ -84,11 +97,10 @@ def run(args: argparse.Namespace) -> int:
     from hmc.io.files import to_toml
     from hmc.io.results import read_tracks, write_run, write_tracks
     from hmc.tracking.resumable import Timing, track_recording
-    from hmc.voxels.hulls import FrontendSettings
     from hmc.voxels.run_options import RunOptions
 
     plugins, recording = load_given_plugins(args), open_selected(args)
-    tracker, frontend = selected_tracker(args), FrontendSettings()
+    tracker, frontend = selected_tracker(args), selected_frontend(args)
     tracks_path, run_path, journal = args.out / "tracks.csv", args.out / "run.toml", args.out / JOURNAL
     if args.out.is_file():
         raise InputError(f"--out {args.out}: is a file; give a folder")
