@@ -66,6 +66,7 @@ class Recording:
     start : int
         First frame of the selection, counted from the start of the recording.
     persons : int or None
+        How many people are there at once at most, where that is known; trackers count no more.
     subject_height_m : tuple of float
         Statures that are known beforehand; may be empty.
     room_is_estimated : bool

@@ -13,7 +13,7 @@ from hmc.errors import InputError
 from hmc.io.recording import iterate_frames, open_recording
 from hmc.io.results import read_centroids, read_joints
 from hmc.landmarks import LANDMARKS
-from hmc.synthetic.image import light_crowd, make_backdrop, picture, static_shadows
+from hmc.synthetic.image import exposure, light_crowd, make_backdrop, picture, static_shadows
 from hmc.synthetic.recipe import RECIPE_FOLDER, load_recipe, recipe_from, shipped_recipes
 from hmc.synthetic.render import render_recording
 from hmc.synthetic.rigs import RIGS, RigRecipe, make_rig
@@ -135,6 +135,36 @@ def test_people_darken_the_floor_and_nothing_that_is_hidden_from_them():
     darker = (ratio[~person] < 0.9).any(axis=1).mean()
     assert 0.005 < darker < 0.3
     assert 0.01 < (labels > 0).mean() < 0.2
+
+
+def test_lamps_that_are_dimmed_and_less_exposure_darken_the_action_only(tmp_path):
+    def levels(name, **changes):
+        folder = render_recording(recipe_from(small(**changes)), tmp_path / name)
+        return [frames_of(folder / part / "cam_00.mp4").astype(float) for part in ("background", "videos")]
+
+    empty, action = levels("plain")
+    for name, changes in {"dimmed": {"light": {"dimmed": 0.4}}, "exposed": {"image": {"exposure": 0.8}}}.items():
+        same, darker = levels(name, **changes)
+        assert np.abs(same - empty).mean() < 0.2
+        assert darker.mean() < action.mean() - 3
+
+
+def test_auto_exposure_keeps_the_mean_and_a_glossy_floor_mirrors_people():
+    scene = build_scene(recipe_from(small(image={"auto_exposure": 1.0}, room={"size_m": [5.0, 4.4, 3.0], "gloss": 0.5})))
+    plain = build_scene(recipe_from(small()))
+    furniture, camera = static_shadows(scene), scene.rig[0]
+    backdrop = make_backdrop(scene, camera, furniture, np.random.default_rng(0))
+    lit = light_crowd(scene, crowd_at(scene, 0), furniture)
+    glossy, labels = picture(scene, camera, backdrop, lit)
+    matt, _ = picture(plain, camera, backdrop, lit)
+    changed = (np.abs(glossy - matt).sum(axis=1) > 1e-4).reshape(labels.shape)
+    inside = cv2.erode(labels, np.ones((3, 3), np.uint8)) > 0  # away from the anti-aliased border
+    assert changed.any() and not changed[inside].any() and (backdrop.floor.reshape(labels.shape)[changed] >= 0).all()
+    # Below the feet, where the mirror image begins.
+    assert np.argwhere(changed)[:, 0].max() > np.argwhere(labels > 0)[:, 0].max()
+    gain = exposure(glossy, backdrop, scene)
+    assert gain != 1 and exposure(glossy, backdrop, plain) == 1
+    assert np.isclose(np.minimum(glossy[::7], 1).mean() * gain, np.minimum(backdrop.radiance[::7], 1).mean())
 
 
 def test_furniture_hides_people():

@@ -62,6 +62,15 @@ def test_what_a_camera_surely_sees_empty_stays_empty(tables, truth):
     np.testing.assert_array_equal(done[0], masks[0])
 
 
+def test_a_camera_whose_light_changed_decides_nothing_by_its_doubts(tables, truth):
+    """It doubts all of the wall, so that a doubt tells nothing; the others complete theirs as before."""
+    masks = [*(lose(mask, where) for mask, where in zip(truth, ((0.2, 0.6), (0.3, 0.6), (0.72, 0.9), (0.05, 0.2)), strict=False)), truth[4]]
+    doubts = [np.ones_like(truth[0]), *truth[1:]]
+    done = complete_masks(tables, masks, doubts)
+    np.testing.assert_array_equal(done[0], masks[0])
+    assert overlap(done[1], truth[1]) > overlap(masks[1], truth[1]) + 0.2
+
+
 def test_one_camera_s_loss_is_left_to_the_tolerant_hull(tables, truth):
     masks = [lose(truth[0], (0.2, 0.6)), *truth[1:]]
     assert all(after is before for after, before in zip(complete_masks(tables, masks, truth), masks, strict=True))
