@@ -30,8 +30,6 @@ class LifecycleSettings:
         Furniture may hide the legs, but no person floats higher than this.
     least_volume_m3, most_volume_m3 : float
         A hull is fatter than its person; the most leaves room for two who come in arm in arm.
-    least_joined_m3 : float
-        A set larger than this may be several people; so may one of which the strict hull is.
     most_side_m, least_side_m : float
         Longest horizontal side (arms stretched out) and least value of the longer side (a ghost is a thin column).
     keep_volume_m3 : float
@@ -76,7 +74,6 @@ class LifecycleSettings:
     most_bottom_m: float = 0.9
     least_volume_m3: float = 0.025
     most_volume_m3: float = 0.7
-    least_joined_m3: float = 0.2
     most_side_m: float = 2.2
     least_side_m: float = 0.25
     keep_volume_m3: float = 0.012

@@ -187,3 +187,16 @@ def test_what_somebody_who_stands_pushes_is_released_and_their_own_voxels_are_no
     low = replace(update, observation=observe(GRID, box((-0.3, -0.25, 0), (1.1, 0.25, 0.8))))  # nobody stands here: nothing is released
     low = release_pushed_objects(replace(low, owners=np.zeros(len(low.observation.points), int)), FollowingSettings())
     assert (low.owners == 0).all()
+
+
+def test_what_not_all_cameras_see_is_no_furniture():
+    """The tolerant hull of four cameras fills a part of the room for long; whoever walks into it is there."""
+    fat = box((0.4, -0.7, 0), (1.8, 0.7, 1.6))
+    path = [np.array([-1.0, 0.0])] * 30 + line((-1.0, 0), (1.2, 0), 40) + [np.array([1.2, 0.0])] * 20
+    state, seen = init(FPS), []
+    for frame, place in enumerate(path):
+        state, info = advance(state, frame, observe(GRID, person(*place) | fat, person(*place)), FollowingSettings())
+        seen += [(row.frame, row.person) for row in info.rows]
+    assert sorted(seen) == [(frame, 0) for frame in range(len(path))]
+    kept = without_static(observe(GRID, person(1.2, 0) | fat, person(1.2, 0)), state.static, FPS)[0]
+    assert kept.certain.sum() == person(1.2, 0).sum()

@@ -89,7 +89,9 @@ def without_static(observation: Observation, static: StaticObjects, fps: float) 
 
 
 def learn_static(static: StaticObjects, observation: Observation, people: Iterable[Track | TrackRow], fps: float) -> StaticObjects:
-    """What is known of static objects after a frame.
+    """What is known of static objects after a frame: only what all cameras see is one.
+
+    The tolerant hull of four cameras fills places between people where nothing stands; hidden there, people who come by were lost.
 
     A standing person is where their head is: their centroid may be between them and a chair that they touch.
 
@@ -114,7 +116,7 @@ def learn_static(static: StaticObjects, observation: Observation, people: Iterab
         _beside(observation.points, heads, STANCE_M),
         _beside(observation.points, centroids, np.where(heads[:, 2] < LEGS_M, LYING_AWAY_M, AWAY_M)),
     )
-    away = ~near.any(axis=1)
+    away = ~near.any(axis=1) & observation.certain
     places = _places(observation)
     filled = np.isin(static.voxels, places, assume_unique=True)
     voxels = np.union1d(static.voxels, places[away])
