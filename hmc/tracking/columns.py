@@ -142,8 +142,11 @@ def explaining(views: FrameViews, points: np.ndarray, columns: Columns, voxel_si
         share = np.array([cells.sum(axis=1) for cells in alone]) / sizes
         least = np.sort(share, axis=0)[-needed]
         worst = int(np.where(real, least, np.inf).argmin())
-        if least[worst] >= OWN_SHARE and (most is None or real.sum() <= most):
-            break
+        if least[worst] >= OWN_SHARE:
+            if most is None or real.sum() <= most:
+                break
+            # All are people by what they cover alone: those stay who cover most.
+            worst = int(np.where(real, sum(cells.sum(axis=1) for cells in alone), np.inf).argmin())
         real[worst] = False
     return real
 

@@ -113,3 +113,12 @@ def test_a_column_s_voxels_are_those_around_its_middle():
     columns = find_columns(observation)
     away = np.hypot(*(observation.points[:, :2] - columns.centres[0]).T)
     assert len(columns) == 1 and np.array_equal(columns.voxels[0], np.flatnonzero(away <= BODY_M))
+
+
+def test_of_more_people_than_there_are_those_stay_who_cover_most():
+    places = [(-0.9, -0.9), (0.8, 0.7), (0.9, -0.8)]
+    observation = seen([body(*place, height=height) for place, height in zip(places, (1.8, 1.75, 1.3), strict=True)])
+    columns = find_columns(observation)
+    kept = columns.take(explaining(observation.views, observation.points, columns, observation.voxel_size_m, most=2)).centres
+    assert len(columns) == 3 and len(kept) == 2
+    assert max(np.hypot(*(kept - place).T).min() for place in places[:2]) < 0.1
