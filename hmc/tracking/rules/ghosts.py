@@ -2,7 +2,7 @@
 
 A real person accounts for parts of the silhouettes that nothing else accounts for; a ghost does not. So the detections are projected
 into the views, and one that adds nothing in two views to the people who are known already is left out. Shown by the recipe
-`meeting_unseen`, where false positives go from 5 to 25 without it (naive tracker).
+`close_queue`, where false positives go from 10 to 100 without it (naive tracker).
 """
 
 from __future__ import annotations
