@@ -30,11 +30,13 @@ def test_kept_without_output(path):
         assert not cell.get("outputs") and cell.get("execution_count") is None, "clear the outputs before you commit"
 
 
-#: Runs a notebook in a process of its own.
+#: Runs a notebook in a process of its own. The kernel is spoken to by files, not by ports: a port that is found free may be
+#: taken by the notebook beside it before the kernel binds it.
 RUN = """
-import sys, nbclient, nbformat
+import sys, jupyter_client, nbclient, nbformat
 notebook = nbformat.read(sys.argv[1], as_version=4)
-nbclient.NotebookClient(notebook, timeout=300, kernel_name="python3", resources={"metadata": {"path": sys.argv[2]}}).execute()
+kernel = jupyter_client.AsyncKernelManager(kernel_name="python3", transport="ipc", ip=sys.argv[3] + "-ipc")
+nbclient.NotebookClient(notebook, km=kernel, timeout=300, resources={"metadata": {"path": sys.argv[2]}}).execute()
 nbformat.write(notebook, sys.argv[3])
 """
 
