@@ -156,7 +156,7 @@ def follow(parameters: Parameters, inputs: Inputs, seed: int, tracker: Tracker |
     label, color = parameters["recording"], parameters["color"]
     recording = inputs.recording(label)
     tracker = tracker or make_tracker(parameters["tracker"], color=color, particles=parameters["particles"], preset=parameters["preset"])
-    state, timing = init(recording.fps), Timing()
+    state, timing = init(recording.fps, recording.persons), Timing()
     rows: list[TrackRow] = []
     images: Iterator = (frame.images for frame in iterate_frames(recording)) if color else repeat(())
     for (frame, observation), pictures in zip(observations(inputs, label, parameters["voxel_m"]), images, strict=False):

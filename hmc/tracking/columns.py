@@ -18,8 +18,7 @@ import numpy as np
 
 from hmc.camera.model import Camera
 from hmc.tracking.blobs import Observation
-from hmc.tracking.views import FrameViews
-from hmc.voxels.carving import pixel_of_voxel
+from hmc.tracking.views import FrameViews, cell_grid, cells_of
 
 __all__ = ["Columns", "explaining", "find_columns", "missed"]
 
@@ -37,10 +36,9 @@ FALL, MOST_M2 = 0.95, 0.3
 #: A person's voxels are within this of the column's middle, seen from above; metres.
 BODY_M = 0.3
 #: Share of what a person covers in a view that must be theirs alone for the view to speak for them, and views that must, where there are
-#: as many. With .1 to .3 the recipes `close_white`, `close_table`, `close_queue`, `crossing` and `meeting_unseen` have the same errors.
+#: as many.
 OWN_SHARE, OWN_VIEWS = 0.15, 2
-#: The same for a person whom a camera misses, and who is in the tolerant hull alone: of four cameras that is full of ghosts, which have at
-#: most .31 in their third view (`close_table`, `close_white`).
+#: The same for a person whom a camera misses, and who is in the tolerant hull alone: of four cameras that is full of ghosts.
 MISSED_SHARE, MISSED_VIEWS = 0.4, 3
 
 
@@ -190,19 +188,13 @@ def missed(
 
 
 def _covered(camera: Camera, mask: np.ndarray, points: np.ndarray, columns: Columns, voxel_size_m: float) -> np.ndarray:
-    """Which cells of the silhouette each column covers, (m, n_cells); cells are as large as a voxel at the columns' middle distance."""
+    """Which cells of the silhouette each column covers, (m, n_cells)."""
     rows = np.unique(np.concatenate([np.zeros(0, int), *columns.voxels]))
-    there = points[rows]
-    depth = np.median(there @ camera.rotation[2] + camera.translation[2]) if len(there) else 1.0
-    side = max(1, int(voxel_size_m * camera.matrix[0, 0] / max(depth, 1.0)))
-    width, height = camera.size
-    shape = (-(-height // side), -(-width // side))
-    column, row, seen = pixel_of_voxel(camera, there)
-    seen &= mask[row, column]
-    cell = np.where(seen, row // side * shape[1] + column // side, -1)
+    side, shape = cell_grid(camera, points[rows], voxel_size_m)
+    cells = cells_of(camera, points[rows], side, mask)
     covered = np.zeros((len(columns), shape[0] * shape[1] + 1), bool)
     for j, voxels in enumerate(columns.voxels):
-        covered[j, cell[np.searchsorted(rows, voxels)]] = True
+        covered[j, cells[np.searchsorted(rows, voxels)]] = True
     return covered[:, :-1]
 
 

@@ -102,8 +102,8 @@ def finish(state: TrackerState, n_frames: int, settings: FollowingSettings | Non
     settings : FollowingSettings, optional
     """
     settings = FollowingSettings() if settings is None else settings
-    short = replace(settings.lifecycle, confirm_frames=n_frames, confirm_s=0.0)
     withheld = tuple(replace(row, person=track.person) for track in state.tracks for row in track.withheld)
     if n_frames > max(settings.lifecycle.confirm_frames, round(settings.lifecycle.confirm_s * state.fps)):
         return withheld
-    return withheld + tuple(confirm(state.candidates, state.next_person, state.fps, short)[2])
+    seen = [one for one in state.candidates if len(one.rows) >= n_frames][: state.most]
+    return withheld + confirm(seen, state.next_person, state.fps)[1]

@@ -20,7 +20,12 @@ __all__ = ["fill_gaps", "frame_rng", "from_rows", "person_voxels", "run", "table
 
 
 def run(
-    observations: Iterable[tuple[int, Observation | None]], fps: float, tracker: Tracker | None = None, seed: int = 0, gap_s: float = 1.0
+    observations: Iterable[tuple[int, Observation | None]],
+    fps: float,
+    tracker: Tracker | None = None,
+    seed: int = 0,
+    gap_s: float = 1.0,
+    most: int | None = None,
 ) -> TrackTable:
     """The tracks of all persons in a recording.
 
@@ -35,6 +40,8 @@ def run(
         Of the random numbers.
     gap_s : float
         Gaps of a track up to this long are filled in.
+    most : int, optional
+        People who are there at once at most.
 
     Returns
     -------
@@ -42,7 +49,7 @@ def run(
         With heads; persons numbered from 0 in the order in which they were first seen.
     """
     tracker = make_tracker() if tracker is None else tracker
-    state, n_frames = init(fps), 0
+    state, n_frames = init(fps, most), 0
     rows: list[TrackRow] = []
     for frame, observation in observations:
         state, info = tracker.step(frame_rng(seed, frame), state, frame, observation)

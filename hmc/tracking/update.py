@@ -107,6 +107,8 @@ class FrameUpdate:
         The upright people of the frame.
     matched : ndarray of int, shape (k,)
         The column of each track, or -1.
+    begins : ndarray of bool, shape (m,)
+        Columns that may be of somebody whom no track has.
     pushed : ndarray of int, shape (n,)
         Row of the track whose person pushes or leans on the object of the voxel, or -1.
     measurement : Measurement
@@ -161,6 +163,7 @@ class FrameUpdate:
     reidentified: tuple[tuple[int, int], ...]
     columns: Columns = field(default_factory=Columns)
     matched: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
+    begins: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))
     detections: tuple[np.ndarray, ...] = ()
     births: tuple[TrackRow, ...] = ()
     upright_births: tuple[TrackRow, ...] = ()
@@ -174,8 +177,8 @@ class FrameUpdate:
 
     @property
     def newcomers(self) -> tuple[np.ndarray, ...]:
-        """Voxels of each column that no track has."""
-        return tuple(voxels for j, voxels in enumerate(self.columns.voxels) if j not in self.matched)
+        """Voxels of each column that no track has, and at which one may begin."""
+        return tuple(voxels for j, voxels in enumerate(self.columns.voxels) if self.begins[j] and j not in self.matched)
 
     @property
     def claimed(self) -> np.ndarray:

@@ -9,8 +9,12 @@ from hypothesis import strategies as st
 from hmc.camera.model import Rig, look_at, project
 from hmc.tracking.blobs import observe
 from hmc.tracking.columns import BODY_M, OWN_SHARE, OWN_VIEWS, explaining, find_columns
+from hmc.tracking.following import init
+from hmc.tracking.rules.upright import match_columns
+from hmc.tracking.settings import FollowingSettings
+from hmc.tracking.update import begin_update
 from hmc.tracking.views import FrameViews
-from hmc.voxels.carving import carve, make_tables
+from hmc.voxels.carving import carve_levels, make_tables
 from hmc.voxels.grid import VoxelGrid
 
 GRID = VoxelGrid(np.array([-2.4, -2.4, 0.0]), 0.06, (80, 80, 33))
@@ -26,17 +30,17 @@ def body(x, y, height=1.72):
     return around.reshape(-1, 3) + (x, y, height / 2)
 
 
-def seen(people):
-    """Silhouettes as filled outlines of the projected points, and the observation of their strict hull."""
+def seen(people, blind=None):
+    """Silhouettes as filled outlines of the projected points, and the observation of the hulls; one camera may see nobody."""
     masks = []
-    for camera in RIG:
+    for c, camera in enumerate(RIG):
         mask = np.zeros(camera.size[::-1], np.uint8)
-        for points in people:
+        for points in people if c != blind else ():
             uv, _ = project(camera, points)
             cv2.fillConvexPoly(mask, cv2.convexHull(uv.astype(np.float32)).astype(np.int32), 1)
         masks.append(mask.view(bool))
-    hull = carve(TABLES, masks)
-    return observe(GRID, hull, hull, FrameViews(RIG, masks))
+    strict, tolerant = carve_levels(TABLES, masks, (0, 1))
+    return observe(GRID, strict if blind is None else tolerant, strict, FrameViews(RIG, masks))
 
 
 def real(observation):
@@ -122,3 +126,10 @@ def test_of_more_people_than_there_are_those_stay_who_cover_most():
     kept = columns.take(explaining(observation.views, observation.points, columns, observation.voxel_size_m, most=2)).centres
     assert len(columns) == 3 and len(kept) == 2
     assert max(np.hypot(*(kept - place).T).min() for place in places[:2]) < 0.1
+
+
+@pytest.mark.parametrize(("height", "newcomers"), [(1.72, 1), (1.25, 0)])
+def test_what_one_camera_misses_is_a_newcomer_only_when_it_stands(height, newcomers):
+    observation = seen([body(0.3, -0.2, height)], blind=2)
+    update = match_columns(begin_update(init(25.0), 0, observation, None), FollowingSettings())
+    assert len(update.columns) == 1 and len(update.newcomers) == newcomers

@@ -5,6 +5,7 @@ Canton (2009), Figure 4.1 and section 4.2.3. Shown by all tests of the trackers.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -60,49 +61,38 @@ def propose_candidates(update: FrameUpdate, settings: FollowingSettings) -> Fram
 
 
 def confirm_candidates(update: FrameUpdate, settings: FollowingSettings) -> FrameUpdate:
-    """The update with the persons who begin in this frame."""
-    fps, limits = update.state.fps, settings.lifecycle
-    beside = {id(one): _is_beside(one, update.tracks, limits) for one in update.candidates}
-    sure = tuple(one for one in update.candidates if not beside[id(one)] or len(one.rows) >= limits.confirm_beside_s * fps)
-    room = len(sure) if update.state.most is None else max(0, update.state.most - len(update.tracks))
-    sure = tuple(sorted(sure, key=lambda one: -len(one.rows)))[:room]
-    candidates, born, rows = confirm(sure, update.state.next_person, fps, limits)
-    candidates += tuple(one for one in update.candidates if not any(one is other for other in sure))
-    return replace(update, candidates=candidates, born=born, born_rows=tuple(rows), next_person=update.state.next_person + len(born))
+    """The update with the persons who begin in this frame: those seen longest first, and no more than there are."""
+    state, limits = update.state, settings.lifecycle
+    ready = [one for one in update.candidates if len(one.rows) >= _frames_needed(one, update.tracks, state.fps, limits)]
+    ready = sorted(ready, key=lambda one: -len(one.rows))
+    if state.most is not None:
+        ready = ready[: max(0, state.most - len(update.tracks))]
+    born, rows = confirm(ready, state.next_person, state.fps)
+    begun = {id(one) for one in ready}
+    return replace(
+        update,
+        candidates=tuple(one for one in update.candidates if id(one) not in begun),
+        born=born,
+        born_rows=rows,
+        next_person=state.next_person + len(born),
+    )
 
 
-def confirm(
-    candidates: tuple[Candidate, ...], next_person: int, fps: float, settings: LifecycleSettings
-) -> tuple[tuple[Candidate, ...], tuple[Track, ...], list[TrackRow]]:
-    """Persons made of the candidates that were seen in enough frames.
-
-    Returns
-    -------
-    candidates : tuple of Candidate
-        The others.
-    tracks : tuple of Track
-        New ones, numbered from `next_person`.
-    rows : list of TrackRow
-        Their positions from the first frame in which each was seen.
-    """
-    needed = max(settings.confirm_frames, round(settings.confirm_s * fps))
-    left: list[Candidate] = []
+def confirm(candidates: Sequence[Candidate], next_person: int, fps: float) -> tuple[tuple[Track, ...], tuple[TrackRow, ...]]:
+    """The persons that candidates become, numbered from `next_person`, and their positions from the first frame in which each was seen."""
     tracks: list[Track] = []
     rows: list[TrackRow] = []
-    for candidate in candidates:
-        if len(candidate.rows) < needed:
-            left.append(candidate)
-            continue
-        person = next_person + len(tracks)
+    for person, candidate in enumerate(candidates, next_person):
         first, last = candidate.rows[0], candidate.rows[-1]
         tracks.append(Track(person, last.position, last.head, candidate.velocity * fps, 0.0, first.frame, last.frame))
         rows += [replace(row, person=person) for row in candidate.rows]
-    return tuple(left), tuple(tracks), rows
+    return tuple(tracks), tuple(rows)
 
 
-def _is_beside(candidate: Candidate, tracks: tuple[Track, ...], limits: LifecycleSettings) -> bool:
-    """Whether a candidate is so near to a track that arms, and silhouettes that meet, may be taken for a person."""
-    return any(horizontal_distance(candidate.rows[-1].position, track.position) < limits.beside_m for track in tracks)
+def _frames_needed(candidate: Candidate, tracks: tuple[Track, ...], fps: float, limits: LifecycleSettings) -> float:
+    """Frames in which a candidate must be seen: more beside a track, where arms, and silhouettes that meet, may be taken for a person."""
+    beside = any(horizontal_distance(candidate.rows[-1].position, track.position) < limits.beside_m for track in tracks)
+    return max(limits.confirm_frames, round(limits.confirm_s * fps), limits.confirm_beside_s * fps if beside else 0)
 
 
 def _expected(candidate: Candidate, frame: int) -> np.ndarray:

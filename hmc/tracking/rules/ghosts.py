@@ -17,8 +17,7 @@ from hmc.camera.model import Camera
 from hmc.tracking.rules.detection import owned_voxels
 from hmc.tracking.settings import FollowingSettings
 from hmc.tracking.update import FrameUpdate
-from hmc.tracking.views import FrameViews
-from hmc.voxels.carving import pixel_of_voxel
+from hmc.tracking.views import FrameViews, cell_grid, cells_of
 
 __all__ = ["real_people", "reject_ghosts"]
 
@@ -57,10 +56,10 @@ def real_people(views: FrameViews, known: np.ndarray, sets: Sequence[np.ndarray]
     ndarray of bool, shape (n_sets,)
     """
     cameras = [(camera, mask) for camera, mask in zip(views.rig, views.masks, strict=True) if mask is not None]
-    sides = [_cell_side(camera, np.concatenate([known, *sets]), voxel_size_m) for camera, _ in cameras]
-    covered = [_grow(_raster(camera, known, side)) for (camera, _), side in zip(cameras, sides, strict=True)]
-    own = [[_raster(camera, points, side, mask) for points in sets] for (camera, mask), side in zip(cameras, sides, strict=True)]
-    sizes = [[_raster(camera, points, side).sum() for points in sets] for (camera, _), side in zip(cameras, sides, strict=True)]
+    grids = [cell_grid(camera, np.concatenate([known, *sets]), voxel_size_m) for camera, _ in cameras]
+    covered = [_grow(_raster(camera, known, grid)) for (camera, _), grid in zip(cameras, grids, strict=True)]
+    own = [[_raster(camera, points, grid, mask) for points in sets] for (camera, mask), grid in zip(cameras, grids, strict=True)]
+    sizes = [[_raster(camera, points, grid).sum() for points in sets] for (camera, _), grid in zip(cameras, grids, strict=True)]
     real = np.zeros(len(sets), bool)
     while not real.all():
         # Cells, (n_views, n_sets), that a set alone accounts for.
@@ -75,21 +74,12 @@ def real_people(views: FrameViews, known: np.ndarray, sets: Sequence[np.ndarray]
     return real
 
 
-def _cell_side(camera: Camera, points: np.ndarray, voxel_size_m: float) -> int:
-    """Pixels that a voxel at the points' middle distance measures, so that neighbouring voxels fall on neighbouring cells."""
-    depth = np.median((points @ camera.rotation.T + camera.translation)[:, 2]) if len(points) else 1.0
-    return max(1, int(voxel_size_m * camera.matrix[0, 0] / max(depth, 1.0)))
-
-
-def _raster(camera: Camera, points: np.ndarray, side: int, mask: np.ndarray | None = None) -> np.ndarray:
-    """Cells of `side` pixels on which points fall, (rows, columns) bool; with a mask, only points on it count."""
-    width, height = camera.size
-    raster = np.zeros((-(-height // side), -(-width // side)), bool)
-    column, row, seen = pixel_of_voxel(camera, points)
-    if mask is not None:
-        seen &= mask[row, column]
-    raster[row[seen] // side, column[seen] // side] = True
-    return raster
+def _raster(camera: Camera, points: np.ndarray, grid: tuple[int, tuple[int, int]], mask: np.ndarray | None = None) -> np.ndarray:
+    """Cells on which points fall, (rows, columns) bool; with a mask, only points on it count."""
+    side, shape = grid
+    raster = np.zeros(shape[0] * shape[1] + 1, bool)
+    raster[cells_of(camera, points, side, mask)] = True
+    return raster[:-1].reshape(shape)
 
 
 def _grow(raster: np.ndarray) -> np.ndarray:

@@ -32,25 +32,11 @@ def measure_tracks(update: FrameUpdate, settings: FollowingSettings) -> FrameUpd
     owned, located = features(owners >= 0), features(locating)
     filter_s = update.filter_s if update.filter else thread_time() - update.begun_s
     certain = features(observation.certain)
-    upright, joined = update.matched >= 0, _joined(update)
-    judged = np.where(joined, looks_like_person(certain, settings.lifecycle), looks_like_person(owned, settings.lifecycle))
-    like = judged | upright
+    upright = update.matched >= 0
+    like = looks_like_person(owned, settings.lifecycle) | upright
     supported = upright | _supports(owned, certain, like, update.state, settings.lifecycle)
     measurement = Measurement(locating, owned, located, certain, supported, like, looks_like_object(owned, settings.lifecycle))
     return replace(update, measurement=measurement, filter_s=filter_s)
-
-
-def _joined(update: FrameUpdate) -> np.ndarray:
-    """Which tracks own voxels of a component in which somebody else stands upright, shape (k,) bool.
-
-    Of such a component the tolerant hull tells nothing: it fills the room between people.
-    """
-    labels = update.observation.labels
-    held = [np.unique(labels[update.owners == k]) for k in range(len(update.matched))]
-    of_columns = [np.unique(labels[voxels]) for voxels in update.columns.voxels]
-    return np.array(
-        [any(j != update.matched[k] and np.isin(own, held[k]).any() for j, own in enumerate(of_columns)) for k in range(len(held))], bool
-    )
 
 
 def _supports(owned: Blobs, certain: Blobs, like: np.ndarray, state: TrackerState, settings: LifecycleSettings) -> np.ndarray:
