@@ -15,14 +15,15 @@ import cv2
 import numpy as np
 from sklearn.cluster import KMeans
 
-__all__ = ["Palette", "learn_palette", "looks_like_people"]
+__all__ = ["Palette", "learn_palette", "looks_like_people", "looks_like_surroundings"]
 
 #: Spread of the kernels, grey levels, and the density that any color has.
 SPREAD = 12.0
 ANY_COLOR = 1e-3
-#: Radii of the rings on which the surroundings are looked at, pixels of an image whose longer side is 320, and points on each.
-RINGS_PX = (12, 18, 26)
-RING_POINTS = 8
+#: Radii of the rings on which a limb's surroundings are looked at, pixels of an image whose longer side is 320, and points on each.
+LIMB_RINGS = (12, 18, 26), 8
+#: The same of a person's surroundings.
+PERSON_RINGS = (18, 32, 48, 64, 80), 12
 #: People's colors: so many cluster centres, of at most so many pixels.
 COLORS = 16
 MOST_PIXELS = 5000
@@ -81,19 +82,40 @@ def looks_like_people(image: np.ndarray, people: np.ndarray, palette: Palette, l
     -------
     ndarray of bool, shape (height, width)
     """
+    theirs, here = _densities(image, people, palette, *LIMB_RINGS)
+    return theirs > np.exp(log_ratio) * here
+
+
+def looks_like_surroundings(image: np.ndarray, people: np.ndarray, palette: Palette, log_ratio: float = 1.5) -> np.ndarray:
+    """Where a pixel has the color of what surrounds the people, further away, rather than that of people.
+
+    Parameters
+    ----------
+    image, people, palette, log_ratio
+        As of `looks_like_people`.
+
+    Returns
+    -------
+    ndarray of bool, shape (height, width)
+    """
+    theirs, here = _densities(image, people, palette, *PERSON_RINGS)
+    return here > np.exp(log_ratio) * theirs
+
+
+def _densities(image: np.ndarray, people: np.ndarray, palette: Palette, radii: tuple[int, ...], n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Density of each pixel's color among people's, and among what is on rings around it and no person."""
     picture = image.astype(np.float32)
     theirs = sum(share * _kernel(picture - color.astype(np.float32)) for share, color in zip(palette.shares, palette.colors, strict=True))
-    here = _surroundings(picture, (~people).astype(np.float32))
-    return theirs + ANY_COLOR > np.exp(log_ratio) * (here + ANY_COLOR)
+    return theirs + ANY_COLOR, _surroundings(picture, (~people).astype(np.float32), radii, n) + ANY_COLOR
 
 
-def _surroundings(picture: np.ndarray, free: np.ndarray) -> np.ndarray:
-    """Density of each pixel's color among the pixels on rings around it that are free of people."""
+def _surroundings(picture: np.ndarray, free: np.ndarray, radii: tuple[int, ...], n: int) -> np.ndarray:
+    """Density of each pixel's color among those pixels of rings around it, `n` on each, that are free of people."""
     height, width = free.shape
     density, weight = np.zeros_like(free), np.zeros_like(free)
     reach = max(height, width) / 320
-    for turn, radius in enumerate(RINGS_PX):
-        for angle in 2 * np.pi * (np.arange(RING_POINTS) + turn / len(RINGS_PX)) / RING_POINTS:
+    for turn, radius in enumerate(radii):
+        for angle in 2 * np.pi * (np.arange(n) + turn / len(radii)) / n:
             right, down = round(radius * reach * np.cos(angle)), round(radius * reach * np.sin(angle))
             # What a pixel has to its left and above is the picture moved right and down.
             here = np.s_[max(0, down) : height + min(0, down), max(0, right) : width + min(0, right)]

@@ -3,7 +3,7 @@
 Colors of people and of the scene are learnt from pixels of which it is known what they show (`learn_colors`). Then a graph cut (Rother
 et al. (2004), "GrabCut") decides between the two, pixel by pixel and with its neighbours. Limbs that never move do not differ from the
 scene as it is known; those are found by their color, which is that of the people and not that of what surrounds them
-(`hmc.camera.local_color`), and held in the cut.
+(`hmc.camera.local_color`), and held in the cut. So is, on the other side, what looks like the floor and the walls around.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from hmc.camera.local_color import Palette, learn_palette, looks_like_people
+from hmc.camera.local_color import Palette, learn_palette, looks_like_people, looks_like_surroundings
 
 __all__ = ["PeopleColors", "View", "cut_people", "disc", "learn_colors"]
 
@@ -117,6 +117,7 @@ def cut_people(view: View, colors: PeopleColors) -> np.ndarray:
         return people
     labels, _ = _hints(view)
     labels, _ = _hints(view, _limbs(view, labels, colors.palette))
+    labels[_ground(view, colors.palette) & (labels != cv2.GC_FGD)] = cv2.GC_BGD
     box = np.s_[top : top + height, left : left + width]
     part = np.ascontiguousarray(labels[box])
     scene, theirs = colors.scene.copy(), colors.people.copy()
@@ -137,6 +138,15 @@ def _limbs(view: View, labels: np.ndarray, palette: Palette) -> np.ndarray:
     solid = cv2.morphologyEx(found.view(np.uint8), cv2.MORPH_OPEN, disc(found, THIN_PX))
     _, pieces = cv2.connectedComponents(solid | people.view(np.uint8), connectivity=8)
     return (solid > 0) & np.isin(pieces, np.unique(pieces[people]))
+
+
+def _ground(view: View, palette: Palette) -> np.ndarray:
+    """Solid parts that do not differ from the scene and look like what is around all places where people may be: floor, and walls.
+
+    The cut's mixtures are of the whole image and too coarse for that: the floor between two people was people's.
+    """
+    found = looks_like_surroundings(view.image, view.possibly, palette) & ~view.differs
+    return cv2.morphologyEx(found.view(np.uint8), cv2.MORPH_OPEN, disc(found, THIN_PX)).view(bool)
 
 
 def _hints(view: View, limbs: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hmc.camera.local_color import learn_palette, looks_like_people
+from hmc.camera.local_color import learn_palette, looks_like_people, looks_like_surroundings
 
 SKIN, CLOTH, WALL, MAT = (120, 150, 190), (200, 180, 40), (130, 155, 185), (40, 40, 40)
 
@@ -57,3 +57,12 @@ def test_a_stricter_ratio_finds_less():
     palette = learn_palette([image[known]])
     loose, strict = (looks_like_people(image, known, palette, ratio) for ratio in (0.0, 3.0))
     assert strict.sum() < loose.sum() and not (strict & ~loose).any()
+
+
+def test_the_mat_beside_a_leg_looks_like_the_mat_around_and_the_leg_does_not():
+    image, parts = room_with_somebody(np.random.default_rng(3))
+    palette = learn_palette([image[mask_of(image.shape[:2], *parts.values())]])
+    maybe = mask_of(image.shape[:2], np.s_[80:215, 90:190])
+    found = looks_like_surroundings(image, maybe, palette)
+    assert found[175:205, 130:180].mean() > 0.95
+    assert found[parts["leg"]].mean() < 0.05 and found[parts["trunk"]].mean() < 0.05
