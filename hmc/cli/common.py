@@ -12,6 +12,7 @@ __all__ = [
     "add_plugin_option",
     "add_selection_options",
     "camera_names",
+    "gather_problems",
     "load_given_plugins",
     "open_selected",
     "positive_float",
@@ -68,9 +69,18 @@ def progress(iterable: Iterable[T], total: int | None = None, desc: str = "", qu
     return iter(tqdm(iterable, total=total, desc=desc, unit="frame", dynamic_ncols=True, file=sys.stderr))
 
 
+def gather_problems(problems: Iterable[str]) -> list[str]:
+    """Each once; those that say the same of several cameras or files, before the colon, as one line that names them all."""
+    said: dict[tuple[str, str], list[str]] = {}
+    for problem in dict.fromkeys(problems):
+        name, colon, words = problem.partition(": ")
+        said.setdefault((colon, words if colon else problem), []).append(name)
+    return [", ".join(names) + colon + words if colon else words for (colon, words), names in said.items()]
+
+
 def print_problems(problems: Iterable[str]) -> None:
     """Print what was survived, one line each on stderr; nothing when there is nothing."""
-    for problem in dict.fromkeys(problems):
+    for problem in gather_problems(problems):
         print(f"note: {problem}", file=sys.stderr)
 
 

@@ -9,6 +9,7 @@ from typing import Any
 from hmc.cli.common import (
     add_plugin_option,
     add_selection_options,
+    gather_problems,
     load_given_plugins,
     open_selected,
     positive_float,
@@ -160,7 +161,7 @@ def run(args: argparse.Namespace) -> int:
     write_pose(paths["pose.npz"], people.states)
     if any(people.details):
         write_fits(args.out / "fits.csv", people.frames.tolist(), people.persons.tolist(), people.status, people.details)
-    write_run(paths["run.toml"], args.method, parameters, args.seed, **source, problems=list(dict.fromkeys(problems)))
+    write_run(paths["run.toml"], args.method, parameters, args.seed, **source, problems=gather_problems(problems))
     for name in (JOURNAL, POSE_JOURNAL, MARKERS_JOURNAL, MASKS):
         for file in args.out.glob(f"{name}*"):
             file.unlink()

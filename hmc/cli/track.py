@@ -9,6 +9,7 @@ from typing import Any
 from hmc.cli.common import (
     add_plugin_option,
     add_selection_options,
+    gather_problems,
     load_given_plugins,
     open_selected,
     positive_float,
@@ -135,7 +136,7 @@ def run(args: argparse.Namespace) -> int:
     table = track_recording(recording, args.voxel, tracker, args.seed, run, timings.append)
     write_tracks(tracks_path, table)
     speed = {name: value for timing in timings for name, value in _speed(timing, recording.fps).items()}
-    write_run(run_path, tracker.name, parameters, args.seed, **source, problems=list(dict.fromkeys(problems)), speed=speed)
+    write_run(run_path, tracker.name, parameters, args.seed, **source, problems=gather_problems(problems), speed=speed)
     journal.unlink(missing_ok=True)
     print(_summary(table, recording.n_frames))
     if speed:

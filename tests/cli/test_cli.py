@@ -175,3 +175,13 @@ def test_progress_passes_everything_on(capsys):
 def test_problems_are_listed_once(capsys):
     common.print_problems(["a", "b", "a"])
     assert capsys.readouterr().err.splitlines() == ["note: a", "note: b"]
+
+
+def test_what_several_cameras_have_in_common_is_one_line():
+    lost = [f"cam_{c}: frames 98 to 99 cannot be read; left out" for c in (1, 2, 1, 3)]
+    assert common.gather_problems([*lost, "cam_4: frame 7 cannot be read; left out", "one remark: of its own", "and another"]) == [
+        "cam_1, cam_2, cam_3: frames 98 to 99 cannot be read; left out",
+        "cam_4: frame 7 cannot be read; left out",
+        "one remark: of its own",
+        "and another",
+    ]
