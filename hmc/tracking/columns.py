@@ -190,8 +190,9 @@ def missed(
 def _covered(camera: Camera, mask: np.ndarray, points: np.ndarray, columns: Columns, voxel_size_m: float) -> np.ndarray:
     """Which cells of the silhouette each column covers, (m, n_cells)."""
     rows = np.unique(np.concatenate([np.zeros(0, int), *columns.voxels]))
-    side, shape = cell_grid(camera, points[rows], voxel_size_m)
-    cells = cells_of(camera, points[rows], side, mask)
+    there = points[rows]
+    side, shape = cell_grid(camera, there, voxel_size_m)
+    cells = cells_of(camera, there, side, mask)
     covered = np.zeros((len(columns), shape[0] * shape[1] + 1), bool)
     for j, voxels in enumerate(columns.voxels):
         covered[j, cells[np.searchsorted(rows, voxels)]] = True

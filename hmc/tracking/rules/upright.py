@@ -36,21 +36,19 @@ def match_columns(update: FrameUpdate, settings: FollowingSettings) -> FrameUpda
     """The update with the upright people of the frame, and the track of each."""
     observation = update.observation
     columns = find_columns(observation)
-    columns = columns.take(_tall(update, columns, settings.lifecycle))
-    n_sure = len(columns)
+    columns, others = columns.take(_tall(update, columns, settings.lifecycle)), Columns()
     if observation.views is not None:
         places = observation.views, observation.points
         columns = columns.take(explaining(*places, columns, observation.voxel_size_m, update.state.most)) if len(columns) else columns
-        n_sure = len(columns)
         others = find_columns(observation, strict=False)
         apart = (np.hypot(*(others.centres[:, None] - columns.centres).transpose(2, 0, 1)) > MATCH_M).all(axis=1)
         others = others.take(apart & _tall(update, others, settings.lifecycle))
         if len(others):
             others = others.take(missed(*places, columns, others, observation.voxel_size_m, update.state.most))
-        columns = Columns(np.concatenate([columns.centres, others.centres]), columns.voxels + others.voxels)
-    tops = np.array([observation.points[rows, 2].max() for rows in columns.voxels])
-    begins = (np.arange(len(columns)) < n_sure) | (tops >= STANDING_M)
-    return replace(update, columns=columns, matched=_match(update.predicted, columns.centres), begins=begins)
+    stands = [observation.points[rows, 2].max() >= STANDING_M for rows in others.voxels]
+    both = Columns(np.concatenate([columns.centres, others.centres]), columns.voxels + others.voxels)
+    begins = np.array([True] * len(columns) + stands, bool)
+    return replace(update, columns=both, matched=_match(update.predicted, both.centres), begins=begins)
 
 
 def _match(predicted: np.ndarray, centres: np.ndarray) -> np.ndarray:
