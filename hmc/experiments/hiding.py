@@ -18,7 +18,6 @@ from hmc.body.inverse import fit_landmarks
 from hmc.body.kinematics import segment_transforms
 from hmc.body.proportions import default_body
 from hmc.body.scalable_models import UNITIVE_PIECES
-from hmc.camera.model import project
 from hmc.experiments.engine.inputs import Inputs, once
 from hmc.experiments.markerless_runs import FRONTEND, MASKS_KEY, VOXEL_M, tracked
 from hmc.experiments.truth import HEIGHT_M, first_truth, standing_state, stature_m, truth_track
@@ -33,6 +32,7 @@ from hmc.pose.steps.presets import PRESETS
 from hmc.pose.steps.restrict import part_mask
 from hmc.pose.views.person_view import views_of
 from hmc.tracking.resumable import person_grid
+from hmc.voxels.carving import pixel_of_voxel
 from hmc.voxels.hulls import HullStep, stream_hulls
 
 __all__ = ["ENDS", "LimbViews", "hidden_and_shown", "limb_views", "rest_of", "waits"]
@@ -115,10 +115,8 @@ def _shares(rig, hull: HullStep, points: np.ndarray) -> Iterator[float]:
     for camera, mask in zip(rig, hull.masks, strict=True):
         if mask is None:
             continue
-        uv, valid = project(camera, points)
-        column, row = np.rint(np.where(valid[:, None], uv, -1)).astype(int).T
-        inside = (column >= 0) & (row >= 0) & (column < camera.size[0]) & (row < camera.size[1])
-        yield float(mask[row[inside], column[inside]].sum() / len(points))
+        column, row, in_image = pixel_of_voxel(camera, points)
+        yield float((in_image & mask[row, column]).sum() / len(points))
 
 
 def hidden_and_shown(occupancy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -14,8 +14,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from hmc.camera.model import Camera, Rig, project
+from hmc.camera.model import Camera, Rig
 from hmc.pose.views.hull_target import HullTarget, sample_points
+from hmc.voxels.carving import pixel_of_voxel
 from hmc.voxels.surface import surface
 
 __all__ = ["points_to_cover", "silhouette_rays", "with_rays"]
@@ -69,11 +70,8 @@ def silhouette_rays(
     for camera, mask in zip(rig, masks, strict=True):
         if mask is None:
             continue
-        uv, valid = project(camera, points)
-        column, row = np.rint(np.where(valid[:, None], uv, -1)).astype(int).T
-        inside = (column >= 0) & (row >= 0) & (column < camera.size[0]) & (row < camera.size[1])
-        seen = np.flatnonzero(inside)
-        seen = seen[mask[row[seen], column[seen]]]
+        column, row, in_image = pixel_of_voxel(camera, points)
+        seen = np.flatnonzero(in_image & mask[row, column])
         if not len(seen):
             continue
         here = points[seen]

@@ -10,7 +10,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hmc.camera.model import Camera, Rig, project
+from hmc.camera.model import Camera, Rig
+from hmc.voxels.carving import pixel_of_voxel
 
 __all__ = ["on_uncovered_pixels"]
 
@@ -40,10 +41,8 @@ def on_uncovered_pixels(
     for camera, mask in zip(rig, masks, strict=True):
         if mask is None:
             continue
-        uv, valid = project(camera, candidates)
-        column, row = np.rint(np.where(valid[:, None], uv, -1)).astype(int).T
-        seen = np.flatnonzero((column >= 0) & (row >= 0) & (column < camera.size[0]) & (row < camera.size[1]))
-        seen = seen[mask[row[seen], column[seen]]]
+        column, row, in_image = pixel_of_voxel(camera, candidates)
+        seen = np.flatnonzero(in_image & mask[row, column])
         covered, step = _covered(camera, known, spacing_m)
         new[seen] |= ~covered[row[seen] // step, column[seen] // step]
     return new
@@ -51,11 +50,10 @@ def on_uncovered_pixels(
 
 def _covered(camera: Camera, known: np.ndarray, spacing_m: float) -> tuple[np.ndarray, int]:
     """Patches of the image on which known voxels show, and their side in pixels: a voxel's at the median distance."""
-    uv, valid = project(camera, known)
-    depth = (known @ camera.rotation[2] + camera.translation[2])[valid]
+    column, row, in_image = pixel_of_voxel(camera, known)
+    depth = known @ camera.rotation[2] + camera.translation[2]
+    depth = depth[depth > 0]
     step = max(1, round(float(camera.matrix[0, 0] * spacing_m / np.median(depth)))) if len(depth) else 1
     covered = np.zeros((camera.size[1] // step + 1, camera.size[0] // step + 1), bool)
-    column, row = np.rint(uv[valid]).astype(int).T // step
-    inside = (column >= 0) & (row >= 0) & (column < covered.shape[1]) & (row < covered.shape[0])
-    covered[row[inside], column[inside]] = True
+    covered[row[in_image] // step, column[in_image] // step] = True
     return covered, step
