@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -201,7 +202,8 @@ def pose(
     Returns
     -------
     PosedPeople
-        `positions`, shape (n, 15, 3), metres; `angles`, radians; `frames`, `persons`; `to_frame()` as a pandas frame.
+        `positions`, shape (n, 15, 3), metres; `angles`, radians; `frames`, `persons`; `poses.views`, how many cameras show each landmark
+        clear (`hmc.pose.clear_views`); `to_frame()` as a pandas frame.
 
     Raises
     ------
@@ -213,8 +215,9 @@ def pose(
     >>> import hmc
     >>> people = hmc.pose(hmc.open_recording("data/synthetic/tiny", frames=8))
     >>> list(people.to_frame().columns)
-    ['frame', 'person', 'joint', 'x', 'y', 'z']
+    ['frame', 'person', 'joint', 'x', 'y', 'z', 'views']
     """
+    from hmc.pose.clear_views import with_clear_views
     from hmc.pose.follow import FollowOptions, follow
     from hmc.pose.registry import pose_method
     from hmc.pose.smoothing import smooth_people
@@ -230,13 +233,14 @@ def pose(
                 on_frame(n, total)
 
     with tempfile.TemporaryDirectory() as folder:
-        masks = None
+        masks = Path(folder) / "masks" if method.needs_tracks else None
         if tracks is None and method.needs_tracks:
-            masks = Path(folder) / "masks"
             tracks = _tracked(recording, "sparse", seed, TRACK_VOXEL_M, masks)
         run = RunOptions(masks=masks, key=_KEY, progress=counted)
         people = follow(recording, tracks, method, FollowOptions(POSE_VOXEL_M, seed, height, detections), run)
-    return smooth_people(people, method.limits, recording.fps, smooth_s) if smooth_s else people
+        if smooth_s:
+            people = smooth_people(people, method.limits, recording.fps, smooth_s)
+        return with_clear_views(people, recording, replace(run, progress=None))
 
 
 def evaluate(found: PosedPeople | TrackTable, recording: Recording) -> PoseEvaluation | MotScores:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-__all__ = ["BONES", "LANDMARKS", "landmark_index"]
+__all__ = ["BONES", "ENOUGH_VIEWS", "LANDMARKS", "landmark_index"]
 
 #: Joint centres (centres of rotation); `pelvis` is the middle of the hip centres, `neck` the base of the neck, `head_top` the crown.
 LANDMARKS: tuple[str, ...] = (
@@ -19,6 +19,9 @@ BONES: tuple[tuple[str, str], ...] = (
     ("pelvis", "l_hip"), ("l_hip", "l_knee"), ("l_knee", "l_ankle"),
     ("pelvis", "r_hip"), ("r_hip", "r_knee"), ("r_knee", "r_ankle"),
 )  # fmt: skip
+
+#: A landmark that fewer cameras show clear of all else is a guess: one camera does not tell how far away it is.
+ENOUGH_VIEWS = 2
 
 
 def landmark_index(name: str) -> int:

@@ -99,6 +99,7 @@ def run(args: argparse.Namespace) -> int:
     from hmc.io.files import to_toml
     from hmc.io.fits import write_fits
     from hmc.io.results import write_joints, write_pose, write_run, write_tracks
+    from hmc.pose.clear_views import with_clear_views
     from hmc.pose.follow import FollowOptions, follow
     from hmc.pose.smoothing import smooth_people
     from hmc.tracking.resumable import person_grid, track_recording
@@ -155,6 +156,8 @@ def run(args: argparse.Namespace) -> int:
         markers.refuse_nothing(people)
     if args.smooth:
         people = smooth_people(people, method.limits, recording.fps, args.smooth)
+    if tracked:
+        people = with_clear_views(people, recording, kept(POSE_JOURNAL, "views"))
     problems += people.notes
     write_tracks(paths["tracks.csv"], _pelvis_tracks(people) if tracks is None else tracks)
     write_joints(paths["joints.csv"], people.poses)

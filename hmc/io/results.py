@@ -28,6 +28,8 @@ __all__ = [
 ]  # fmt: skip
 
 JOINT_COLUMNS = ("frame", "person", "joint", "x", "y", "z")
+#: Beyond them: how many cameras show a landmark clear.
+VIEWS_COLUMN = "views"
 TRACK_COLUMNS = ("frame", "person", "x", "y", "z")
 HEAD_COLUMNS = ("head_x", "head_y", "head_z")
 
@@ -44,6 +46,8 @@ class PoseTable:
         Person numbers.
     positions : ndarray, shape (n, 15, 3)
         World, metres, in the order of `hmc.landmarks.LANDMARKS`; NaN where a landmark is missing.
+    views : ndarray, shape (n, 15), optional
+        Cameras that show each landmark clear of all else (`hmc.pose.clear_views`); NaN where it is not known.
 
     Raises
     ------
@@ -54,13 +58,15 @@ class PoseTable:
     frames: np.ndarray
     persons: np.ndarray
     positions: np.ndarray
+    views: np.ndarray | None = None
 
     def __post_init__(self) -> None:
-        _set_rows(self, positions=(len(LANDMARKS), 3))
+        _set_rows(self, positions=(len(LANDMARKS), 3), **({} if self.views is None else {"views": (len(LANDMARKS),)}))
 
     def where(self, chosen: np.ndarray) -> PoseTable:
         """The chosen rows: a mask, shape (n,), or row numbers."""
-        return PoseTable(self.frames[chosen], self.persons[chosen], self.positions[chosen])
+        views = None if self.views is None else self.views[chosen]
+        return PoseTable(self.frames[chosen], self.persons[chosen], self.positions[chosen], views)
 
     def of(self, person: int) -> PoseTable:
         """The rows of one person."""
@@ -159,7 +165,7 @@ def _set_rows(table: Any, **tails: tuple[int, ...]) -> None:
 
 
 def read_joints(path: str | Path) -> PoseTable:
-    """Read a table `frame, person, joint, x, y, z`.
+    """Read a table `frame, person, joint, x, y, z`; `views` too where there is such a column.
 
     A landmark without a row, or with an empty or `nan` coordinate, is missing (NaN). Columns beyond these are ignored.
 
@@ -187,18 +193,27 @@ def read_joints(path: str | Path) -> PoseTable:
     _refuse_twice(path, cells, lines, "this frame, person and joint")
     positions = np.full((len(keys) * len(LANDMARKS), 3), np.nan)
     positions[cells] = xyz
-    return PoseTable(keys[:, 0], keys[:, 1], positions.reshape(len(keys), len(LANDMARKS), 3))
+    views = None
+    if VIEWS_COLUMN in columns:
+        views = np.full((len(keys), len(LANDMARKS)), np.nan)
+        views.flat[cells] = _numbers(path, VIEWS_COLUMN, columns[VIEWS_COLUMN], lines, "a number of cameras")
+    return PoseTable(keys[:, 0], keys[:, 1], positions.reshape(len(keys), len(LANDMARKS), 3), views)
 
 
 def write_joints(path: str | Path, table: PoseTable) -> None:
-    """Write a table `frame, person, joint, x, y, z`: metres to six decimals, sorted by frame, then person; missing landmarks as `nan`."""
+    """Write a table `frame, person, joint, x, y, z`: metres to six decimals, sorted by frame, then person; missing landmarks as `nan`.
+
+    With a last column `views` where the table has them.
+    """
     order = np.lexsort([table.persons, table.frames])
     with atomic_write(path) as file:
-        file.write(",".join(JOINT_COLUMNS) + "\n")
+        file.write(",".join((*JOINT_COLUMNS, *(() if table.views is None else (VIEWS_COLUMN,)))) + "\n")
         for row in order:
             start = f"{table.frames[row]},{table.persons[row]},"
+            ends = [""] * len(LANDMARKS) if table.views is None else [f",{n:.0f}" if n >= 0 else "," for n in table.views[row]]
             file.writelines(
-                f"{start}{name},{x:.6f},{y:.6f},{z:.6f}\n" for name, (x, y, z) in zip(LANDMARKS, table.positions[row], strict=True)
+                f"{start}{name},{x:.6f},{y:.6f},{z:.6f}{end}\n"
+                for name, (x, y, z), end in zip(LANDMARKS, table.positions[row], ends, strict=True)
             )
 
 
@@ -246,17 +261,22 @@ def write_tracks(path: str | Path, table: TrackTable) -> None:
 
 def _points(path: Path, names: Sequence[str], columns: Mapping[str, Sequence[str]], lines: np.ndarray) -> np.ndarray:
     """Three columns of numbers as (n, 3); an empty cell is NaN."""
-    points = np.empty((len(lines), len(names)))
-    for place, name in enumerate(names):
-        for row, cell in enumerate(columns[name]):
-            try:
-                points[row, place] = float(cell) if cell.strip() else np.nan
-            except ValueError:
-                raise InputError(f"{path}, line {lines[row]}: `{name}` must be a number of metres; got {cell!r}") from None
+    points = np.stack([_numbers(path, name, columns[name], lines, "a number of metres") for name in names], axis=1)
     infinite = np.isinf(points).any(axis=1)
     if infinite.any():
         raise InputError(f"{path}, line {lines[np.argmax(infinite)]}: an infinite coordinate; write nan where there is none")
     return points
+
+
+def _numbers(path: Path, name: str, cells: Sequence[str], lines: np.ndarray, what: str) -> np.ndarray:
+    """A column of numbers, shape (n,); an empty cell is NaN."""
+    numbers = np.empty(len(lines))
+    for row, cell in enumerate(cells):
+        try:
+            numbers[row] = float(cell) if cell.strip() else np.nan
+        except ValueError:
+            raise InputError(f"{path}, line {lines[row]}: `{name}` must be {what}; got {cell!r}") from None
+    return numbers
 
 
 def _refuse_twice(path: Path, cells: np.ndarray, lines: np.ndarray, what: str) -> None:

@@ -17,7 +17,7 @@ from hmc.body.joints import DOF_NAMES
 from hmc.body.kinematics import landmark_masks, landmarks
 from hmc.errors import InputError
 from hmc.io.detections import DetectionTable
-from hmc.io.masks import MaskStep, kept_masks
+from hmc.io.masks import MaskStep, keep_masks, kept_masks
 from hmc.io.recording import Recording, iterate_frames
 from hmc.io.results import PoseStates, PoseTable, TrackTable, write_joints, write_pose
 from hmc.landmarks import LANDMARKS
@@ -88,12 +88,13 @@ class PosedPeople:
         return self.states.dof_names[3:]
 
     def to_frame(self):
-        """A pandas frame with the columns of ``joints.csv``: frame, person, joint, x, y, z; metres."""
+        """A pandas frame with the columns of ``joints.csv``: frame, person, joint, x, y, z in metres, and views where they are known."""
         import pandas as pd
 
         rows, joints = self.positions.shape[:2]
         columns = {"frame": np.repeat(self.frames, joints), "person": np.repeat(self.persons, joints), "joint": list(LANDMARKS) * rows}
-        return pd.DataFrame(columns | dict(zip("xyz", self.positions.reshape(-1, 3).T, strict=True)))
+        columns |= dict(zip("xyz", self.positions.reshape(-1, 3).T, strict=True))
+        return pd.DataFrame(columns if self.poses.views is None else columns | {"views": self.poses.views.ravel().astype(int)})
 
     def save(self, folder: str | Path) -> None:
         """Write ``joints.csv`` and ``pose.npz``, as `hmc pose` does."""
@@ -196,13 +197,14 @@ def _views_from(
 
 
 def _hulls_from(recording: Recording, grid: VoxelGrid, run: RunOptions, first: int, images: bool) -> Iterator[HullStep]:
-    """Hulls from a frame on, of the silhouettes that were kept, where they were."""
+    """Hulls from a frame on, of the silhouettes that were kept, where they were; otherwise these are kept now."""
     end = recording.start + recording.n_frames
     kept: Iterable[MaskStep] | None = None if run.masks is None else kept_masks(run.masks, run.key, first, end)
     if kept is not None and images:
         frames = iterate_frames(recording, first, end, run.on_problem)
         kept = (replace(step, images=frame.images) for step, frame in zip(kept, frames, strict=True))
-    return stream_hulls(recording, grid, run.frontend, first=first, warm_up=WARM_UP_FRAMES, masks=kept, on_problem=run.on_problem)
+    stream = stream_hulls(recording, grid, run.frontend, first=first, warm_up=WARM_UP_FRAMES, masks=kept, on_problem=run.on_problem)
+    return stream if kept is not None or run.masks is None else keep_masks(run.masks, run.key, first, stream, run.on_problem)
 
 
 def _with_markers(views: dict[int, PersonView], recording: Recording, method: PoseMethod, options: FollowOptions) -> dict[int, PersonView]:

@@ -18,7 +18,7 @@ from hmc.camera.model import Camera
 from hmc.errors import InputError
 from hmc.io.recording import Frame, Recording, iterate_frames
 from hmc.io.results import PoseStates, PoseTable, TrackTable, read_joints, read_pose, read_tracks
-from hmc.landmarks import landmark_index
+from hmc.landmarks import ENOUGH_VIEWS, landmark_index
 from hmc.view.overlay import LEFT, RIGHT, draw_label, draw_outline, draw_paths, draw_sticks, draw_track, person_color
 from hmc.view.scene import BACKGROUND, draw_floor, draw_rig, draw_voxels, from_above, viewpoint
 from hmc.voxels.grid import VoxelGrid
@@ -47,6 +47,7 @@ class Person:
     position: np.ndarray | None = None
     state: np.ndarray | None = None
     body: BodyModel | None = None
+    guessed: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -110,7 +111,7 @@ def people_in(result: Result, frame: int) -> list[Person]:
         {} if table is None else {int(table.persons[row]): row for row in np.flatnonzero(table.frames == frame)}
         for table in (result.poses, result.tracks, result.states)
     )
-    people = []
+    people, views = [], None if result.poses is None else result.poses.views
     for number in sorted(set(poses) | set(tracks)):
         points = result.poses.positions[poses[number]] if result.poses is not None and number in poses else None
         if points is not None and np.isnan(points).all():
@@ -123,6 +124,7 @@ def people_in(result: Result, frame: int) -> list[Person]:
                 position=result.tracks.positions[tracks[number]] if result.tracks is not None and number in tracks else None,
                 state=result.states.states[states[number]] if fitted and result.states is not None else None,
                 body=(result.bodies or {}).get(number),
+                guessed=None if points is None or views is None else views[poses[number]] < ENOUGH_VIEWS,
             )
         )
     return people
@@ -216,7 +218,7 @@ def draw_people(image: np.ndarray, camera: Camera, people: list[Person], outline
             draw_outline(image, camera, person.body, person.state, person.number)
     for person in people:
         if person.landmarks is not None:
-            draw_sticks(image, camera, person.landmarks, person.number, width)
+            draw_sticks(image, camera, person.landmarks, person.number, width, person.guessed)
         elif person.position is not None:
             draw_track(image, camera, person.position, person.number, width)
     for person in people:

@@ -30,7 +30,7 @@ STARTS = STEPS | {"pose.starts"}
 PERSON = STARTS | {"pose.legs", "pose.person"}
 FOLLOWING = PERSON | {"pose.records", "pose.follow"}
 METHODS = STARTS | {"pose.legs", "pose.recovery", "pose.methods"}
-POSE = METHODS | FOLLOWING | {"pose.smoothing", "pose.registry"}
+POSE = METHODS | FOLLOWING | {"pose.clear_views", "pose.smoothing", "pose.registry"}
 METRICS = IO | {"metrics"}
 VIEW = VOXELS | {"body", "view"}
 EVERYTHING = POSE | METRICS | VIEW | {"check", "synthetic", "plugins"}
@@ -55,6 +55,7 @@ MAY_IMPORT = {
     "pose.records": PERSON | {"pose.records"},
     "pose.follow": FOLLOWING,
     "pose.smoothing": FOLLOWING,
+    "pose.clear_views": FOLLOWING,
     "pose.methods": METHODS,
     "pose.registry": METHODS | {"pose.registry", "plugins"},
     "pose.__init__": {"callable_package"},

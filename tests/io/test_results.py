@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pickle
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas
@@ -52,6 +52,23 @@ def test_joints_come_back(tmp_path_factory, seed, n_frames):
     np.testing.assert_array_equal(back.frames, table.frames)
     np.testing.assert_array_equal(back.persons, table.persons)
     np.testing.assert_allclose(back.positions, table.positions, atol=6e-7)
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=st.integers(0, 10_000))
+def test_views_come_back(tmp_path_factory, seed):
+    path, table, rng = tmp_path_factory.mktemp("joints") / "joints.csv", make_poses(seed=seed), np.random.default_rng(seed)
+    views = rng.integers(0, 9, table.positions.shape[:2]).astype(float)
+    views[rng.random(views.shape) < 0.1] = np.nan
+    write_joints(path, replace(table, views=views))
+    np.testing.assert_array_equal(read_joints(path).views, views)
+    np.testing.assert_array_equal(read_joints(path).of(2).views, views[table.persons == 2])
+
+
+def test_views_that_are_no_number_are_refused_with_the_line(tmp_path):
+    (tmp_path / "joints.csv").write_text("frame,person,joint,x,y,z,views\n0,0,neck,1,2,3,4\n0,0,pelvis,1,2,3,many\n")
+    with pytest.raises(InputError, match=r"joints.csv, line 3: `views` must be a number of cameras; got 'many'"):
+        read_joints(tmp_path / "joints.csv")
 
 
 def test_joints_are_the_long_table_that_pandas_reads(tmp_path):

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import csv
 import tomllib
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from hmc.cli import main
 from hmc.errors import InputError
-from hmc.io.results import PoseTable, TrackTable, write_joints, write_run, write_tracks
+from hmc.io.results import PoseTable, TrackTable, read_joints, write_joints, write_run, write_tracks
 from hmc.landmarks import LANDMARKS, landmark_index
 from hmc.metrics.persons import exchange_sides
 from hmc.metrics.scores import evaluate_pose, evaluate_tracks
@@ -50,6 +51,18 @@ def result(tmp_path, truth):
     tracks = centroids(truth)
     write_tracks(folder / "tracks.csv", TrackTable(tracks.frames, names, tracks.positions + np.array([0, 0.06, 0.4])))
     return folder
+
+
+def test_guesses_are_scored_apart(result, recording, capsys):
+    found = read_joints(result / "joints.csv")
+    views = np.full(found.positions.shape[:2], 3.0)
+    views[found.persons == 4, landmark_index("l_wrist")] = 1  # 80 mm off, all others 30
+    write_joints(result / "joints.csv", replace(found, views=views))
+    assert main(["evaluate", str(result), str(recording)]) == 0
+    report = tomllib.loads((result / "metrics.toml").read_text())["pose"]
+    assert report["guessed"] == pytest.approx({"landmarks": 20, "mean_mm": 80, "mmta_at_100mm": 1, "mmta_at_50mm": 0})
+    assert report["shown"] == pytest.approx({"landmarks": 580, "mean_mm": 30, "mmta_at_100mm": 1, "mmta_at_50mm": 1})
+    assert "20 landmarks that fewer do: guesses: mean 80.0 mm, 1.000 within 100 mm, 0.000 within 50 mm" in capsys.readouterr().out
 
 
 def test_known_errors_come_out(result, recording, capsys):

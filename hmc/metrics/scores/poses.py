@@ -10,7 +10,7 @@ import numpy as np
 
 from hmc.errors import InputError
 from hmc.io.results import PoseTable, TrackTable
-from hmc.landmarks import LANDMARKS, landmark_index
+from hmc.landmarks import ENOUGH_VIEWS, LANDMARKS, landmark_index
 from hmc.metrics.landmarks import landmark_errors, score
 from hmc.metrics.mot import MotScores, clear_mot
 from hmc.metrics.persons import LIMB_PAIRS, exchange_sides, match_persons, runs, swapped_frames
@@ -47,6 +47,8 @@ class PersonErrors:
         Frames with truth.
     estimate, truth : ndarray, shape (n, 15, 3)
         Metres; NaN where missing.
+    views : ndarray, shape (n, 15)
+        Cameras that show each landmark clear, as the estimate says; NaN where it does not.
     """
 
     person: int
@@ -54,6 +56,7 @@ class PersonErrors:
     frames: np.ndarray
     estimate: np.ndarray
     truth: np.ndarray
+    views: np.ndarray
 
     @property
     def errors(self) -> np.ndarray:
@@ -134,6 +137,7 @@ def evaluate_pose(estimate: PoseTable, truth: PoseTable, thresholds_m: Sequence[
     }
     summary |= {key: value for key, value in rows[len(LANDMARKS)].items() if key not in ("person", "landmark", "frames", "true_frames")}
     summary |= chosen
+    summary |= _by_views(groups["all"], np.concatenate([person.views for person in persons]), known)
     return PoseEvaluation(persons, rows, summary, tuple(_notes(persons, frame_means, estimate.persons[unmatched])), known)
 
 
@@ -229,9 +233,23 @@ def _person_errors(estimate: PoseTable, truth: PoseTable, person: int, names: Ma
     estimated_as = tuple(sorted(name for name, true_name in names.items() if true_name == person))
     rows = np.flatnonzero(np.isin(estimate.persons, estimated_as))
     positions = np.full((len(true_rows), len(LANDMARKS), 3), np.nan)
+    views = np.full((len(true_rows), len(LANDMARKS)), np.nan)
     _, a, b = np.intersect1d(truth.frames[true_rows], estimate.frames[rows], return_indices=True)
     positions[a] = estimate.positions[rows[b]]
-    return PersonErrors(person, estimated_as, truth.frames[true_rows], positions, truth.positions[true_rows])
+    if estimate.views is not None:
+        views[a] = estimate.views[rows[b]]
+    return PersonErrors(person, estimated_as, truth.frames[true_rows], positions, truth.positions[true_rows], views)
+
+
+def _by_views(errors: np.ndarray, views: np.ndarray, thresholds_m: Sequence[float]) -> dict[str, dict[str, float]]:
+    """Scores of the landmarks that enough cameras show clear, and of those that are guesses; empty where it is not known."""
+    scores = {}
+    for name, of_these in (("shown", views >= ENOUGH_VIEWS), ("guessed", views < ENOUGH_VIEWS)):
+        chosen = errors[of_these & np.isfinite(errors)]
+        if len(chosen):
+            matched = {f"mmta_at_{1000 * threshold:g}mm": float((chosen <= threshold).mean()) for threshold in thresholds_m}
+            scores[name] = {"landmarks": len(chosen), "mean_mm": _mean_mm(chosen), **matched}
+    return scores
 
 
 def _frame_means(errors: np.ndarray) -> np.ndarray:

@@ -1,0 +1,160 @@
+"""In how many silhouettes each landmark shows clear of all else: what tells a measured limb from a guessed one.
+
+A silhouette says where a forearm is when the forearm stands out of it: not when it lies before the trunk, when another person is
+behind it, or when furniture hides it. Two cameras that show it clear locate it; one says where it is not; without any, it is where
+posture and the frames before have put it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hmc.body.flesh import flesh_points, place_points
+from hmc.body.kinematics import landmarks, segment_transforms
+from hmc.body.limbs import CHAIN_OF_PART, LIMBS
+from hmc.body.model import BodyModel, neutral_state
+from hmc.body.proportions import make_body
+from hmc.camera.model import Camera, Rig
+from hmc.io.masks import MaskStep, kept_masks
+from hmc.io.recording import Recording
+from hmc.io.results import PoseStates, PoseTable
+from hmc.landmarks import ENOUGH_VIEWS, LANDMARKS
+from hmc.tracking.views import cell_grid
+from hmc.voxels.carving import pixel_of_voxel
+from hmc.voxels.run_options import RunOptions
+
+if TYPE_CHECKING:
+    from hmc.pose.follow import PosedPeople
+
+__all__ = ["clear_views", "with_clear_views"]
+
+#: Flesh of a landmark's limb as near as this to it counts as its own, metres.
+NEAR_M = 0.15
+#: A camera shows a landmark clear when more than this share of its flesh is.
+CLEAR_SHARE = 0.3
+#: A person of whose landmarks more than this share are guesses is told of.
+MANY_GUESSES = 0.05
+#: Between points of the flesh, and sides of an image's cells at the people's distance, metres.
+SPACING_M, CELL_M = 0.02, 0.03
+
+_N_CHAINS = len(LIMBS) + 1
+#: The chain (`hmc.body.limbs`) of each landmark; 0 for those of the trunk and the head.
+_CHAIN = np.zeros(len(LANDMARKS), int)
+for _number, _limb in enumerate(LIMBS.values(), 1):
+    _CHAIN[_limb.landmarks] = _number
+
+
+@dataclass(frozen=True)
+class _Flesh:
+    """A body's surface: points and their segments, the chain of each, and of which landmarks it is, shape (n, 15)."""
+
+    points: np.ndarray
+    segment: np.ndarray
+    chain: np.ndarray
+    of_landmark: np.ndarray
+
+
+def clear_views(rig: Rig, steps: Iterable[MaskStep], states: PoseStates) -> np.ndarray:
+    """Number of cameras in whose silhouettes each landmark's flesh stands clear of the person's other limbs and of other people.
+
+    Parameters
+    ----------
+    rig : Rig
+    steps : iterable of MaskStep
+        The silhouettes of the frames.
+    states : PoseStates
+        The poses of all people in them, with their bodies.
+
+    Returns
+    -------
+    ndarray of int, shape (n, 15)
+        A row for every row of `states`, in the order of `hmc.landmarks.LANDMARKS`; 0 where there is no pose or no silhouettes. For trunk
+        and head only other people stand in the way.
+    """
+    bodies = {person: make_body({name: float(value) for name, value in body.items()}) for person, body in states.bodies.items()}
+    flesh = {person: _flesh_of(body) for person, body in bodies.items()}
+    views = np.zeros((len(states.frames), len(LANDMARKS)), int)
+    posed = np.isfinite(states.states).any(axis=1)
+    for step in steps:
+        rows = np.flatnonzero((states.frames == step.index) & posed).tolist()
+        if not rows:
+            continue
+        people = [flesh[int(states.persons[row])] for row in rows]
+        placed = []
+        for row, one in zip(rows, people, strict=True):
+            # What is not known of a limb is NaN, and so is where its flesh is: it falls on no pixel.
+            transforms = segment_transforms(bodies[int(states.persons[row])], states.states[row])
+            placed.append(place_points(*transforms, one.points, one.segment))
+        for camera, mask in zip(rig, step.masks, strict=True):
+            if mask is not None:
+                views[rows] += _shown_by(camera, mask, people, placed)
+    return views
+
+
+def with_clear_views(people: PosedPeople, recording: Recording, run: RunOptions) -> PosedPeople:
+    """Poses with `clear_views` beside their landmarks, and a line on every person of whom much is guessed.
+
+    Parameters
+    ----------
+    people : PosedPeople
+    recording : Recording
+    run : RunOptions
+        With the silhouettes that were kept; where they were not, the poses stay as they are.
+    """
+    first, end = recording.start, recording.start + recording.n_frames
+    steps: Iterable[MaskStep] | None = None if run.masks is None else kept_masks(run.masks, run.key, first, end)
+    if steps is None:
+        return people
+    steps = run.progress(steps, end - first) if run.progress else steps
+    poses = replace(people.poses, views=clear_views(recording.rig, steps, people.states))
+    return replace(people, poses=poses, notes=(*people.notes, *_guess_notes(poses)))
+
+
+def _guess_notes(poses: PoseTable) -> list[str]:
+    """A line on every person of whose landmarks many are guesses: how many, and which most of all."""
+    notes = []
+    for person in np.unique(poses.persons).tolist():
+        own = poses.of(person)
+        there = np.isfinite(own.positions).all(axis=2)
+        guessed = there & (np.zeros(there.shape) if own.views is None else own.views < ENOUGH_VIEWS)
+        if guessed.sum() > MANY_GUESSES * there.sum():
+            counts = guessed.sum(axis=0)
+            most = ", ".join(f"{LANDMARKS[k]} {counts[k]}" for k in np.argsort(-counts, kind="stable")[:4] if counts[k])
+            notes.append(
+                f"person {person}: {guessed.sum() / there.sum():.0%} of the landmarks are guesses, as fewer than two cameras show them "
+                f"clear (`views` in joints.csv); in how many of {len(there)} frames, most of all: {most}"
+            )
+    return notes
+
+
+def _flesh_of(body: BodyModel) -> _Flesh:
+    table = flesh_points(body, SPACING_M)
+    skin = table.is_surface
+    points, segment, chain = table.points[skin], table.segment[skin], CHAIN_OF_PART[table.part[skin]]
+    state = neutral_state("sideways", body.limits)
+    apart = np.linalg.norm(place_points(*segment_transforms(body, state), points, segment)[:, None] - landmarks(body, state), axis=2)
+    near = (apart <= NEAR_M) & (chain[:, None] == _CHAIN)
+    return _Flesh(points, segment, chain, near)
+
+
+def _shown_by(camera: Camera, mask: np.ndarray, people: list[_Flesh], placed: list[np.ndarray]) -> np.ndarray:
+    """Whether a camera shows each person's landmarks clear, bool, shape (n_people, 15)."""
+    points = np.concatenate(placed)
+    person = np.repeat(np.arange(len(people)), [len(one) for one in placed])
+    chain = np.concatenate([one.chain for one in people])
+    known = np.isfinite(points).all(axis=1)
+    column, row, seen = pixel_of_voxel(camera, np.where(known[:, None], points, 0.0))
+    seen &= known
+    side, (n_rows, n_columns) = cell_grid(camera, points[known], CELL_M)
+    cell = row // side * n_columns + column // side
+    chains_in, people_in = (
+        np.bincount(np.unique(key[seen] * n_rows * n_columns + cell[seen]) % (n_rows * n_columns), minlength=n_rows * n_columns)[cell]
+        for key in (person * _N_CHAINS + chain, person)
+    )
+    clear = seen & mask[row, column] & np.where(chain > 0, chains_in == 1, people_in == 1)
+    shown = [own.of_landmark[clear[person == k]].sum(axis=0) > CLEAR_SHARE * own.of_landmark.sum(axis=0) for k, own in enumerate(people)]
+    return np.array(shown)
