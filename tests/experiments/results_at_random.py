@@ -276,13 +276,18 @@ def displaced(rng, parameters, noise):
     return {"distance_m": {name: amount(rng, noise, 0.05, n) for name in SAMPLINGS}, "degrees": rng.uniform(15, 45, n)}
 
 
+def overlaps(rng, parameters, noise):
+    usual = rng.uniform(0.1, 0.9) if noise else rng.uniform(0.78, 0.82)
+    return {"silhouettes": np.clip(usual + 0.01 * rng.normal(size=(4, 5)), 0, 1), "hulls": np.clip(usual + 0.01 * rng.normal(size=4), 0, 1)}
+
+
 #: By the folder of the cells: ``draw(rng, parameters, noise) -> results``.
 RESULTS = {
     "fig-2.4": colored, "fig-3.3": peaks, "fig-3.5": over_annealed, "fig-4.2": components, "table-4.2": classified, "fig-4.4": tree,
     "fig-4.7": ellipsoid, "fig-4.9": samples, "tracking": tracks, "fig-4.12": crossing, "why-behind": behind, "pose": pose,
     "fig-6.11": maps, "markers": marked, "filters": filtered, "markerless": pose, "fig-7.8": schedule, "fig-7.15": behind_furniture,
     "lost-arm": lost_arm, "over-time": unseen, "all-methods": timed, "fig-B.1": square, "hsiao-3.8": ghosts, "hsiao-parts": parts,
-    "hsiao-4": swarmed, "why-hsiao": swarmed, "hsiao-pso": optimised,
+    "hsiao-4": swarmed, "why-hsiao": swarmed, "hsiao-pso": optimised, "repairs": overlaps,
     "kehl-1": carved, "kehl-4": edges, "kehl-9": displaced, "kehl": descended,
 }  # fmt: skip
 

@@ -50,6 +50,7 @@ EXPERIMENTS = {
     "table-8.1": "table_8_1",
     "fig-8.1": "fig_8_1",
     "missing-data": "missing_data",
+    "repairs": "repairs",
     "what-each-adds": "what_each_adds",
     "lost-arm": "lost_arm",
     "over-time": "over_time",
