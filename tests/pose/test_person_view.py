@@ -81,6 +81,25 @@ def test_voxels_are_shared_out_among_the_people(pair):
     assert set(alone) == {3}
 
 
+def test_a_piece_that_is_nobodys_may_be_anybodys(frame, monkeypatch):
+    """A hand beyond a sleeve that all cameras lost: a body may be there, and silhouettes ask for it."""
+    clip, grid, tracks, hull = frame
+    (whole,) = views_of(clip, grid, tracks, hull).values()
+    above = grid.centres(np.argwhere(hull.strict))[:, 2].max() - 0.2
+    real = person_view.person_voxels
+
+    def without_head(*given):
+        return [voxels[grid.centres(voxels)[:, 2] < above] for voxels in real(*given)]
+
+    monkeypatch.setattr(person_view, "person_voxels", without_head)
+    (view,) = views_of(clip, grid, tracks, hull).values()
+    heads = grid.centres(np.argwhere(hull.strict))
+    heads = heads[heads[:, 2] > above]
+    at = tuple(np.rint((heads - view.target.origin) / view.target.voxel_size_m).astype(int).T)
+    assert len(heads) > 20 and view.target.loose[at].all() and not view.target.tolerant[at].any()
+    assert (view.target.rays[:, 2] > above).sum() > 0.5 * (whole.target.rays[:, 2] > above).sum()
+
+
 def test_people_who_are_not_in_the_frame_and_those_whom_nothing_shows(frame):
     clip, grid, tracks, hull = frame
     elsewhere = TrackTable(np.array([0, 0, 1]), np.array([0, 7, 9]), np.vstack([tracks.positions, [2.2, 2.0, 0.9], tracks.positions]))

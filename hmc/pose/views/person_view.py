@@ -135,9 +135,11 @@ def views_of(
 
 
 def _targets(recording, grid, hull, strict, tolerant) -> list[HullTarget | None]:
-    """Every person's hulls and rays. The tolerant hull is shared out among the people; the rest of the loose one may be any person's."""
-    spare, floor_z = hull.loose & ~hull.tolerant, float(recording.room[0, 2])
+    """Every person's hulls and rays. The tolerant hull is shared out among the people; what nobody got, and the rest of the loose one, may
+    be any person's: a hand beyond a sleeve that is lost is a piece of its own."""
+    spare, floor_z = hull.loose.copy(), float(recording.room[0, 2])
     nothing = np.zeros((0, 3), int)
+    spare[tuple(np.concatenate([nothing, *tolerant]).T)] = False
     new = None
     if sum(mask is not None for mask in hull.masks) <= FEW_CAMERAS:
         all_strict = grid.centres(np.concatenate([nothing, *strict]))
