@@ -76,13 +76,19 @@ def add_tracker_options(parser: argparse.ArgumentParser) -> None:
         default=True,
         help="let the other cameras decide where one takes pale clothes for a shadow (default), or use each camera's own silhouette",
     )
+    parser.add_argument(
+        "--cut-shadows",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="cut shadows on the floor, on which the cameras agree, out of the silhouettes (default), or leave them in",
+    )
 
 
 def selected_frontend(args: argparse.Namespace):
     """How silhouettes and hulls are made, as the options say."""
     from hmc.voxels.hulls import FrontendSettings
 
-    return FrontendSettings(complete=args.complete)
+    return FrontendSettings(complete=args.complete, cut_shadows=args.cut_shadows)
 
 
 def selected_tracker(args: argparse.Namespace):

@@ -26,7 +26,7 @@ from hmc.camera.model import Camera, Rig, undistort
 from hmc.voxels.carving import CarvingTables, carve, make_tables, pixel_of_voxel, pixels_at
 from hmc.voxels.grid import VoxelGrid
 
-__all__ = ["CompletionTables", "complete_masks", "doubtful_hull", "floor_shadows", "make_completion_tables"]
+__all__ = ["CompletionTables", "complete_masks", "doubtful_hull", "floor_shadows", "make_completion_tables", "shown"]
 
 #: Voxels in which cameras are compared, metres (a forearm is two wide), and the most of them: in a hall they are larger.
 VOXEL_M, MOST_VOXELS = 0.04, 4e6
@@ -152,7 +152,7 @@ def complete_masks(
             break
         joined, there = {}, points[agreed]
         for c in given:
-            image, scale = _shown(tables.carving.rig[c], there, pixels[c].take(agreed))
+            image, scale = shown(tables.carving.rig[c], there, pixels[c].take(agreed))
             if turn == 0 and _doubted_beside(image, scale, done[c], possible[c]) > MOST_DOUBT:
                 useless.add(c)
             joined[c] = (done[c], 0.0) if c in useless else _join(image, scale, done[c], possible[c], grid.voxel_size_m)
@@ -242,7 +242,7 @@ def _possible(mask: np.ndarray, doubt: np.ndarray | None, shadow: np.ndarray, ce
     return out
 
 
-def _shown(camera: Camera, points: np.ndarray, pixels: np.ndarray) -> tuple[np.ndarray, float]:
+def shown(camera: Camera, points: np.ndarray, pixels: np.ndarray) -> tuple[np.ndarray, float]:
     """Image of voxels, 1 or 0, by the pixels on which they fall; and how many pixels a metre is there."""
     width, height = camera.size
     image: np.ndarray = np.zeros((height, width), np.uint8)

@@ -29,6 +29,7 @@ from hmc.io.recording import Frame, Recording, background_frames, iterate_frames
 from hmc.voxels.background_initialisation import UnseenPlaces, learn_from_people, with_unseen_places
 from hmc.voxels.carving import CarvingTables, carve_levels, make_tables
 from hmc.voxels.completion import complete_masks, doubtful_hull, make_completion_tables
+from hmc.voxels.floor_shadows import cut_floor_shadows
 from hmc.voxels.grid import VoxelGrid
 
 __all__ = ["FrontendSettings", "HullStep", "stream_hulls", "stream_masks"]
@@ -55,6 +56,8 @@ class FrontendSettings:
         Images of which the median is taken, and the number of frames, around the selection, over which they are spread.
     complete : bool
         Whether cameras decide one another's doubtful pixels (`hmc.voxels.completion`).
+    cut_shadows : bool
+        Whether shadows on the floor, on which cameras agree, leave the silhouettes (`hmc.voxels.floor_shadows`).
     tolerance : int
         Cameras that may miss a voxel of the tolerant hull. Used where four cameras or more have a silhouette; with fewer, the tolerant
         hull is the strict one.
@@ -72,6 +75,7 @@ class FrontendSettings:
     median_frames: int = 20
     median_span: int = 1800
     complete: bool = True
+    cut_shadows: bool = True
     tolerance: int = 1
     outside: str = "ignore"
     min_views: int | None = None
@@ -172,7 +176,8 @@ def stream_masks(
     start = max(recording.start, first - warm_up)
     models, places = _learn(recording, settings, report)
     names = recording.rig.names
-    tables = make_completion_tables(recording.room, recording.rig) if settings.complete and any(models) else None
+    decided_together = (settings.complete or settings.cut_shadows) and any(models)
+    tables = make_completion_tables(recording.room, recording.rig) if decided_together else None
     changed: dict[int, int] = {}  # camera whose whole image changed -> the frame in which that began
     with ThreadPoolExecutor(settings.threads or os.cpu_count() or 1) as pool, ThreadPoolExecutor(1) as reader:
         for frame in _read_ahead(iterate_frames(recording, start, last, report), reader):
@@ -187,9 +192,11 @@ def stream_masks(
                 if places is not None:
                     masks = with_unseen_places(places, frame.images, masks, pool)
                 doubtful = tuple(None if model is None else model.doubtful for model in models)
-                completed = masks if tables is None else complete_masks(tables, masks, doubtful)
+                completed = masks if tables is None or not settings.complete else complete_masks(tables, masks, doubtful)
                 if all(after is before for after, before in zip(completed, masks, strict=True)):
                     doubtful = (None,) * len(masks)
+                if tables is not None and settings.cut_shadows:
+                    completed = cut_floor_shadows(tables, frame.images, models, completed)
                 yield MaskStep(frame.index, frame.images, completed, doubtful)
         for c, began in changed.items():
             report(_say_changed(names[c], began, frame.index))

@@ -30,7 +30,7 @@ def test_overlap_is_that_of_a_loop_over_pixels():
 
 
 def test_a_cell_scores_the_frames_with_a_truth():
-    whole, bare = cell(repairs.ALL), cell("all three")
+    whole, bare = cell(repairs.ALL), cell("all of these")
     assert whole["silhouettes"].shape == (2, 7) and whole["hulls"].shape == (2,)  # frames 0 and 5, seven cameras
     assert 0.7 < np.mean(whole["silhouettes"]) < 1 and 0.5 < np.mean(whole["hulls"]) < 1
     assert np.mean(bare["silhouettes"]) != np.mean(whole["silhouettes"])

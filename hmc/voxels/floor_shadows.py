@@ -1,0 +1,143 @@
+"""Shadows on the floor, told from people by all cameras: a spot of the floor is as dark to whoever looks at it.
+
+A deep shadow before a person's feet looks to one camera as dark trousers would: the floor's color, much darker. It is in all silhouettes,
+so it is in the hull, and joins people who stand together. To a rig the two are not the same:
+
+- A shadow lies on the floor. Other cameras that look at the same spot see it darkened by as much, as a floor scatters light all ways; of
+  the spot behind a leg they see the bare floor, or something of another darkness.
+- A shadow fills no room. The line of sight to it meets no place, a quarter of a metre and more above the floor, at which all cameras see
+  people.
+
+Pixels of which both hold leave the silhouettes. Measured by ``python -m hmc.experiments run repairs``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+
+from hmc.camera.segmentation import BackgroundModel
+from hmc.voxels.carving import carve, pixels_at
+from hmc.voxels.completion import CompletionTables, shown
+
+__all__ = ["cut_floor_shadows"]
+
+#: Shares of the empty floor's light: from the first on a spot is bare, below the second it is no shadow but something dark.
+BARE, DARKEST = 0.93, 0.35
+#: Two cameras see one shadow where the logarithms of these shares differ by less, and half of the light's ways agree: of the other cameras
+#: that see the spot darkened, this share must.
+AGREE, AGREE_SHARE = 0.18, 0.34
+#: A shadow has the floor's color: chroma this near to it, grey levels.
+MOST_CHROMA = 6.0
+#: Places at which people are told from shadows lie this high above the floor at least, metres: lower down the hull holds shadows.
+ABOVE_M = 0.25
+#: Every so many pixels of each row and column tell how bright a whole image is.
+GAIN_STEP = 16
+#: Sides, in cells and in pixels, of what is opened and closed.
+SPOT, SPECK, AROUND = 3, 3, 5
+
+#: Of a pixel that tells nothing of the floor: no image, another color than the floor's.
+_UNKNOWN, _OTHER = np.float32(np.nan), np.float32(9)
+
+
+def cut_floor_shadows(
+    tables: CompletionTables,
+    images: Sequence[np.ndarray | None],
+    models: Sequence[BackgroundModel | None],
+    masks: Sequence[np.ndarray | None],
+) -> tuple[np.ndarray | None, ...]:
+    """Silhouettes without the shadows on the floor.
+
+    Parameters
+    ----------
+    tables : CompletionTables
+        Of the room and the rig.
+    images : sequence of ndarray of uint8, shape (height, width, 3), or None
+        BGR, one a camera.
+    models : sequence of BackgroundModel or None
+        What is known of the empty scene; None of a camera that has other silhouettes.
+    masks : sequence of ndarray of bool, shape (height, width), or None
+
+    Returns
+    -------
+    tuple of ndarray of bool, shape (height, width), or None
+        Each within the mask it came from. With fewer than two cameras that know the empty floor, the masks as they are.
+    """
+    darkness = {
+        c: _darkness(image, model, mask)
+        for c, (image, model, mask) in enumerate(zip(images, models, masks, strict=True))
+        if image is not None and model is not None and mask is not None
+    }
+    if len(darkness) < 2:
+        return tuple(masks)
+    spots = _shadowed(tables, darkness)
+    standing = _standing(tables, masks)
+    cut = list(masks)
+    for c, dark in darkness.items():
+        mask = np.asarray(masks[c])
+        pixels = np.flatnonzero(mask & (standing[c] == 0))
+        of_floor = spots[c].take(tables.pixel_cells[c].ravel().take(pixels))
+        values = dark.ravel().take(pixels)
+        pixels = pixels[of_floor & (values > np.log(DARKEST)) & (values < 0)]
+        if len(pixels):
+            cut[c] = _without(mask, pixels)
+    return tuple(cut)
+
+
+def _darkness(image: np.ndarray, model: BackgroundModel, mask: np.ndarray) -> np.ndarray:
+    """Logarithm of the share of the empty scene's light that each pixel has, float32; `_OTHER` where it has another color as well."""
+    color = cv2.GaussianBlur(cv2.cvtColor(image, cv2.COLOR_BGR2YCrCb), (3, 3), 0).astype(np.float32)
+    share = np.maximum(color[..., 0], 1) / model.mean[..., 0]
+    few = slice(None, None, GAIN_STEP), slice(None, None, GAIN_STEP)
+    beside = share[few][~mask[few]]
+    if beside.size:
+        share /= np.median(beside)  # exposure, flicker
+    lit = np.minimum(share, 1)  # chroma shrinks with the light
+    tint = np.maximum(*(np.abs(color[..., k] - 128 - lit * (model.mean[..., k] - 128)) for k in (1, 2)))
+    dark = np.where(tint < MOST_CHROMA, np.log(share), _OTHER)
+    return dark if model.unseen is None else np.where(model.unseen, _OTHER, dark)
+
+
+def _shadowed(tables: CompletionTables, darkness: dict[int, np.ndarray]) -> dict[int, np.ndarray]:
+    """By camera, the floor's cells that are in a shadow as it sees them; one more, beyond the floor, is not."""
+    seen = np.stack([np.append(dark.ravel(), _UNKNOWN).take(tables.cell_pixels[c]) for c, dark in darkness.items()])
+    bare = ((seen > np.log(BARE)) & (seen < _OTHER)).any(axis=0)
+    dark = (seen <= np.log(BARE)) & (seen >= np.log(DARKEST))
+    square = np.ones((SPOT, SPOT), np.uint8)
+    spots = {}
+    for k, c in enumerate(darkness):
+        others = dark.copy()
+        others[k] = False
+        agree = (others & (np.abs(seen - seen[k]) < AGREE)).sum(axis=0)
+        found = ~bare & dark[k] & (agree >= np.maximum(1, AGREE_SHARE * others.sum(axis=0)))
+        cells = cv2.morphologyEx(found.view(np.uint8).reshape(tables.cells), cv2.MORPH_OPEN, square)
+        cells = cv2.morphologyEx(cells, cv2.MORPH_CLOSE, square)
+        spots[c] = np.append(cells.ravel() > 0, False)
+    return spots
+
+
+def _standing(tables: CompletionTables, masks: Sequence[np.ndarray | None]) -> dict[int, np.ndarray]:
+    """By camera, where it looks at places above the floor at which all cameras see people, 1 or 0."""
+    grid = tables.carving.grid
+    hull = carve(tables.carving, masks)
+    hull[..., : int(np.ceil(ABOVE_M / grid.voxel_size_m))] = False
+    voxels = np.argwhere(hull)
+    points, pixels = grid.centres(voxels), pixels_at(tables.carving, voxels).astype(np.int64)
+    standing = {}
+    for c, mask in enumerate(masks):
+        if mask is not None:
+            image, scale = shown(tables.carving.rig[c], points, pixels[c])
+            side = max(1, int(np.ceil(grid.voxel_size_m * scale)))
+            standing[c] = cv2.dilate(image, np.ones((side, side), np.uint8))
+    return standing
+
+
+def _without(mask: np.ndarray, pixels: np.ndarray) -> np.ndarray:
+    """A mask without some pixels, and without the specks that are left around them."""
+    left = mask.copy()
+    left.ravel()[pixels] = False
+    opened = cv2.morphologyEx(left.view(np.uint8), cv2.MORPH_OPEN, np.ones((SPECK, SPECK), np.uint8))
+    changed = cv2.dilate((mask & ~left).view(np.uint8), np.ones((AROUND, AROUND), np.uint8))
+    return np.where(changed > 0, opened > 0, left)
