@@ -25,7 +25,7 @@ from hmc.voxels.completion import CompletionTables, shown
 __all__ = ["cut_floor_shadows"]
 
 #: Shares of the empty floor's light: from the first on a spot is bare, below the second it is no shadow but something dark.
-BARE, DARKEST = 0.93, 0.35
+BARE, DARKEST = 0.93, 0.5
 #: Two cameras see one shadow where the logarithms of these shares differ by less, and half of the light's ways agree: of the other cameras
 #: that see the spot darkened, this share must.
 AGREE, AGREE_SHARE = 0.18, 0.34

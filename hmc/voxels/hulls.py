@@ -195,8 +195,9 @@ def stream_masks(
                 completed = masks if tables is None or not settings.complete else complete_masks(tables, masks, doubtful)
                 if all(after is before for after, before in zip(completed, masks, strict=True)):
                     doubtful = (None,) * len(masks)
-                if tables is not None and settings.cut_shadows:
-                    completed = cut_floor_shadows(tables, frame.images, models, completed)
+                    if tables is not None and settings.cut_shadows:
+                        # Not of people who look like what is around them: what lies on the floor there may be their shoes.
+                        completed = cut_floor_shadows(tables, frame.images, models, masks)
                 yield MaskStep(frame.index, frame.images, completed, doubtful)
         for c, began in changed.items():
             report(_say_changed(names[c], began, frame.index))
