@@ -1,4 +1,4 @@
-"""In how many silhouettes each landmark shows clear of all else: what tells a measured limb from a guessed one.
+"""What silhouettes bear out of finished poses: which limbs are measured and which are guessed, and how much of them no body covers.
 
 A silhouette says where a forearm is when the forearm stands out of it: not when it lies before the trunk, when another person is
 behind it, or when furniture hides it. Two cameras that show it clear locate it; one says where it is not; without any, it is where
@@ -11,6 +11,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+import cv2
 import numpy as np
 
 from hmc.body.flesh import flesh_points, place_points
@@ -30,14 +31,14 @@ from hmc.voxels.run_options import RunOptions
 if TYPE_CHECKING:
     from hmc.pose.follow import PosedPeople
 
-__all__ = ["clear_views", "with_clear_views"]
+__all__ = ["BorneOut", "clear_views", "with_clear_views"]
 
 #: Flesh of a landmark's limb as near as this to it counts as its own, metres.
 NEAR_M = 0.15
 #: A camera shows a landmark clear when more than this share of its flesh is.
 CLEAR_SHARE = 0.3
-#: A person of whose landmarks more than this share are guesses is told of.
-MANY_GUESSES = 0.05
+#: A person of whose landmarks more than this share are guesses is told of, and silhouettes of which no body covers more than this share.
+MANY_GUESSES, MUCH_UNCOVERED = 0.05, 0.1
 #: Between points of the flesh, and sides of an image's cells at the people's distance, metres.
 SPACING_M, CELL_M = 0.02, 0.03
 
@@ -46,6 +47,23 @@ _N_CHAINS = len(LIMBS) + 1
 _CHAIN = np.zeros(len(LANDMARKS), int)
 for _number, _limb in enumerate(LIMBS.values(), 1):
     _CHAIN[_limb.landmarks] = _number
+
+
+@dataclass(frozen=True)
+class BorneOut:
+    """What the silhouettes of some frames say of the poses in them.
+
+    Parameters
+    ----------
+    views : ndarray of int, shape (n, 15)
+        Cameras that show each landmark clear; a row for every row of the poses, in the order of `hmc.landmarks.LANDMARKS`. 0 where there is
+        no pose or no silhouettes. For trunk and head only other people stand in the way.
+    uncovered : ndarray, shape (n_cameras,)
+        Share of each camera's silhouettes that lies beside all bodies; NaN of a camera that has none.
+    """
+
+    views: np.ndarray
+    uncovered: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -58,8 +76,8 @@ class _Flesh:
     of_landmark: np.ndarray
 
 
-def clear_views(rig: Rig, steps: Iterable[MaskStep], states: PoseStates) -> np.ndarray:
-    """Number of cameras in whose silhouettes each landmark's flesh stands clear of the person's other limbs and of other people.
+def clear_views(rig: Rig, steps: Iterable[MaskStep], states: PoseStates) -> BorneOut:
+    """In how many silhouettes each landmark's flesh stands clear of the person's other limbs and of other people, and what is not covered.
 
     Parameters
     ----------
@@ -71,16 +89,16 @@ def clear_views(rig: Rig, steps: Iterable[MaskStep], states: PoseStates) -> np.n
 
     Returns
     -------
-    ndarray of int, shape (n, 15)
-        A row for every row of `states`, in the order of `hmc.landmarks.LANDMARKS`; 0 where there is no pose or no silhouettes. For trunk
-        and head only other people stand in the way.
+    BorneOut
     """
     bodies = {person: make_body({name: float(value) for name, value in body.items()}) for person, body in states.bodies.items()}
     flesh = {person: _flesh_of(body) for person, body in bodies.items()}
     views = np.zeros((len(states.frames), len(LANDMARKS)), int)
     posed = np.isfinite(states.states).any(axis=1)
+    covered, whole = np.zeros((2, len(rig)))
     for step in steps:
         rows = np.flatnonzero((states.frames == step.index) & posed).tolist()
+        whole += np.array([0 if mask is None else np.count_nonzero(mask) for mask in step.masks])
         if not rows:
             continue
         people = [flesh[int(states.persons[row])] for row in rows]
@@ -89,14 +107,16 @@ def clear_views(rig: Rig, steps: Iterable[MaskStep], states: PoseStates) -> np.n
             # What is not known of a limb is NaN, and so is where its flesh is: it falls on no pixel.
             transforms = segment_transforms(bodies[int(states.persons[row])], states.states[row])
             placed.append(place_points(*transforms, one.points, one.segment))
-        for camera, mask in zip(rig, step.masks, strict=True):
+        for k, (camera, mask) in enumerate(zip(rig, step.masks, strict=True)):
             if mask is not None:
-                views[rows] += _shown_by(camera, mask, people, placed)
-    return views
+                shown, covers = _shown_by(camera, mask, people, placed)
+                views[rows] += shown
+                covered[k] += covers
+    return BorneOut(views, 1 - covered / np.where(whole > 0, whole, np.nan))
 
 
 def with_clear_views(people: PosedPeople, recording: Recording, run: RunOptions) -> PosedPeople:
-    """Poses with `clear_views` beside their landmarks, and a line on every person of whom much is guessed.
+    """Poses with `clear_views` beside their landmarks, and a line on every person of whom much is guessed and on what no body covers.
 
     Parameters
     ----------
@@ -110,8 +130,10 @@ def with_clear_views(people: PosedPeople, recording: Recording, run: RunOptions)
     if steps is None:
         return people
     steps = run.progress(steps, end - first) if run.progress else steps
-    poses = replace(people.poses, views=clear_views(recording.rig, steps, people.states))
-    return replace(people, poses=poses, notes=(*people.notes, *_guess_notes(poses)))
+    found = clear_views(recording.rig, steps, people.states)
+    poses = replace(people.poses, views=found.views)
+    notes = (*people.notes, *_guess_notes(poses), *_uncovered_notes(recording.rig, found.uncovered))
+    return replace(people, poses=poses, notes=notes)
 
 
 def _guess_notes(poses: PoseTable) -> list[str]:
@@ -131,6 +153,15 @@ def _guess_notes(poses: PoseTable) -> list[str]:
     return notes
 
 
+def _uncovered_notes(rig: Rig, uncovered: np.ndarray) -> list[str]:
+    """A line where much of the silhouettes is covered by no body."""
+    told = np.isfinite(uncovered)
+    if not told.any() or np.mean(uncovered[told]) <= MUCH_UNCOVERED:
+        return []
+    shares = ", ".join(f"{camera.name} {share:.0%}" for camera, share in zip(rig, uncovered, strict=True) if np.isfinite(share))
+    return [f"of the silhouettes no body covers {shares}: people who were not found, limbs that are astray, or things taken for people"]
+
+
 def _flesh_of(body: BodyModel) -> _Flesh:
     table = flesh_points(body, SPACING_M)
     skin = table.is_surface
@@ -141,8 +172,8 @@ def _flesh_of(body: BodyModel) -> _Flesh:
     return _Flesh(points, segment, chain, near)
 
 
-def _shown_by(camera: Camera, mask: np.ndarray, people: list[_Flesh], placed: list[np.ndarray]) -> np.ndarray:
-    """Whether a camera shows each person's landmarks clear, bool, shape (n_people, 15)."""
+def _shown_by(camera: Camera, mask: np.ndarray, people: list[_Flesh], placed: list[np.ndarray]) -> tuple[np.ndarray, int]:
+    """Whether a camera shows each person's landmarks clear, bool, shape (n_people, 15); and how many of the mask's pixels bodies cover."""
     points = np.concatenate(placed)
     person = np.repeat(np.arange(len(people)), [len(one) for one in placed])
     chain = np.concatenate([one.chain for one in people])
@@ -157,4 +188,10 @@ def _shown_by(camera: Camera, mask: np.ndarray, people: list[_Flesh], placed: li
     )
     clear = seen & mask[row, column] & np.where(chain > 0, chains_in == 1, people_in == 1)
     shown = [own.of_landmark[clear[person == k]].sum(axis=0) > CLEAR_SHARE * own.of_landmark.sum(axis=0) for k, own in enumerate(people)]
-    return np.array(shown)
+    cells = np.zeros((n_rows, n_columns), np.uint8)
+    cells.ravel()[cell[seen]] = 1
+    # Outlines are a cell thick: flesh is sampled by points, and clothes are wider than it.
+    wide = np.asarray(cv2.dilate(cells, np.ones((3, 3), np.uint8)))
+    height, width = mask.shape
+    bodies = wide.repeat(side, axis=0).repeat(side, axis=1)[:height, :width]
+    return np.array(shown), int(np.count_nonzero(mask & (bodies > 0)))

@@ -1,5 +1,6 @@
 """How many cameras show a landmark clear: of arms held out, before the trunk, behind another person and outside of the silhouette."""
 
+import cv2
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -36,7 +37,7 @@ def seen(cameras, states, masks=None):
     step = MaskStep(0, (None,) * len(cameras), tuple(masks), (None,) * len(cameras))
     people = range(len(states))
     rows = PoseStates(np.zeros(len(states), int), np.array(people), np.array(states), DOF_NAMES, dict.fromkeys(people, BODY.dimensions))
-    return clear_views(Rig(tuple(cameras)), [step], rows)
+    return clear_views(Rig(tuple(cameras)), [step], rows).views
 
 
 def number(views, name, person=0):
@@ -81,6 +82,31 @@ def test_a_limb_that_is_not_known_and_a_person_without_a_pose():
     assert number(views, "l_wrist") == 0 and number(views, "r_wrist") == 1
     nobody = seen([FRONT], [np.full(len(DOF_NAMES), np.nan), posed()])
     assert not nobody[0].any() and np.array_equal(nobody[1], seen([FRONT], [posed()])[0])
+
+
+def test_what_no_body_covers_is_counted():
+    """One of two equal people has a pose: half of the silhouettes is nobody's; of all-black ones nothing is told."""
+    place = posed("down"), posed("down", at=(0.0, 1.2))
+    masks = []
+    for state in place:
+        table = flesh_points(BODY, 0.01)
+        uv = project(FRONT, place_points(*segment_transforms(BODY, state), table.points, table.segment))[0]
+        mask = np.zeros(SIZE[::-1], np.uint8)
+        mask[tuple(np.rint(uv).astype(int)[:, ::-1].T)] = 1
+        masks.append(cv2.morphologyEx(mask, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8)).view(bool))
+    both = masks[0] | masks[1]
+
+    def uncovered(mask, states):
+        rows = PoseStates(
+            np.zeros(len(states), int), np.arange(len(states)), np.array(states), DOF_NAMES, dict.fromkeys((0, 1), BODY.dimensions)
+        )
+        step = MaskStep(0, (None,), (mask,), (None,))
+        return clear_views(Rig((FRONT,)), [step], rows).uncovered[0]
+
+    assert uncovered(both, place) < 0.02
+    assert uncovered(both, place[:1]) == pytest.approx(masks[1].sum() / both.sum(), abs=0.03)
+    assert uncovered(both, [np.full(len(DOF_NAMES), np.nan)]) == 1
+    assert np.isnan(uncovered(~EVERYWHERE, place))
 
 
 def chains_by_loop(camera, states):
