@@ -237,7 +237,7 @@ OWN_REASONS = {
         "docs/accuracy.md has recordings that need it."
     ),
     "repairs": (
-        "Completion is for people of the walls' color, who are in one of the three recordings; there, shadows are not cut, and on a tiled floor "
+        "Completion is for people of the walls' color, who are in one of the three recordings; there shadows are not cut, and on tiles "
         "most are told by a single camera. docs/accuracy.md has seven more recordings."
     ),
 }
