@@ -124,7 +124,7 @@ def test_in_the_house_s_company_every_method_has_the_person(whole, case):
 @each([case for case in CASES if case not in HOUSE and case[0] != "marker-apf"])
 def test_the_papers_methods_are_where_the_person_is(whole, case):
     error = np.linalg.norm(whole(case).poses.positions - true_joints(FRAMES), axis=-1)
-    assert np.nanmax(error[:, landmark_index("pelvis")]) < 0.35
+    assert np.nanmax(error[:, landmark_index("pelvis")]) < 0.45
 
 
 @each(CASES)
