@@ -9,6 +9,8 @@ from hmc.camera.model import Camera, Rig, project
 from hmc.io.calibration import write_calibration
 
 RADIUS_M, HEIGHT_M = 0.24, 1.75
+#: A rectangle on the floor, beside a body at (.3, .1): x and y from, to.
+SHADOW = (-0.9, 0.2), (-0.1, 0.7)
 
 
 def silhouette(camera: Camera, x: float, y: float) -> np.ndarray:
@@ -20,6 +22,16 @@ def silhouette(camera: Camera, x: float, y: float) -> np.ndarray:
     mask = np.zeros(camera.size[::-1], np.uint8)
     cv2.fillConvexPoly(mask, cv2.convexHull(np.rint(uv[valid]).astype(np.int32)), 1)
     return mask.view(bool)
+
+
+def floor_patch(camera: Camera) -> np.ndarray:
+    """A camera's view of the shadow, (h, w) bool."""
+    (x0, y0), (x1, y1) = SHADOW
+    uv, valid = project(camera, np.array([[x0, y0, 0], [x1, y0, 0], [x1, y1, 0], [x0, y1, 0]]))
+    assert valid.all()
+    view = np.zeros(camera.size[::-1], np.uint8)
+    cv2.fillConvexPoly(view, np.rint(uv).astype(np.int32), 1)
+    return view.view(bool)
 
 
 def draw_recording(folder: Path, rig: Rig, frames: list[list[tuple[float, float]]], background: int = 5, silhouettes: bool = False) -> Path:

@@ -102,15 +102,15 @@ def _carved_before(recording, grid, frontend=None, *, first=0, masks=None, **mor
     if recording.path != TINY:
         yield from stream_hulls(recording, grid, frontend, first=first, masks=masks, **more)
         return
-    for step in _carved(recording.rig.names, grid.voxel_size_m):
+    for step in _carved(recording.rig.names, grid.voxel_size_m, frontend):
         if first <= step.index < recording.start + recording.n_frames:
             yield step
 
 
 @cache
-def _carved(cameras: tuple[str, ...], voxel_size_m: float) -> tuple[HullStep, ...]:
+def _carved(cameras: tuple[str, ...], voxel_size_m: float, frontend=None) -> tuple[HullStep, ...]:
     clip = tiny_clip(MOST_FRAMES, cameras)
-    return tuple(stream_hulls(clip, person_grid(clip, voxel_size_m)))
+    return tuple(stream_hulls(clip, person_grid(clip, voxel_size_m), frontend))
 
 
 @cache

@@ -26,8 +26,8 @@ __all__ = ["cut_floor_shadows"]
 
 #: Shares of the empty floor's light: from the first on a spot is bare, below the second it is no shadow but something dark.
 BARE, DARKEST = 0.93, 0.5
-#: Two cameras see one shadow where the logarithms of these shares differ by less, and half of the light's ways agree: of the other cameras
-#: that see the spot darkened, this share must.
+#: Two cameras see one shadow where the logarithms of these shares differ by less; of the other cameras that see the spot darkened, so many
+#: must see the same.
 AGREE, AGREE_SHARE = 0.18, 0.34
 #: A shadow has the floor's color: chroma this near to it, grey levels.
 MOST_CHROMA = 6.0
@@ -72,17 +72,20 @@ def cut_floor_shadows(
     }
     if len(darkness) < 2:
         return tuple(masks)
-    spots = _shadowed(tables, darkness)
-    standing = _standing(tables, masks)
+    spots, dark = _shadowed(tables, darkness), {}
+    for c, values in darkness.items():
+        pixels = np.flatnonzero(np.asarray(masks[c]))
+        pixels = pixels[spots[c].take(tables.pixel_cells[c].ravel().take(pixels))]
+        share = values.ravel().take(pixels)
+        dark[c] = pixels[(share > np.log(DARKEST)) & (share < 0)]
+    if not any(map(len, dark.values())):
+        return tuple(masks)
     cut = list(masks)
-    for c, dark in darkness.items():
-        mask = np.asarray(masks[c])
-        pixels = np.flatnonzero(mask & (standing[c] == 0))
-        of_floor = spots[c].take(tables.pixel_cells[c].ravel().take(pixels))
-        values = dark.ravel().take(pixels)
-        pixels = pixels[of_floor & (values > np.log(DARKEST)) & (values < 0)]
+    standing = _standing(tables, masks)
+    for c, pixels in dark.items():
+        pixels = pixels[standing[c].ravel().take(pixels) == 0]
         if len(pixels):
-            cut[c] = _without(mask, pixels)
+            cut[c] = _without(np.asarray(masks[c]), pixels)
     return tuple(cut)
 
 

@@ -41,7 +41,7 @@ from hmc.pose.method import Capture, begin_tracking
 from hmc.pose.recovery import LossSettings
 from hmc.pose.registry import METHODS
 from hmc.tracking.resumable import person_grid
-from hmc.voxels.hulls import stream_hulls, stream_masks
+from hmc.voxels.hulls import FrontendSettings, stream_hulls, stream_masks
 from hmc.voxels.run_options import RunOptions
 
 APF, CANTON, MARKERS = ("apf", "default"), ("apf", "canton2009"), ("marker-apf", "default")
@@ -122,9 +122,11 @@ def test_in_the_house_s_company_every_method_has_the_person(whole, case):
 
 
 @each([case for case in CASES if case not in HOUSE and case[0] != "marker-apf"])
-def test_the_papers_methods_are_where_the_person_is(whole, case):
-    error = np.linalg.norm(whole(case).poses.positions - true_joints(FRAMES), axis=-1)
-    assert np.nanmax(error[:, landmark_index("pelvis")]) < 0.45
+def test_the_papers_methods_are_where_the_person_is(case):
+    """From silhouettes as the papers have them: no camera tells another's shadows there."""
+    people = followed(case, FRAMES, RunOptions(frontend=FrontendSettings(cut_shadows=False)))
+    error = np.linalg.norm(people.poses.positions - true_joints(FRAMES), axis=-1)
+    assert np.nanmax(error[:, landmark_index("pelvis")]) < 0.35
 
 
 @each(CASES)

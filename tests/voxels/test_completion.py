@@ -1,16 +1,13 @@
 """Silhouettes completed by the other cameras, against bodies whose silhouettes and shadows are drawn exactly."""
 
-import cv2
 import numpy as np
 import pytest
-from drawn import silhouette
+from drawn import SHADOW, floor_patch, silhouette
 
-from hmc.camera.model import project
 from hmc.voxels.carving import carve
 from hmc.voxels.completion import complete_masks, doubtful_hull, floor_shadows, make_completion_tables
 
 ROOM = np.array([[-1.5, -1.5, 0.0], [1.5, 1.5, 2.2]])
-SHADOW = (-0.9, 0.2), (-0.1, 0.7)  # on the floor, beside the body: x and y from, to
 
 
 @pytest.fixture(scope="module")
@@ -21,16 +18,6 @@ def tables(ring):
 @pytest.fixture(scope="module")
 def truth(ring):
     return [silhouette(camera, 0.3, 0.1) for camera in ring]
-
-
-def floor_patch(camera):
-    """A camera's view of the shadow."""
-    (x0, y0), (x1, y1) = SHADOW
-    uv, valid = project(camera, np.array([[x0, y0, 0], [x1, y0, 0], [x1, y1, 0], [x0, y1, 0]]))
-    assert valid.all()
-    view = np.zeros(camera.size[::-1], np.uint8)
-    cv2.fillConvexPoly(view, np.rint(uv).astype(np.int32), 1)
-    return view.view(bool)
 
 
 def lose(mask, where):

@@ -3,15 +3,13 @@
 import cv2
 import numpy as np
 import pytest
-from drawn import silhouette
+from drawn import floor_patch, silhouette
 
-from hmc.camera.model import project
 from hmc.camera.segmentation import train_background
 from hmc.voxels.completion import make_completion_tables
 from hmc.voxels.floor_shadows import cut_floor_shadows
 
 ROOM = np.array([[-1.5, -1.5, 0.0], [1.5, 1.5, 2.2]])
-SHADOW = (-0.9, 0.2), (-0.1, 0.7)  # on the floor, beside the body: x and y from, to
 DARK = 0.6
 
 
@@ -23,16 +21,6 @@ def tables(ring):
 @pytest.fixture(scope="module")
 def people(ring):
     return [silhouette(camera, 0.3, 0.1) for camera in ring]
-
-
-def floor_patch(camera, corners=SHADOW):
-    """A camera's view of a rectangle on the floor."""
-    (x0, y0), (x1, y1) = corners
-    uv, valid = project(camera, np.array([[x0, y0, 0], [x1, y0, 0], [x1, y1, 0], [x0, y1, 0]]))
-    assert valid.all()
-    view = np.zeros(camera.size[::-1], np.uint8)
-    cv2.fillConvexPoly(view, np.rint(uv).astype(np.int32), 1)
-    return view.view(bool)
 
 
 def empty(camera, rng):
