@@ -255,7 +255,8 @@ def evaluate(found: PosedPeople | TrackTable, recording: Recording) -> PoseEvalu
     Returns
     -------
     PoseEvaluation or MotScores
-        Of poses, `summary` has plain numbers by name, such as ``mean_mm`` and ``mmta_at_50mm``.
+        Of poses, `summary` has plain numbers by name, such as ``mean_mm`` and ``mmta_at_50mm``, and `persons` what was compared, for more:
+        ``hmc.metrics.scores.evaluate_offsets(evaluation.persons)`` has the errors without each landmark's constant offset.
 
     Raises
     ------

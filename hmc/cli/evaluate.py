@@ -22,8 +22,8 @@ def add_parser(subparsers) -> None:
         "evaluate",
         help="score a result against the truth",
         description="Score a result against the truth: mean error, deviation, MMTP and MMTA a landmark and overall, MOTP and MOTA of the "
-        "tracks; with --angles the angles of the joints, with --images the landmarks in the images. Prints them and writes metrics.csv, "
-        "angles.csv, images.csv and metrics.toml into DIR.",
+        "tracks; with --angles the angles of the joints, with --offsets the errors without what is constant in them, with --images the "
+        "landmarks in the images. Prints them and writes metrics.csv, angles.csv, offsets.csv, images.csv and metrics.toml into DIR.",
     )
     parser.add_argument("directory", type=Path, metavar="DIR", help="folder of the result, with joints.csv or tracks.csv")
     parser.add_argument("recording", type=Path, nargs="?", metavar="RECORDING", help="folder of the recording, with truth/")
@@ -45,6 +45,11 @@ def add_parser(subparsers) -> None:
         "errors, by Lilliefors and by R^2 (default: 100 50; in images 10 5)",
     )
     parser.add_argument("--angles", action="store_true", help="errors of the joints' angles, read as one reference body, where matched")
+    parser.add_argument(
+        "--offsets",
+        action="store_true",
+        help="errors also without each joint's constant offset along the true trunk, which is how other definitions of joints differ",
+    )
     parser.add_argument("--images", action="store_true", help="errors in the images too, of the true joints projected into all cameras")
     parser.add_argument("--quiet", action="store_true", help="print the overall figures and the notes only")
 
@@ -64,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
     """Score, print, write."""
     from hmc.io.results import PoseTable, read_centroids, read_joints, read_tracks, run_selection
     from hmc.metrics.mot import MotScores
-    from hmc.metrics.scores import PoseEvaluation, angle_rows, evaluate_pose, evaluate_tracks, pelvis_tracks
+    from hmc.metrics.scores import PoseEvaluation, angle_rows, evaluate_offsets, evaluate_pose, evaluate_tracks, pelvis_tracks
     from hmc.metrics.scores.poses import THRESHOLDS_M
 
     if not args.directory.is_dir():
@@ -102,16 +107,26 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"{args.directory}: neither joints.csv nor tracks.csv that the truth could be compared with")
     if args.angles and poses is None and images is None:
         raise InputError(f"{args.directory}: --angles needs joints.csv there, and true joints")
+    if args.offsets and poses is None:
+        raise InputError(f"{args.directory}: --offsets needs joints.csv there, and true joints in metres")
 
     report: dict = {}
+    notes: list[str] = []
     angles: list[dict] = []
     if poses is not None:
         print_pose(poses, args.quiet)
         write_rows(args.directory / "metrics.csv", poses.rows)
         report["pose"] = poses.summary
+        notes += poses.notes
         if args.angles:
             groups = {str(person.person): (person.estimate, person.truth) for person in poses.persons}
             angles = angle_rows("person", groups, poses.thresholds_m[0])
+        if args.offsets:
+            offsets = evaluate_offsets(poses.persons)
+            print_offsets(offsets, args.quiet)
+            write_rows(args.directory / "offsets.csv", offsets.rows)
+            report["offsets"] = offsets.summary
+            notes += offsets.notes
     if images is not None:
         print("in images:")
         print_rows(images.rows, "camera", args.quiet)
@@ -132,7 +147,7 @@ def run(args: argparse.Namespace) -> int:
             f"positives, {tracks.mismatches} mismatches in {tracks.objects} person-frames{tracks_note}"
         )
         report["tracks"] = track_summary(tracks)
-    notes = [*(poses.notes if poses is not None else ()), *made_from(args.directory, args.recording)]
+    notes += made_from(args.directory, args.recording)
     for note in notes:
         print(f"note: {note}")
     report["notes"] = notes
@@ -225,6 +240,20 @@ def print_angles(rows, quiet: bool) -> None:
     whole = [row for row in rows if next(iter(row.values())) == "all" and (not quiet or row["angle"] == "overall")]
     print("angles where both landmarks are matched:")
     print_table([row["angle"] for row in whole], whole, ["mean_deg", "deviation_deg", "compared"])
+
+
+def print_offsets(offsets, quiet: bool) -> None:
+    """The landmarks' constant offsets, the errors with and without them, and how much of the mean they are."""
+    summary = offsets.summary
+    if not summary["frames"]:
+        return  # a note says why
+    print("constant offsets along the true trunk, medians over the same frames:")
+    print_rows(offsets.rows, "person", quiet)
+    if summary["mean_mm"] > 0:
+        print(
+            f"without them: mean {summary['mean_without_mm']:.1f} mm for {summary['mean_mm']:.1f}, "
+            f"{summary['constant_share']:.0%} of the error is constant (in-sample)"
+        )
 
 
 def print_table(labels, rows, columns) -> None:

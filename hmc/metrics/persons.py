@@ -8,7 +8,7 @@ from scipy.optimize import linear_sum_assignment
 from hmc.landmarks import LANDMARKS
 from hmc.metrics.landmarks import landmark_errors
 
-__all__ = ["LIMB_PAIRS", "exchange_sides", "match_persons", "runs", "swapped_frames"]
+__all__ = ["LIMB_PAIRS", "exchange_sides", "frames_in_words", "match_persons", "runs", "swapped_frames"]
 
 #: Farther than this, on the mean over landmarks, an estimate does not stand for a person.
 GATE_M = 1.0
@@ -125,3 +125,10 @@ def runs(frames: np.ndarray) -> list[tuple[int, int]]:
     breaks = np.flatnonzero(np.diff(frames) > 1)
     firsts, lasts = frames[np.r_[0, breaks + 1]] if len(frames) else frames, frames[np.r_[breaks, -1]] if len(frames) else frames
     return list(zip(firsts.tolist(), lasts.tolist(), strict=True))
+
+
+def frames_in_words(frames: np.ndarray, most: int = 6) -> str:
+    """Frame numbers in words: ``frames 3-17, 20 (16 frames)``."""
+    parts = [str(first) if first == last else f"{first}-{last}" for first, last in runs(frames)]
+    shown = ", ".join(parts[:most]) + (", ..." if len(parts) > most else "")
+    return f"frame {shown}" if len(frames) == 1 else f"frames {shown} ({len(frames)} frames)"

@@ -1,7 +1,8 @@
-"""Scores of results against truth, as `hmc evaluate` prints them: poses, tracks, angles, and landmarks in images."""
+"""Scores of results against truth, as `hmc evaluate` prints them: poses, tracks, angles, constant offsets, and landmarks in images."""
 
 from hmc.metrics.scores.angles import angle_rows
 from hmc.metrics.scores.images import evaluate_images, image_landmarks, read_image_landmarks
+from hmc.metrics.scores.offsets import OffsetEvaluation, evaluate_offsets
 from hmc.metrics.scores.poses import (
     PersonErrors,
     PoseEvaluation,
@@ -11,10 +12,12 @@ from hmc.metrics.scores.poses import (
 )
 
 __all__ = [
+    "OffsetEvaluation",
     "PersonErrors",
     "PoseEvaluation",
     "angle_rows",
     "evaluate_images",
+    "evaluate_offsets",
     "evaluate_pose",
     "evaluate_tracks",
     "image_landmarks",

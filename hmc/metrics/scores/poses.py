@@ -13,7 +13,7 @@ from hmc.io.results import PoseTable, TrackTable
 from hmc.landmarks import ENOUGH_VIEWS, LANDMARKS, landmark_index
 from hmc.metrics.landmarks import landmark_errors, score
 from hmc.metrics.mot import MotScores, clear_mot
-from hmc.metrics.persons import LIMB_PAIRS, exchange_sides, match_persons, runs, swapped_frames
+from hmc.metrics.persons import LIMB_PAIRS, exchange_sides, frames_in_words, match_persons, swapped_frames
 from hmc.metrics.threshold import choose_threshold
 
 __all__ = [
@@ -275,27 +275,20 @@ def _notes(persons: Sequence[PersonErrors], frame_means: Mapping[int, np.ndarray
         means = frame_means[person.person]
         missing = person.frames[~np.isfinite(means) & (~np.isnan(person.truth)).any(axis=(1, 2))]
         if len(missing):
-            notes.append(f"person {person.person}: no estimate in {_frames(missing)}")
+            notes.append(f"person {person.person}: no estimate in {frames_in_words(missing)}")
         if len(person.estimated_as) > 1:
             parts = ", ".join(map(str, person.estimated_as))
             notes.append(f"person {person.person}: its track was lost and begun anew; estimated persons {parts} together stand for it")
         lost = np.where(np.isfinite(means), means, 0) > LOST_M
         if lost.any():
-            notes.append(f"person {person.person}: mean error above {LOST_M * 1000:g} mm in {_frames(person.frames[lost])}")
+            notes.append(f"person {person.person}: mean error above {LOST_M * 1000:g} mm in {frames_in_words(person.frames[lost])}")
         for limbs in LIMB_PAIRS:
             swapped, as_is, exchanged = swapped_frames(person.estimate, person.truth, limbs)
             if swapped.sum() >= MIN_SWAPPED_FRAMES:
                 notes.append(
-                    f"person {person.person}: left and right {limbs} seem swapped in {_frames(person.frames[swapped])}: their mean error "
-                    f"there is {_mean_mm(as_is[swapped]):.0f} mm, and {_mean_mm(exchanged[swapped]):.0f} mm with the sides exchanged"
+                    f"person {person.person}: left and right {limbs} seem swapped in {frames_in_words(person.frames[swapped])}: their mean "
+                    f"error there is {_mean_mm(as_is[swapped]):.0f} mm, and {_mean_mm(exchanged[swapped]):.0f} mm with the sides exchanged"
                 )
     for name, count in zip(*np.unique(unmatched, return_counts=True), strict=True):
         notes.append(f"estimated person {name} ({count} frames) matches no true person")
     return notes
-
-
-def _frames(frames: np.ndarray, most: int = 6) -> str:
-    """Frame numbers in words: ``frames 3-17, 20 (16 frames)``."""
-    parts = [str(first) if first == last else f"{first}-{last}" for first, last in runs(frames)]
-    shown = ", ".join(parts[:most]) + (", ..." if len(parts) > most else "")
-    return f"frame {shown}" if len(frames) == 1 else f"frames {shown} ({len(frames)} frames)"
