@@ -22,18 +22,19 @@ __all__ = ["CANTON_LENGTHS", "DEFAULT_LENGTHS", "GIRTHS", "canton_body", "defaul
 #: (limbs; shoulders: half its width of .259, less some 4 cm from the tip of the shoulder to the joint's centre; ankle: .039 and a
 #: sole of 1 cm), and the ranges that rendered and captured people show (trunk, head). The spine is behind: a standing person's
 #: last neck vertebra is behind the hip centres (Mac-Thiong et al. 2010, Spine 35: E1193), while the chest and the skull are over or
-#: before them. From the line of hips and neck the chest's middle is `chest_forward` to the front, the crown `head_forward`.
+#: before them. From the line of hips and neck the chest's middle is `chest_forward` to the front, the crown `head_forward`. The crown is
+#: the skull's; silhouettes have its hair as well (`python -m hmc.experiments run body-bias`).
 DEFAULT_LENGTHS: dict[str, float] = {
     "trunk": 0.318, "head": 0.147, "shoulder_half_width": 0.104, "shoulder_drop": 0.060, "hip_half_width": 0.060,
     "upper_arm": 0.157, "forearm": 0.150, "hand": 0.085, "thigh": 0.245, "shank": 0.250, "ankle_height": 0.046, "foot": 0.105,
-    "chest_forward": 0.010, "head_forward": 0.020,
+    "chest_forward": 0.010, "head_forward": 0.020, "hair": 0.010,
 }  # fmt: skip
 
 #: Table 6.1 of Canton (2009), which gives no widths (hips: ours; shoulders: so that the arms span about the height), no hand or foot.
 CANTON_LENGTHS: dict[str, float] = DEFAULT_LENGTHS | {
     "shoulder_half_width": 0.098,
     "trunk": 0.33, "head": 0.16, "upper_arm": 0.20, "forearm": 0.20, "hand": 0.0, "thigh": 0.26, "shank": 0.25,
-    "ankle_height": 0.0, "foot": 0.0, "chest_forward": 0.0, "head_forward": 0.0,
+    "ankle_height": 0.0, "foot": 0.0, "chest_forward": 0.0, "head_forward": 0.0, "hair": 0.0,
 }  # fmt: skip
 
 #: Factors on the radii of the flesh, one a group of parts.
@@ -60,7 +61,8 @@ def make_body(dimensions: dict[str, float], limits: JointLimits | None = None) -
     Parameters
     ----------
     dimensions : dict
-        ``height`` (metres), the lengths of `DEFAULT_LENGTHS` (metres) and ``girth_<group>`` for each of `GIRTHS` (factors).
+        ``height`` (metres), the lengths of `DEFAULT_LENGTHS` (metres) and ``girth_<group>`` for each of `GIRTHS` (factors). Without hair
+        the flesh ends at the crown, as in results that were made before it was known.
     limits : JointLimits, optional
         `default_limits` unless given.
 
@@ -74,6 +76,7 @@ def make_body(dimensions: dict[str, float], limits: JointLimits | None = None) -
         When a dimension is missing, not finite or negative.
     """
     wanted = ["height", *DEFAULT_LENGTHS, *(f"girth_{group}" for group in GIRTHS)]
+    dimensions = {"hair": 0.0} | dimensions
     for name in wanted:
         value = dimensions.get(name, np.nan)
         if not np.isfinite(value) or value < 0:
@@ -165,7 +168,7 @@ def _flesh(d: dict[str, float]) -> Cones:
     skull = 0.01 * h + 0.6 * ahead
     cone("head", ((nape, 0, -0.02 * h), (0.004 * h + 0.4 * ahead, 0, 0.28 * head)), ((0.034, 0.034), (0.034, 0.040)), y, g)
     cone("head", ((0.006 * h + 0.4 * ahead, 0, 0.22 * head), (skull, 0, 0.65 * head)), ((0.036, 0.046), (0.045, 0.057)), y, g)
-    cone("head", ((skull, 0, 0.65 * head), (skull - 0.002 * h, 0, head)), ((0.045, 0.057), (0.026, 0.032)), y, g)
+    cone("head", ((skull, 0, 0.65 * head), (skull - 0.002 * h, 0, head + d["hair"])), ((0.045, 0.057), (0.026, 0.032)), y, g)
     x, arms = (1, 0, 0), (d["girth_arms"], d["girth_arms"])
     thighs, shanks = (d["girth_thighs"],) * 2, (d["girth_shanks"],) * 2
     for side, sign in (("r", -1.0), ("l", 1.0)):
@@ -178,7 +181,9 @@ def _flesh(d: dict[str, float]) -> Cones:
         calf = (-0.004 * h, 0, -0.4 * shank)
         cone(f"{side}_shank", ((0, 0, 0), calf), ((0.030, 0.032), (0.031, 0.033)), y, shanks)
         cone(f"{side}_shank", (calf, (0, 0, -shank - 0.3 * ankle)), ((0.031, 0.033), (0.020, 0.021)), y, shanks)
-        sole = -shank - ankle + 0.024 * h  # the foot's axis at the heel: flesh reaches to the floor
+        # The foot's axis at the heel. Soles are round and cameras stand higher: the lowest 2 cm of feet are hardly in any hull, and a flesh
+        # that reached to the floor would lift the whole body out of it (`python -m hmc.experiments run body-bias`).
+        sole = -shank - ankle + 0.036 * h
         if foot > 0:
             heel, toe = (-0.032 * h, 0, sole), (-0.032 * h + 1.35 * foot, 0, sole - 0.012 * h)
             cone(f"{side}_shank", (heel, toe), ((0.020, 0.024), (0.028, 0.012)), y, (1.0, 1.0))

@@ -168,16 +168,17 @@ def test_neutral_states():
 
 
 def test_the_body_stands_on_its_soles_with_the_spine_behind():
-    """Flesh ends where the ankle's height says that the floor is; chest and crown lie before the line of hips and neck."""
+    """Flesh ends 2 cm over where the ankle's height says that the floor is, and 2 cm over the crown; chest and crown lie before hips and neck."""
     body = default_body(1.8)
     points = flesh_points(body, 0.01)
     rotations, positions = segment_transforms(body, neutral_state("down")[None])
     placed = np.einsum("nij,nj->ni", rotations[0, points.segment], points.points) + positions[0, points.segment]
     legs = body.dimensions["thigh"] + body.dimensions["shank"] + body.dimensions["ankle_height"]
-    assert placed[:, 2].min() == pytest.approx(-legs, abs=0.012)
+    assert placed[:, 2].min() == pytest.approx(0.012 * 1.8 - legs, abs=0.012)
     marks = landmarks(body, neutral_state("down"))
     crown, neck = marks[LANDMARKS.index("head_top")], marks[LANDMARKS.index("neck")]
     assert crown[0] - neck[0] == pytest.approx(0.020 * 1.8) and neck[0] == pytest.approx(0.0)
+    assert placed[:, 2].max() == pytest.approx(crown[2] + 0.010 * 1.8, abs=0.006)
     skull = placed[placed[:, 2] > crown[2] - 0.06]
     assert skull[:, 0].mean() == pytest.approx(crown[0], abs=0.01)
     chest = placed[(points.part == PARTS.index("torso")) & (np.abs(placed[:, 2] - 0.6 * neck[2]) < 0.03)]
