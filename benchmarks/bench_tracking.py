@@ -155,8 +155,8 @@ def whole_chain(rng: np.random.Generator) -> list[bool]:
         for frame, images in enumerate(frames):
             masks, models = timed("segmentation", segment_views, models, images, settings, pool)
             doubtful = tuple(model.doubtful for model in models)
-            whole = timed("completion", complete_masks, completion, masks, doubtful)
-            if all(after is before for after, before in zip(whole, masks, strict=True)):
+            whole, much = timed("completion", complete_masks, completion, masks, doubtful)
+            if not much:
                 doubtful = (None,) * len(masks)
             strict, tolerant, _ = timed("carving", hulls, whole, doubtful)
             observation = timed("components", observe, grid, tolerant, strict, FrameViews(rig, whole, tuple(images)))

@@ -19,10 +19,10 @@ import cv2
 import numpy as np
 
 from hmc.camera.noise import blur_for, blurred, is_grey, noise_floor
-from hmc.camera.silhouettes import GapRules, cut_halo, evidence, fill_gaps, in_planes
+from hmc.camera.silhouettes import GapRules, cut_halo, evidence, fill_gaps, filled_for_darkness, in_planes
 from hmc.errors import InputError
 
-__all__ = ["BackgroundModel", "SegmentationSettings", "segment", "segment_views", "train_background"]
+__all__ = ["BackgroundModel", "SegmentationSettings", "light_gain", "segment", "segment_views", "train_background"]
 
 #: Gaussians a pixel. OpenCV's five take 100 bytes a pixel and camera; an indoor scene needs no more than three (Stauffer and
 #: Grimson 1999 take three to five).
@@ -100,7 +100,7 @@ class SegmentationSettings:
     variance_threshold: float = 9.0
     shadow_factor: float = 0.6
     gap_threshold: float = 4.0
-    gap_shadow_factor: float = 0.7
+    gap_shadow_factor: float = 0.75
     grey_shadow_factor: float = 0.7
     grey_gap_shadow_factor: float = 0.85
     reach_threshold: float = 5.0
@@ -144,6 +144,9 @@ class BackgroundModel:
     doubtful : ndarray of bool, shape (height, width), or None
         Where the last image is not quite the empty scene: the silhouette, shadows, and near people whatever differs a little. What
         other cameras see decides there (`hmc.voxels.completion`). None before the first image.
+    filled : ndarray of bool, shape (height, width), or None
+        Pixels of the last silhouette that were filled for their darkness alone: what other cameras see of the floor decides there
+        (`hmc.voxels.floor_shadows`). None before the first image.
     unseen : ndarray of bool, shape (height, width), or None
         Where the empty scene was never seen (`hmc.camera.empty_scene`): nothing is learnt there, and what is found there tells nothing.
     blur : int
@@ -160,6 +163,7 @@ class BackgroundModel:
     settling: int = 0
     before: np.ndarray | None = None
     doubtful: np.ndarray | None = None
+    filled: np.ndarray | None = None
     unseen: np.ndarray | None = None
     blur: int = 0
     grey: bool = False
@@ -273,12 +277,13 @@ def segment(
         image, answer, found = _level(model, image, answer, found)
     if cv2.countNonZero(found) > settings.max_foreground * found.size:
         return None, _adapt_to_switch(model, image, settings)
-    mask, doubtful = _complete(found, cv2.threshold(answer, SHADOW - 1, 1, cv2.THRESH_BINARY)[1], image, model, settings)
-    mask = mask.view(bool)
+    mask, filled, doubtful = _complete(found, cv2.threshold(answer, SHADOW - 1, 1, cv2.THRESH_BINARY)[1], image, model, settings)
+    mask, filled = mask.view(bool), filled.view(bool)
     doubtful = np.bitwise_or(doubtful.view(bool), mask, out=doubtful.view(bool))
     if model.unseen is not None:
         doubtful &= ~model.unseen
-    after = replace(model, people=mask, frame=model.frame + 1, settling=max(0, model.settling - 1), doubtful=doubtful)
+    settling = max(0, model.settling - 1)
+    after = replace(model, people=mask, frame=model.frame + 1, settling=settling, doubtful=doubtful, filled=filled)
     if not after.settling and after.before is not None:
         after = replace(after, before=None)
     if after.settling or after.frame % settings.learn_every == 0:
@@ -313,6 +318,27 @@ def segment_views(
     return tuple(mask for mask, _ in results), tuple(model for _, model in results)
 
 
+def light_gain(image: np.ndarray, mean: np.ndarray, people: np.ndarray) -> float:
+    """How bright an image is as a whole, against the empty scene beside people; 1 where nothing tells.
+
+    Parameters
+    ----------
+    image : ndarray of uint8, shape (height, width, 3)
+        BGR.
+    mean : ndarray of float32, shape (height, width, 3)
+        The empty scene (`BackgroundModel.mean`).
+    people : ndarray of bool, shape (height, width)
+
+    Returns
+    -------
+    float
+    """
+    few = slice(None, None, GAIN_STEP), slice(None, None, GAIN_STEP)
+    luma = _luma_chroma(image[few])[..., 0]
+    told: np.ndarray = (luma < OVEREXPOSED) & ~people[few]
+    return float(np.median(luma[told] / mean[few][told, 0])) if told.any() else 1.0
+
+
 def _apply(model: BackgroundModel, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """What the mixture says of an image, and where that is foreground, 1 or 0."""
     answer = model.mixture.apply(image, learningRate=0)
@@ -321,12 +347,7 @@ def _apply(model: BackgroundModel, image: np.ndarray) -> tuple[np.ndarray, np.nd
 
 def _level(model: BackgroundModel, image: np.ndarray, answer: np.ndarray, found: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The image as bright as the background, with the mixture's answer to it, where that accounts for most of the foreground."""
-    few = slice(None, None, GAIN_STEP), slice(None, None, GAIN_STEP)
-    luma = _luma_chroma(image[few])[..., 0]
-    told: np.ndarray = (luma < OVEREXPOSED) & ~model.people[few]
-    if not told.any():
-        return image, answer, found
-    gain = float(np.median(luma[told] / model.mean[few][told, 0]))
+    gain = light_gain(image, model.mean, model.people)
     if 1 / LEAST_GAIN < gain < LEAST_GAIN:
         return image, answer, found
     level = cv2.convertScaleAbs(image, alpha=1 / gain)
@@ -347,15 +368,18 @@ def _nearer(image: np.ndarray, one: np.ndarray, other: np.ndarray) -> bool:
 
 def _complete(
     found: np.ndarray, doubtful: np.ndarray, image: np.ndarray, model: BackgroundModel, settings: SegmentationSettings
-) -> tuple[np.ndarray, np.ndarray]:
-    """Clean and complete what the mixture found, and what it doubts; only the part of the image around the former is looked at."""
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What the mixture found, cleaned and completed, what of that was filled for darkness alone, and what is doubtful.
+
+    Only the part of the image around what was found is looked at.
+    """
     scale = max(image.shape[:2]) / 640
-    mask = np.zeros_like(found)
+    mask, filled = np.zeros_like(found), np.zeros_like(found)
     # Specks are all over the image; a person has some solid part.
     solid = min(SOLID_PX, max(LEAST_SOLID_PX, round(SOLID_PX * scale)))
     left, top, width, height = cv2.boundingRect(cv2.erode(found, np.ones((solid, solid), np.uint8)))
     if width == 0:
-        return mask, mask.copy()
+        return mask, filled, np.zeros_like(found)
     margin = round(MARGIN_PX * scale)
     rows = slice(max(0, top - margin), top + height + margin)
     columns = slice(max(0, left - margin), left + width + margin)
@@ -371,10 +395,11 @@ def _complete(
         least=settings.least_blob_px,
         sure=SURE,
     )
-    part = fill_gaps(seeds, seen, rules, scale * zoom)
-    mask[rows, columns] = _reduced_mask(cut_halo(part, seen, settings.halo_share, scale * zoom), zoom)
+    part = cut_halo(fill_gaps(seeds, seen, rules, scale * zoom), seen, settings.halo_share, scale * zoom)
+    mask[rows, columns] = _reduced_mask(part, zoom)
+    filled[rows, columns] = mask[rows, columns] & _reduced_mask(filled_for_darkness(part, seeds, seen, rules), zoom)
     doubtful[rows, columns] |= _reduced_mask(((seen.chroma2 > DOUBT**2) | (np.abs(seen.luma) > DOUBT)).view(np.uint8), zoom)
-    return mask, cv2.morphologyEx(doubtful, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+    return mask, filled, cv2.morphologyEx(doubtful, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
 
 
 def _enlarged(array: np.ndarray, zoom: int) -> np.ndarray:

@@ -6,6 +6,9 @@ hull. So next to the mixture each pixel has one plain Gaussian in luma and chrom
 already saw something near.
 
 Shadows are told apart as in Canton (2009), section 2.2.3 (Landabaso's rule): the background's color, darkened but not beyond a factor.
+In gaps the factor is lower, as between two parts of a person there is rather dark cloth than shadow; but a shadow under a chair lies between
+legs too. So what was filled for its darkness alone (`filled_for_darkness`) is a silhouette's doubt, which the other cameras settle
+(`hmc.voxels.floor_shadows`).
 """
 
 from __future__ import annotations
@@ -15,7 +18,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-__all__ = ["Evidence", "GapRules", "cut_halo", "evidence", "fill_gaps", "in_planes"]
+__all__ = ["Evidence", "GapRules", "cut_halo", "evidence", "fill_gaps", "filled_for_darkness", "in_planes"]
 
 
 @dataclass(frozen=True)
@@ -135,7 +138,10 @@ def fill_gaps(seeds: np.ndarray, seen: Evidence, rules: GapRules, scale: float) 
     grown = cv2.morphologyEx((reached & outer).view(np.uint8), cv2.MORPH_OPEN, _square(3, scale))
     mask = cv2.bitwise_or(cv2.bitwise_or(seeds, (weak & inner).view(np.uint8)), grown)
     mask = cv2.morphologyEx(mask, cv2.MORPH_OPEN, _square(3, scale))
-    mask = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, _disc(CLOSE_PX, scale))
+    # What is seen between two parts of a person may lie in their shadow: over a wide cut, darkness alone tells nothing.
+    differs = ((seen.chroma2 > CUT_THRESHOLD**2) | (seen.luma > CUT_THRESHOLD)).view(np.uint8)
+    mask |= cv2.morphologyEx(mask, cv2.MORPH_CLOSE, _disc(CLOSE_PX, scale)) & differs
+    mask = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, _disc(SLIT_PX, scale))
     n, labels = cv2.connectedComponents(mask, connectivity=8)
     told = np.flatnonzero(seeds.view(bool))
     if rules.sure > 0:
@@ -146,6 +152,24 @@ def fill_gaps(seeds: np.ndarray, seen: Evidence, rules: GapRules, scale: float) 
         return mask
     kept[0] = 0
     return np.take(kept, np.asarray(labels))
+
+
+def filled_for_darkness(mask: np.ndarray, seeds: np.ndarray, seen: Evidence, rules: GapRules) -> np.ndarray:
+    """Pixels of a filled mask that are no seeds and of which no more is known than that they are darker, as shadows are.
+
+    Parameters
+    ----------
+    mask : ndarray of uint8, shape (height, width)
+        As `fill_gaps` returns it, or a part of that.
+    seeds, seen, rules
+        As for `fill_gaps`.
+
+    Returns
+    -------
+    ndarray of uint8, shape (height, width)
+    """
+    sure = (seen.chroma2 > rules.threshold**2) | (seen.luma > rules.threshold) | (seen.lost > 1 - rules.shadow)
+    return mask & (1 - (sure.view(np.uint8) | seeds))
 
 
 def cut_halo(mask: np.ndarray, seen: Evidence, share: float, scale: float) -> np.ndarray:
@@ -174,10 +198,13 @@ def cut_halo(mask: np.ndarray, seen: Evidence, share: float, scale: float) -> np
     return cv2.bitwise_or(core, cv2.bitwise_and(mask, (seen.contrast > share * person).view(np.uint8)))
 
 
-#: Widths in pixels of a 640 x 480 image: gaps that may be filled on weak evidence, twice the outward reach, cuts closed blindly.
+#: Widths in pixels of a 640 x 480 image: gaps that may be filled on weak evidence, twice the outward reach, cuts closed where color or light
+#: differ by so many standard deviations, and slits closed blindly.
 GAP_PX = 25
 REACH_PX = 41
 CLOSE_PX = 7
+CUT_THRESHOLD = 3.0
+SLIT_PX = 3
 
 
 def _square(width: float, scale: float) -> np.ndarray:

@@ -10,8 +10,10 @@ camera alone the two are the same, to a rig they are not:
 So doubtful pixels become part of the silhouette where they are no shadow on the floor and look at such voxels. A miss on weak evidence
 is thereby no miss, while a camera that surely sees the empty scene, or furniture before the person, carves as ever.
 
-Measured (recipe `pale`, pale clothes before pale walls): overlap with the true silhouettes from .68 to .8, that of the strict hull with
-the true one from .25 to .6. A walker in easy clothes (`demo`) keeps the same masks.
+How much is completed depends on what was lost. Where several cameras lost much, all that the rig agrees upon is added; elsewhere the
+thin rims of a hull of coarse voxels would make people fat, so that only solid pieces are: a thigh, not an outline.
+
+Measured by ``python -m hmc.experiments run repairs``.
 """
 
 from __future__ import annotations
@@ -36,12 +38,12 @@ LEAST_VIEWS, LEAST_MASKS = 3, 4
 CELL_M, AROUND_M = 0.03, 0.5
 #: Widths in cells: holes in shadows that are closed, and the rim added to them.
 SHADOW_CLOSE, SHADOW_RIM = 7, 3
-#: A doubt must lie this deep in the agreed shape's image; doubtful pixels this near to such a one go with it. Metres at the person.
-DEEP_M, NEAR_M = 0.02, 0.08
-#: Masks are completed in frames in which this share of the cameras, and two, lost this share of their silhouettes. One camera's loss the
-#: tolerant hull forgives, and what is added where nothing was lost makes rims fat: without these bounds the first 40 frames of a woman
-#: who sits down (recipe `sit`) went from 83 to 216 mm, as she was taken to face the other way.
-LEAST_LOSS, LEAST_LOSERS = 0.06, 1 / 2
+#: Doubtful pixels this near to one that is agreed upon go with it. Metres at the person.
+NEAR_M = 0.08
+#: Masks are completed where so many cameras lost something, as one camera's loss the tolerant hull forgives; much was lost where so many
+#: lost this share of their silhouettes. Rims that are added where nothing was lost make people fat:
+#: the first 40 frames of a woman who sits down (recipe `sit`) went from 83 to 216 mm, as she was taken to face the other way.
+LEAST_LOSS, LEAST_LOSERS = 0.06, 2
 #: Doubts tell nothing in a camera that doubts so much of the empty scene beside people: its light changed. Of pale clothes (`pale`) 2 % is
 #: doubted there, under a lamp that was dimmed (`close_white`) a quarter to a third, and all of the wall between people became people.
 MOST_DOUBT = 0.1
@@ -49,6 +51,17 @@ MOST_DOUBT = 0.1
 BAND_PX = 128
 #: Rounds: what is completed in one camera lets others complete more.
 ROUNDS = 2
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """What of the doubts is added: how deep they must lie in the agreed shape's image, and half the width they must have, metres there."""
+
+    deep_m: float
+    solid_m: float
+
+
+ANY, SOLID = Pieces(0.02, 0.0), Pieces(0.04, 0.02)
 
 
 @dataclass(frozen=True)
@@ -113,7 +126,7 @@ def make_completion_tables(room: np.ndarray, rig: Rig) -> CompletionTables:
 
 def complete_masks(
     tables: CompletionTables, masks: Sequence[np.ndarray | None], doubtful: Sequence[np.ndarray | None]
-) -> tuple[np.ndarray | None, ...]:
+) -> tuple[tuple[np.ndarray | None, ...], bool]:
     """Silhouettes with those doubtful pixels that the other cameras show to be people.
 
     Parameters
@@ -127,42 +140,45 @@ def complete_masks(
 
     Returns
     -------
-    tuple of ndarray of bool, shape (height, width), or None
-        Each holds the mask it came from, and is that very mask where it lost nothing. With fewer than four masks, or where few
-        lost much, the masks as they are.
+    completed : tuple of ndarray of bool, shape (height, width), or None
+        Each holds the mask it came from, and is that very mask where it lost nothing. With fewer than four masks, and where only one lost
+        anything, the masks as they are.
+    much : bool
+        Whether several cameras lost much: the people look like what is around them.
     """
     given = {c: mask for c, mask in enumerate(masks) if mask is not None}
     if len(given) < LEAST_MASKS or all(doubtful[c] is None for c in given):
-        return tuple(masks)
+        return tuple(masks), False
     shadow = np.append(floor_shadows(tables, masks, doubtful), False)
     possible = {c: _possible(mask, doubtful[c], shadow, tables.pixel_cells[c]) for c, mask in given.items()}
     grid = tables.carving.grid
     # Of a flat array: much quicker than of a volume.
     voxels = np.flatnonzero(carve(tables.carving, [possible.get(c) for c in range(len(masks))]))
-    if not len(voxels):
-        return tuple(masks)
     voxels = np.stack(np.unravel_index(voxels, grid.shape), axis=-1)
     points, pixels = grid.centres(voxels), pixels_at(tables.carving, voxels).astype(np.int64)  # as gathers want them
     before = {c: np.ascontiguousarray(mask).view(np.uint8) for c, mask in given.items()}
-    done, losers = before, set[int]()
-    useless = {c for c in given if doubtful[c] is None}
+    done, much, losers = before, False, set[int]()
+    telling = {c for c in given if doubtful[c] is not None}
     for turn in range(ROUNDS):
         agreed = np.flatnonzero(_votes(done, pixels) >= LEAST_VIEWS)
         if not len(agreed):
             break
-        joined, there = {}, points[agreed]
-        for c in given:
-            image, scale = shown(tables.carving.rig[c], there, pixels[c].take(agreed))
-            if turn == 0 and _doubted_beside(image, scale, done[c], possible[c]) > MOST_DOUBT:
-                useless.add(c)
-            joined[c] = (done[c], 0.0) if c in useless else _join(image, scale, done[c], possible[c], grid.voxel_size_m)
-        losers |= {c for c, (_, lost) in joined.items() if lost > LEAST_LOSS}
-        last, done = done, {c: mask for c, (mask, _) in joined.items()}
+        there = points[agreed]
+        shapes = {c: shown(tables.carving.rig[c], there, pixels[c].take(agreed)) for c in telling}
+        if turn == 0:
+            telling = {c for c in telling if _doubted_beside(*shapes[c], done[c], possible[c]) <= MOST_DOUBT}
+        for pieces in (ANY, SOLID) if turn == 0 else (ANY if much else SOLID,):
+            joined = {c: _join(*shapes[c], done[c], possible[c], grid.voxel_size_m, pieces) for c in telling}
+            if turn == 0 and pieces is ANY and sum(lost > LEAST_LOSS for _, lost in joined.values()) >= LEAST_LOSERS:
+                much = True
+                break
+        losers |= {c for c, (_, lost) in joined.items() if lost > 0}
+        last, done = done, done | {c: mask for c, (mask, _) in joined.items()}
         if all(done[c] is last[c] for c in given):  # another round would find the same
             break
-    if len(losers) < max(2, LEAST_LOSERS * len(given)):
-        return tuple(masks)
-    return tuple(mask if mask is None or done[c] is before[c] else done[c].view(bool) for c, mask in enumerate(masks))
+    if len(losers) < LEAST_LOSERS:
+        return tuple(masks), False
+    return tuple(mask if mask is None or done[c] is before[c] else done[c].view(bool) for c, mask in enumerate(masks)), much
 
 
 def doubtful_hull(
@@ -264,7 +280,9 @@ def _doubted_beside(shape: np.ndarray, scale: float, mask: np.ndarray, possible:
     return cv2.countNonZero(beside & possible[box].view(np.uint8)) / max(1, cv2.countNonZero(beside))
 
 
-def _join(shape: np.ndarray, scale: float, mask: np.ndarray, possible: np.ndarray, voxel_m: float) -> tuple[np.ndarray, float]:
+def _join(
+    shape: np.ndarray, scale: float, mask: np.ndarray, possible: np.ndarray, voxel_m: float, pieces: Pieces
+) -> tuple[np.ndarray, float]:
     """A mask with the possible pixels that lie deep in the agreed voxels' image, and their neighbours; the share of it that they are.
 
     The very mask and 0 where there is nothing to join.
@@ -278,7 +296,8 @@ def _join(shape: np.ndarray, scale: float, mask: np.ndarray, possible: np.ndarra
     old = np.ascontiguousarray(mask[box])
     free = shape & possible[box].view(np.uint8) & (1 - old)
     three = np.ones((3, 3), np.uint8)
-    sure = cv2.morphologyEx(free & cv2.erode(shape, _square(DEEP_M * scale)), cv2.MORPH_OPEN, three)
+    deep = free & cv2.erode(shape, _square(pieces.deep_m * scale))
+    sure = cv2.morphologyEx(deep, cv2.MORPH_OPEN, _square(max(1.0, pieces.solid_m * scale)))
     if not sure.any():
         return mask, 0.0
     grown = cv2.morphologyEx((cv2.dilate(sure, _square(NEAR_M * scale)) & free) | old, cv2.MORPH_OPEN, three) | old

@@ -28,8 +28,8 @@ from hmc.io.masks import MaskStep, Report
 from hmc.io.recording import Frame, Recording, background_frames, iterate_frames
 from hmc.voxels.background_initialisation import UnseenPlaces, learn_from_people, with_unseen_places
 from hmc.voxels.carving import CarvingTables, carve_levels, make_tables
-from hmc.voxels.completion import complete_masks, doubtful_hull, make_completion_tables
-from hmc.voxels.floor_shadows import cut_floor_shadows
+from hmc.voxels.completion import CompletionTables, complete_masks, doubtful_hull, make_completion_tables
+from hmc.voxels.floor_shadows import cut_filled_shadows, cut_floor_shadows
 from hmc.voxels.grid import VoxelGrid
 
 __all__ = ["FrontendSettings", "HullStep", "stream_hulls", "stream_masks"]
@@ -191,14 +191,8 @@ def stream_masks(
             if frame.index >= first:
                 if places is not None:
                     masks = with_unseen_places(places, frame.images, masks, pool)
-                doubtful = tuple(None if model is None else model.doubtful for model in models)
-                completed = masks if tables is None or not settings.complete else complete_masks(tables, masks, doubtful)
-                if all(after is before for after, before in zip(completed, masks, strict=True)):
-                    doubtful = (None,) * len(masks)
-                    if tables is not None and settings.cut_shadows:
-                        # Not of people who look like what is around them: what lies on the floor there may be their shoes.
-                        completed = cut_floor_shadows(tables, frame.images, models, masks)
-                yield MaskStep(frame.index, frame.images, completed, doubtful)
+                masks, doubtful = _settle(tables, frame, models, masks, settings)
+                yield MaskStep(frame.index, frame.images, masks, doubtful)
         for c, began in changed.items():
             report(_say_changed(names[c], began, frame.index))
 
@@ -252,6 +246,22 @@ def _segment(frame: Frame, models: tuple, settings: FrontendSettings, pool: Thre
         masks[c] = mask
     new = dict(zip(ours, after, strict=True))
     return tuple(masks), tuple(new.get(c) for c in range(len(models)))
+
+
+def _settle(tables: CompletionTables | None, frame: Frame, models: tuple, masks: tuple, settings: FrontendSettings) -> tuple[tuple, tuple]:
+    """Silhouettes after the cameras settled one another's doubts, and the doubts of frames in which much is left to doubt."""
+    none, much = (None,) * len(masks), False
+    if tables is None:
+        return masks, none
+    doubtful = tuple(None if model is None else model.doubtful for model in models)
+    if settings.cut_shadows:
+        filled = tuple(None if model is None else model.filled for model in models)
+        masks = cut_filled_shadows(tables, masks, filled, doubtful)
+    if settings.complete:
+        masks, much = complete_masks(tables, masks, doubtful)
+    if much:  # people who look like what is around them: what is dark on the floor there may be their shoes
+        return masks, doubtful
+    return cut_floor_shadows(tables, frame.images, models, masks) if settings.cut_shadows else masks, none
 
 
 def _read_ahead(items: Iterable[T], reader: ThreadPoolExecutor) -> Iterator[T]:

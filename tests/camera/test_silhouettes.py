@@ -6,7 +6,18 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy import ndimage
 
-from hmc.camera.silhouettes import CLOSE_PX, GAP_PX, REACH_PX, Evidence, GapRules, evidence, fill_gaps
+from hmc.camera.silhouettes import (
+    CLOSE_PX,
+    CUT_THRESHOLD,
+    GAP_PX,
+    REACH_PX,
+    SLIT_PX,
+    Evidence,
+    GapRules,
+    evidence,
+    fill_gaps,
+    filled_for_darkness,
+)
 
 RULES = GapRules(threshold=4.0, reach_threshold=5.0, shadow=0.6, gap_shadow=0.7, least=40)
 
@@ -75,11 +86,40 @@ def filled(seeds: np.ndarray, seen: Evidence, scale: float) -> np.ndarray:
         return bright | ((seen.luma < -RULES.threshold) & (seen.lost > 1 - shadow))
 
     three = square(3)
-    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, square(CLOSE_PX).shape).astype(bool)
+
+    def closed(mask, width):
+        disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, square(width).shape).astype(bool)
+        return shrink(grow(mask, disc), disc)
+
     in_gaps = strong(RULES.threshold, RULES.gap_shadow) & shrink(grow(seeds, square(GAP_PX)), square(GAP_PX))
     outwards = strong(RULES.reach_threshold, RULES.shadow) & grow(seeds, square(REACH_PX))
     mask = seeds | in_gaps | grow(shrink(outwards, three), three)
     mask = grow(shrink(mask, three), three)
-    mask = shrink(grow(mask, disc), disc)
+    mask |= closed(mask, CLOSE_PX) & ((seen.chroma2 > CUT_THRESHOLD**2) | (seen.luma > CUT_THRESHOLD))
+    mask = closed(mask, SLIT_PX)
     labels, n = ndimage.label(mask, np.ones((3, 3)))
     return np.isin(labels, [k for k in range(1, n + 1) if (seeds & (labels == k)).sum() >= RULES.least * scale**2])
+
+
+def test_between_two_legs_their_shadow_stays_out_and_dim_cloth_in_a_gap_is_told_as_filled():
+    """Two legs of three pixels' distance; between them a shadow, or the same darkness in another color; and a band across one of them."""
+    shape = (120, 100)
+    seeds: np.ndarray = np.zeros(shape, np.uint8)
+    seeds[10:110, 30:48] = seeds[10:110, 53:71] = 1
+    seeds[50:60, 30:48] = 0
+    luma, chroma2, lost = (np.zeros(shape, np.float32) for _ in range(3))
+    between = np.zeros(shape, bool)
+    between[20:100, 48:53] = True
+    luma[between], lost[between] = -9, 0.15
+    band = np.zeros(shape, bool)
+    band[50:60, 30:48] = True
+    luma[band], lost[band] = -9, 0.35
+    luma[seeds > 0], chroma2[seeds > 0], lost[seeds > 0] = -20, 99, 0.7
+    seen = Evidence(luma, chroma2, lost, np.abs(luma))
+    mask = fill_gaps(seeds, seen, RULES, 1.0)
+    assert mask[between].mean() < 0.1 and mask[band].mean() > 0.95
+    told = filled_for_darkness(mask, seeds, seen, RULES)
+    assert told[band].mean() > 0.95 and not told[~band & ~between].any()
+    chroma2[between] = 12.0  # not enough for a gap, enough for a cut
+    mask = fill_gaps(seeds, seen, RULES, 1.0)
+    assert mask[between].mean() > 0.95
