@@ -6,9 +6,9 @@ hull. So next to the mixture each pixel has one plain Gaussian in luma and chrom
 already saw something near.
 
 Shadows are told apart as in Canton (2009), section 2.2.3 (Landabaso's rule): the background's color, darkened but not beyond a factor.
-In gaps the factor is lower, as between two parts of a person there is rather dark cloth than shadow; but a shadow under a chair lies between
-legs too. So what was filled for its darkness alone (`filled_for_darkness`) is a silhouette's doubt, which the other cameras settle
-(`hmc.voxels.floor_shadows`).
+In gaps the factor is lower, as between two parts of a person there is rather dark cloth than shadow; but a shadow under a chair lies
+between legs too. So what was filled for its darkness alone (`filled_for_darkness`) is a silhouette's doubt, which the other cameras
+settle (`hmc.voxels.floor_shadows`).
 """
 
 from __future__ import annotations
@@ -140,7 +140,8 @@ def fill_gaps(seeds: np.ndarray, seen: Evidence, rules: GapRules, scale: float) 
     mask = cv2.morphologyEx(mask, cv2.MORPH_OPEN, _square(3, scale))
     # What is seen between two parts of a person may lie in their shadow: over a wide cut, darkness alone tells nothing.
     differs = ((seen.chroma2 > CUT_THRESHOLD**2) | (seen.luma > CUT_THRESHOLD)).view(np.uint8)
-    mask |= cv2.morphologyEx(mask, cv2.MORPH_CLOSE, _disc(CLOSE_PX, scale)) & differs
+    cuts = cv2.bitwise_and(cv2.morphologyEx(mask, cv2.MORPH_CLOSE, _disc(CLOSE_PX, scale)), differs)
+    mask = cv2.bitwise_or(mask, cuts)
     mask = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, _disc(SLIT_PX, scale))
     n, labels = cv2.connectedComponents(mask, connectivity=8)
     told = np.flatnonzero(seeds.view(bool))
@@ -198,8 +199,8 @@ def cut_halo(mask: np.ndarray, seen: Evidence, share: float, scale: float) -> np
     return cv2.bitwise_or(core, cv2.bitwise_and(mask, (seen.contrast > share * person).view(np.uint8)))
 
 
-#: Widths in pixels of a 640 x 480 image: gaps that may be filled on weak evidence, twice the outward reach, cuts closed where color or light
-#: differ by so many standard deviations, and slits closed blindly.
+#: Widths in pixels of a 640 x 480 image: gaps that may be filled on weak evidence, twice the outward reach, cuts closed where color or
+#: light differ by so many standard deviations, and slits closed blindly.
 GAP_PX = 25
 REACH_PX = 41
 CLOSE_PX = 7

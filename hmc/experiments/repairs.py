@@ -26,7 +26,20 @@ from hmc.voxels.hulls import FrontendSettings, stream_masks
 
 __all__ = ["EXPERIMENT", "WITHOUT"]
 
-CLIPS = ("close_white", "close_queue", "pale", "crossing", "sit", "close_table", "bystander", "box", "throw_catch", "meeting_moved")
+CLIPS = (
+    "close_white",
+    "close_queue",
+    "pale",
+    "crossing",
+    "sit",
+    "close_table",
+    "bystander",
+    "box",
+    "throw_catch",
+    "meeting_moved",
+    "tan",
+    "slate",
+)
 QUICK_CLIPS = 3
 FRAMES, QUICK_FRAMES = 120, 61
 VOXEL_M = 0.04
