@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hmc.camera.background import stable_background
-from hmc.camera.segmentation import SegmentationSettings, segment, segment_views, train_background
+from hmc.camera.segmentation import SegmentationSettings, light_gain, segment, segment_views, train_background
 from hmc.camera.silhouettes import cut_halo, evidence
 from hmc.errors import InputError
 from hmc.io.recording import background_frames, iterate_frames, open_recording
@@ -84,6 +84,20 @@ def test_a_pale_band_is_filled_in_that_the_mixture_takes_for_shadow():
     assert np.mean(raw[truth]) < 0.88
     assert np.mean(mask[truth]) > 0.97
     assert np.mean(mask & ~truth) < 0.01
+
+
+def test_what_was_filled_for_its_darkness_alone_is_told():
+    """Stripes as above, and dark ones beside them, of which the mixture is sure."""
+    scene = Scene(1, noise=1.0)
+    model = trained(scene)
+    image, _ = scene.person()
+    for top in (90, 105, 120):
+        image[top : top + 7, 142:178] = scene.wall[top : top + 7, 142:178] * 0.66
+    mask, model = segment(model, image)
+    assert model.filled is not None and not (model.filled & ~mask).any()
+    assert np.mean(model.filled[91:96, 145:175]) > 0.95  # but for a rim that the evidence mixes with what is beside it
+    assert not model.filled[100:103, 145:175].any() and not model.filled[150:185].any()
+    assert not segment(model, scene.empty())[1].filled.any()
 
 
 def test_an_empty_scene_has_no_silhouette():
@@ -303,3 +317,14 @@ def test_true_silhouettes_of_rendered_recordings(shared_data, name, camera, leas
             both, either, true = both + np.sum(mask & truth), either + np.sum(mask | truth), true + truth.sum()
     assert both / either > least_overlap
     assert both / true > least_recall
+
+
+def test_the_gain_of_an_image_is_that_of_its_median_beside_people():
+    rng = np.random.default_rng(5)
+    mean = np.full((96, 128, 3), 128, np.float32)
+    mean[..., 0] = rng.uniform(60, 120, mean.shape[:2])
+    people = np.zeros(mean.shape[:2], bool)
+    people[:, 40:90] = True
+    image = np.where(people, 5, 0.8 * mean[..., 0])[..., None].repeat(3, axis=2).astype(np.uint8)
+    assert light_gain(image, mean, people) == pytest.approx(0.8, abs=0.01)
+    assert light_gain(image, mean, ~np.zeros_like(people)) == 1

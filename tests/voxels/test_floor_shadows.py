@@ -7,7 +7,7 @@ from drawn import floor_patch, silhouette
 
 from hmc.camera.segmentation import train_background
 from hmc.voxels.completion import make_completion_tables
-from hmc.voxels.floor_shadows import cut_floor_shadows
+from hmc.voxels.floor_shadows import cut_filled_shadows, cut_floor_shadows
 
 ROOM = np.array([[-1.5, -1.5, 0.0], [1.5, 1.5, 2.2]])
 DARK = 0.6
@@ -81,6 +81,17 @@ def test_what_cameras_see_in_different_darkness_is_no_shadow(tables, scenes, rin
     np.testing.assert_array_equal(cut(tables, scenes, alone, masks)[0] & patches[0], masks[0] & patches[0])  # others see the bare floor
 
 
+def test_a_shadow_that_one_camera_does_not_see_leaves_the_others(tables, scenes, ring, people):
+    """As where something stands before it, or the floor is glossy there."""
+    patches = [floor_patch(camera) for camera in ring]
+    images = filmed(scenes, people, [(patch, 1.0 if k == 0 else DARK) for k, patch in enumerate(patches)])
+    masks = [person | patch for person, patch in zip(people, patches, strict=True)]
+    done = cut(tables, scenes, images, masks)
+    for after, patch, person in list(zip(done, patches, people, strict=True))[1:]:
+        assert (after & patch & ~person).sum() < 0.25 * (patch & ~person).sum()
+        assert (after & person).sum() > 0.97 * person.sum()
+
+
 def test_a_colored_thing_on_the_floor_is_no_shadow(tables, scenes, ring, people):
     patches = [floor_patch(camera) for camera in ring]
     images = filmed(scenes, people, [(np.zeros_like(person), 1.0) for person in people])
@@ -99,3 +110,39 @@ def test_cameras_that_know_no_empty_scene_and_those_without_a_mask_are_left_as_t
     given = cut_floor_shadows(tables, images, [None, *models[1:]], [masks[0], None, *masks[2:]])
     assert given[0] is masks[0] and given[1] is None and given[2].sum() < masks[2].sum()
     assert cut_floor_shadows(tables, images, [None] * 4 + models[4:], masks) == tuple(masks)
+
+
+def bands(people):
+    """Across each person, of four rows: cloth that was filled for its darkness."""
+    middle = [round(float(np.flatnonzero(person.any(axis=1)).mean())) for person in people]
+    return [person & (np.abs(np.arange(len(person)) - row) < 3)[:, None] for person, row in zip(people, middle, strict=True)]
+
+
+def test_what_was_filled_for_its_darkness_leaves_on_a_shadow_and_stays_on_a_person(tables, ring, people):
+    """The shadow lies between two people, whom the lines of sight to it meet in some views."""
+    second = [silhouette(camera, -0.9, 0.3) for camera in ring]
+    shadows = [floor_patch(camera) & ~one & ~other for camera, one, other in zip(ring, people, second, strict=True)]
+    bodies = [one | other for one, other in zip(people, second, strict=True)]
+    masks = [body | shadow for body, shadow in zip(bodies, shadows, strict=True)]
+    filled = [shadow | band for shadow, band in zip(shadows, bands(people), strict=True)]
+    done = cut_filled_shadows(tables, masks, filled, masks)
+    for after, mask, body, shadow in zip(done, masks, bodies, shadows, strict=True):
+        assert not (after & ~mask).any()
+        assert (after & body).sum() > 0.98 * body.sum()
+        assert (after & shadow).sum() < 0.15 * shadow.sum()
+
+
+def test_what_only_one_camera_doubts_was_filled_rightly(tables, ring, people):
+    patches = [floor_patch(camera) & ~person for camera, person in zip(ring, people, strict=True)]
+    masks = [people[0] | patches[0], *people[1:]]
+    done = cut_filled_shadows(tables, masks, [patches[0], *(np.zeros_like(person) for person in people[1:])], masks)
+    np.testing.assert_array_equal(done[0], masks[0])
+
+
+def test_nothing_filled_changes_nothing_and_cameras_without_doubts_are_left(tables, ring, people):
+    none = [np.zeros_like(person) for person in people]
+    assert cut_filled_shadows(tables, people, none, people) == tuple(people)
+    patches = [floor_patch(camera) & ~person for camera, person in zip(ring, people, strict=True)]
+    masks = [person | patch for person, patch in zip(people, patches, strict=True)]
+    done = cut_filled_shadows(tables, [masks[0], None, *masks[2:]], [None, *patches[1:]], [None, *masks[1:]])
+    assert done[0] is masks[0] and done[1] is None and done[2].sum() < masks[2].sum()
