@@ -44,7 +44,7 @@ class MaskStep:
     masks : tuple of ndarray of bool, shape (h, w), or None; one a camera
         None where the camera tells nothing in this frame.
     doubtful : tuple of ndarray of bool, shape (h, w), or None; one a camera
-        Where people may be besides; None in a frame whose silhouettes seem whole, and for silhouettes from disk.
+        Where people may be besides; None in a frame in which little was lost, and for silhouettes from disk.
     """
 
     index: int

@@ -41,8 +41,8 @@ SHADOW_CLOSE, SHADOW_RIM = 7, 3
 #: Doubtful pixels this near to one that is agreed upon go with it. Metres at the person.
 NEAR_M = 0.08
 #: Masks are completed where so many cameras lost something, as one camera's loss the tolerant hull forgives; much was lost where so many
-#: lost this share of their silhouettes. Rims that are added where nothing was lost make people fat:
-#: the first 40 frames of a woman who sits down (recipe `sit`) went from 83 to 216 mm, as she was taken to face the other way.
+#: lost this share of their silhouettes. Rims that are added where nothing was lost make people fat: the first 40 frames of a woman who sits
+#: down (recipe `sit`) went from 83 to 216 mm, as she was taken to face the other way.
 LEAST_LOSS, LEAST_LOSERS = 0.06, 2
 #: Doubts tell nothing in a camera that doubts so much of the empty scene beside people: its light changed. Of pale clothes (`pale`) 2 % is
 #: doubted there, under a lamp that was dimmed (`close_white`) a quarter to a third, and all of the wall between people became people.
@@ -157,7 +157,7 @@ def complete_masks(
     voxels = np.stack(np.unravel_index(voxels, grid.shape), axis=-1)
     points, pixels = grid.centres(voxels), pixels_at(tables.carving, voxels).astype(np.int64)  # as gathers want them
     before = {c: np.ascontiguousarray(mask).view(np.uint8) for c, mask in given.items()}
-    done, much, losers = before, False, set[int]()
+    done, pieces, losers = before, SOLID, set[int]()
     telling = {c for c in given if doubtful[c] is not None}
     for turn in range(ROUNDS):
         agreed = np.flatnonzero(_votes(done, pixels) >= LEAST_VIEWS)
@@ -167,18 +167,17 @@ def complete_masks(
         shapes = {c: shown(tables.carving.rig[c], there, pixels[c].take(agreed)) for c in telling}
         if turn == 0:
             telling = {c for c in telling if _doubted_beside(*shapes[c], done[c], possible[c]) <= MOST_DOUBT}
-        for pieces in (ANY, SOLID) if turn == 0 else (ANY if much else SOLID,):
-            joined = {c: _join(*shapes[c], done[c], possible[c], grid.voxel_size_m, pieces) for c in telling}
-            if turn == 0 and pieces is ANY and sum(lost > LEAST_LOSS for _, lost in joined.values()) >= LEAST_LOSERS:
-                much = True
-                break
-        losers |= {c for c, (_, lost) in joined.items() if lost > 0}
+            lost = [_join(*shapes[c], done[c], possible[c], grid.voxel_size_m, ANY)[1] for c in telling]
+            pieces = ANY if sum(share > LEAST_LOSS for share in lost) >= LEAST_LOSERS else SOLID
+        joined = {c: _join(*shapes[c], done[c], possible[c], grid.voxel_size_m, pieces) for c in telling}
+        losers |= {c for c, (_, share) in joined.items() if share > 0}
         last, done = done, done | {c: mask for c, (mask, _) in joined.items()}
         if all(done[c] is last[c] for c in given):  # another round would find the same
             break
     if len(losers) < LEAST_LOSERS:
         return tuple(masks), False
-    return tuple(mask if mask is None or done[c] is before[c] else done[c].view(bool) for c, mask in enumerate(masks)), much
+    completed = tuple(mask if mask is None or done[c] is before[c] else done[c].view(bool) for c, mask in enumerate(masks))
+    return completed, pieces is ANY
 
 
 def doubtful_hull(
