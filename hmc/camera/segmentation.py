@@ -100,7 +100,7 @@ class SegmentationSettings:
     variance_threshold: float = 9.0
     shadow_factor: float = 0.6
     gap_threshold: float = 4.0
-    gap_shadow_factor: float = 0.75
+    gap_shadow_factor: float = 0.7
     grey_shadow_factor: float = 0.7
     grey_gap_shadow_factor: float = 0.85
     reach_threshold: float = 5.0

@@ -28,7 +28,7 @@ from hmc.camera.model import Camera, Rig, undistort
 from hmc.voxels.carving import CarvingTables, carve, make_tables, pixel_of_voxel, pixels_at
 from hmc.voxels.grid import VoxelGrid
 
-__all__ = ["CompletionTables", "complete_masks", "doubtful_hull", "floor_shadows", "make_completion_tables", "shown"]
+__all__ = ["CompletionTables", "complete_masks", "doubted_floor", "doubtful_hull", "floor_shadows", "make_completion_tables", "shown"]
 
 #: Voxels in which cameras are compared, metres (a forearm is two wide), and the most of them: in a hall they are larger.
 VOXEL_M, MOST_VOXELS = 0.04, 4e6
@@ -211,7 +211,24 @@ def doubtful_hull(
 
 
 def floor_shadows(tables: CompletionTables, masks: Sequence[np.ndarray | None], doubtful: Sequence[np.ndarray | None]) -> np.ndarray:
-    """Shadows on the floor: most cameras that see the spot doubt it, and two at least.
+    """Shadows on the floor with their rims: what most cameras doubt (`doubted_floor`), without its holes, and a little around it.
+
+    Parameters
+    ----------
+    tables, masks, doubtful
+        As for `complete_masks`.
+
+    Returns
+    -------
+    ndarray of bool, shape `tables.cells`
+    """
+    seeds = doubted_floor(tables, masks, doubtful).view(np.uint8)
+    shadow = cv2.morphologyEx(seeds, cv2.MORPH_CLOSE, np.ones((SHADOW_CLOSE,) * 2, np.uint8))
+    return cv2.dilate(shadow, np.ones((SHADOW_RIM,) * 2, np.uint8)).view(bool)
+
+
+def doubted_floor(tables: CompletionTables, masks: Sequence[np.ndarray | None], doubtful: Sequence[np.ndarray | None]) -> np.ndarray:
+    """Spots of the floor that most cameras doubt that see them, and two at least.
 
     Cameras before which a person hides it do not count.
 
@@ -234,9 +251,7 @@ def floor_shadows(tables: CompletionTables, masks: Sequence[np.ndarray | None], 
         told = told.take(pixels)
         doubting += told == 1
         bare += told == 0
-    seeds = ((doubting >= 2) & (doubting > bare)).view(np.uint8).reshape(tables.cells)
-    shadow = cv2.morphologyEx(seeds, cv2.MORPH_CLOSE, np.ones((SHADOW_CLOSE,) * 2, np.uint8))
-    return cv2.dilate(shadow, np.ones((SHADOW_RIM,) * 2, np.uint8)).view(bool)
+    return ((doubting >= 2) & (doubting > bare)).reshape(tables.cells)
 
 
 def _votes(masks: dict[int, np.ndarray], pixels: np.ndarray) -> np.ndarray:

@@ -22,7 +22,7 @@ import numpy as np
 
 from hmc.camera.segmentation import BackgroundModel, light_gain
 from hmc.voxels.carving import carve, pixels_at
-from hmc.voxels.completion import SHADOW_RIM, CompletionTables, floor_shadows, shown
+from hmc.voxels.completion import CompletionTables, doubted_floor, shown
 
 __all__ = ["cut_filled_shadows", "cut_floor_shadows"]
 
@@ -67,7 +67,7 @@ def cut_filled_shadows(
     if not any(mask is not None and fill is not None and fill.any() for mask, fill in zip(masks, filled, strict=True)):
         return tuple(masks)
     sure = [mask if mask is None or fill is None else mask & ~fill for mask, fill in zip(masks, filled, strict=True)]
-    shadow = np.append(floor_shadows(tables, sure, doubtful), False)
+    shadow = np.append(doubted_floor(tables, sure, doubtful), False)
     cut = list(masks)
     for c, (mask, fill) in enumerate(zip(masks, filled, strict=True)):
         if mask is not None and fill is not None:
@@ -152,7 +152,7 @@ def _shadowed(tables: CompletionTables, darkness: dict[int, np.ndarray]) -> dict
         agree = (others & (np.abs(seen - seen[k]) < AGREE)).sum(axis=0)
         found = most & dark[k] & (agree >= np.maximum(1, AGREE_SHARE * others.sum(axis=0)))
         cells = cv2.morphologyEx(found.view(np.uint8).reshape(tables.cells), cv2.MORPH_OPEN, square)
-        cells = cv2.dilate(cv2.morphologyEx(cells, cv2.MORPH_CLOSE, square), np.ones((SHADOW_RIM,) * 2, np.uint8))
+        cells = cv2.morphologyEx(cells, cv2.MORPH_CLOSE, square)
         spots[c] = np.append(cells.ravel() > 0, False)
     return spots
 
