@@ -187,7 +187,8 @@ def pose(
     tracks : TrackTable, optional
         As from `track`; made here where left out.
     method : str or PoseMethod
-        A key of `hmc.METHODS`, or a method, such as ``hmc.pose_method("smd", preset="kehl2006")``.
+        A key of `hmc.METHODS`, or a method, such as ``hmc.pose_method("smd", preset="kehl2006")``, or ``hmc.pose_method("apf", passes=1)``
+        for who cannot wait for the second pass (`hmc.pose.backward`).
     seed : int
         The same seed gives the same result.
     height_m : float or "auto", optional
@@ -217,6 +218,7 @@ def pose(
     >>> list(people.to_frame().columns)
     ['frame', 'person', 'joint', 'x', 'y', 'z', 'views']
     """
+    from hmc.pose.backward import backward
     from hmc.pose.clear_views import with_clear_views
     from hmc.pose.follow import FollowOptions, follow
     from hmc.pose.registry import pose_method
@@ -237,10 +239,14 @@ def pose(
         if tracks is None and method.needs_tracks:
             tracks = _tracked(recording, "sparse", seed, TRACK_VOXEL_M, masks)
         run = RunOptions(masks=masks, key=_KEY, progress=counted)
-        people = follow(recording, tracks, method, FollowOptions(POSE_VOXEL_M, seed, height, detections), run)
+        options = FollowOptions(POSE_VOXEL_M, seed, height, detections)
+        people = follow(recording, tracks, method, options, run)
+        run = replace(run, progress=None)
+        if tracks is not None:
+            people = backward(recording, tracks, method, people, options, run)
         if smooth_s:
             people = smooth_people(people, method.limits, recording.fps, smooth_s)
-        return with_clear_views(people, recording, replace(run, progress=None))
+        return with_clear_views(people, recording, run)
 
 
 def evaluate(found: PosedPeople | TrackTable, recording: Recording) -> PoseEvaluation | MotScores:

@@ -27,6 +27,7 @@ __all__ = ["add_parser", "run"]
 
 #: The journal of a run that is not finished.
 POSE_JOURNAL = ".pose.journal"
+BACK_JOURNAL = ".back.journal"
 #: Time over which poses are smoothed where no other is said, seconds.
 SMOOTH_S = 0.3
 #: Its silhouettes, which the tracker leaves for the poses.
@@ -82,6 +83,13 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
         "single person, else auto",
     )
     parser.add_argument(
+        "--passes",
+        type=int,
+        choices=(1, 2),
+        default=2,
+        help="1: forward in time only; 2 (default): then backward, with each person's own body, where the method has that",
+    )
+    parser.add_argument(
         "--smooth",
         type=positive_float,
         nargs="?",
@@ -99,6 +107,7 @@ def run(args: argparse.Namespace) -> int:
     from hmc.io.files import to_toml
     from hmc.io.fits import write_fits
     from hmc.io.results import write_joints, write_pose, write_run, write_tracks
+    from hmc.pose.backward import backward
     from hmc.pose.clear_views import with_clear_views
     from hmc.pose.follow import FollowOptions, follow
     from hmc.pose.smoothing import smooth_people
@@ -106,7 +115,7 @@ def run(args: argparse.Namespace) -> int:
     from hmc.voxels.run_options import RunOptions
 
     plugins = load_given_plugins(args)
-    method = pose_method(args.method, args.preset, args.model, args.init, args.markers == "skin")
+    method = pose_method(args.method, args.preset, args.model, args.init, args.markers == "skin", args.passes)
     recording = open_selected(args)
     if args.out.is_file():
         raise InputError(f"--out {args.out}: is a file; give a folder")
@@ -123,6 +132,7 @@ def run(args: argparse.Namespace) -> int:
         "window_s": method.window_s,
         "recovery": getattr(method.recover, "settings", None),
         "legs": method.legs,
+        "back": method.back,
         "smooth_s": args.smooth or 0.0,
     } | plugins
     if tracked:
@@ -151,9 +161,12 @@ def run(args: argparse.Namespace) -> int:
 
     tracks = track_recording(recording, args.track_voxel, tracker, args.seed, kept(JOURNAL, "track")) if tracked else None
     detections = None if markers is None else markers.table(args, key, problems)
-    people = follow(recording, tracks, method, FollowOptions(args.voxel, args.seed, height, detections), kept(POSE_JOURNAL, "pose"))
+    options = FollowOptions(args.voxel, args.seed, height, detections)
+    people = follow(recording, tracks, method, options, kept(POSE_JOURNAL, "pose"))
     if markers is not None:
         markers.refuse_nothing(people)
+    if tracks is not None:
+        people = backward(recording, tracks, method, people, options, kept(BACK_JOURNAL, "back"))
     if args.smooth:
         people = smooth_people(people, method.limits, recording.fps, args.smooth)
     if tracked:
@@ -165,7 +178,7 @@ def run(args: argparse.Namespace) -> int:
     if any(people.details):
         write_fits(args.out / "fits.csv", people.frames.tolist(), people.persons.tolist(), people.status, people.details)
     write_run(paths["run.toml"], args.method, parameters, args.seed, **source, problems=gather_problems(problems))
-    for name in (JOURNAL, POSE_JOURNAL, MARKERS_JOURNAL, MASKS):
+    for name in (JOURNAL, POSE_JOURNAL, BACK_JOURNAL, MARKERS_JOURNAL, MASKS):
         for file in args.out.glob(f"{name}*"):
             file.unlink()
     _tell(people, recording, paths["joints.csv"])

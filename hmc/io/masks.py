@@ -18,7 +18,7 @@ from typing import TypeVar
 
 import numpy as np
 
-__all__ = ["MaskStep", "Report", "keep_masks", "kept_masks"]
+__all__ = ["MaskStep", "Report", "keep_masks", "kept_frames", "kept_masks"]
 
 Masks = tuple[np.ndarray | None, ...]
 #: Called with one line for everything that was survived.
@@ -100,7 +100,7 @@ def keep_masks(path: str | Path, key: str, first: int, steps: Iterable[Step], on
 
 
 def kept_masks(path: str | Path, key: str, first: int, last: int) -> Iterator[MaskStep] | None:
-    """The silhouettes of some frames, without their images; None where not all of them were kept.
+    """The silhouettes of consecutive frames, without their images; None where not all of them were kept.
 
     Parameters
     ----------
@@ -114,10 +114,22 @@ def kept_masks(path: str | Path, key: str, first: int, last: int) -> Iterator[Ma
     -------
     iterator of MaskStep, or None
     """
-    places = _places(Path(path), key)
-    if any(index not in places for index in range(first, last)):
+    return kept_frames(path, key, range(first, last))
+
+
+def kept_frames(path: str | Path, key: str, frames: Iterable[int]) -> Iterator[MaskStep] | None:
+    """The silhouettes of some frames in any order, as `kept_masks` gives those of consecutive ones.
+
+    Parameters
+    ----------
+    path, key
+        As for `kept_masks`.
+    frames : iterable of int
+    """
+    places, frames = _places(Path(path), key), list(frames)
+    if any(index not in places for index in frames):
         return None
-    return (_read(Path(path), index, places[index]) for index in range(first, last))
+    return (_read(Path(path), index, places[index]) for index in frames)
 
 
 def _header(key: str) -> bytes:

@@ -275,6 +275,8 @@ class PoseMethod:
         ``alternatives(rng, (tracked, info), view)`` gives the frame's `Alternatives`; None: those of the step, if any.
     legs : LegSettings or None
         How the frames around decide between alternatives (`hmc.pose.legs`); None: the pose stays as the step has it.
+    back : BackwardSettings or None
+        How a second pass goes, backward in time (`hmc.pose.backward`); None: there is none.
     limits : JointLimits
         Of the bodies that the start makes.
     window_s : float
@@ -294,6 +296,7 @@ class PoseMethod:
     recover: Recover | None = None
     alternatives: FindAlternatives | None = None
     legs: Any = None
+    back: Any = None
     limits: JointLimits = field(default_factory=default_limits)
     window_s: float = 1.5
     gate_px: float = 30.0

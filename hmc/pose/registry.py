@@ -73,7 +73,9 @@ class MethodEntry:
     takes: frozenset[str] = frozenset()
 
 
-def pose_method(name: str, preset: str = "default", models: Sequence[str] = (), init: str | None = None, skin: bool = True) -> PoseMethod:
+def pose_method(
+    name: str, preset: str = "default", models: Sequence[str] = (), init: str | None = None, skin: bool = True, passes: int = 2
+) -> PoseMethod:
     """A method by its name.
 
     Parameters
@@ -82,6 +84,8 @@ def pose_method(name: str, preset: str = "default", models: Sequence[str] = (), 
         A key of `METHODS`.
     preset, models, init, skin
         As in `MethodChoice`.
+    passes : {1, 2}
+        1: without the second pass, backward in time, that most methods' `default` has (`hmc.pose.backward`).
 
     Raises
     ------
@@ -106,7 +110,10 @@ def pose_method(name: str, preset: str = "default", models: Sequence[str] = (), 
         raise InputError(f"--init {init}: use one of {', '.join(INITS)}")
     if init is not None and ("init" not in entry.takes or preset in OWN_START):
         raise InputError(f"--init {init}: method {name}{'' if preset == 'default' else f' of preset {preset}'} has a start of its own")
-    return entry.make(MethodChoice(preset, models, cast("Init | None", init), skin))
+    if passes not in (1, 2):
+        raise InputError(f"`passes` must be 1 or 2; got {passes!r}")
+    method = entry.make(MethodChoice(preset, models, cast("Init | None", init), skin))
+    return method if passes == 2 else replace(method, back=None)
 
 
 def register_method(method: PoseMethod, help: str = "") -> None:

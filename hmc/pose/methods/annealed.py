@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 from hmc.body.joints import canton_limits, default_limits
+from hmc.pose.backward import BackwardSettings
 from hmc.pose.legs import LegSettings, TellLegs
 from hmc.pose.method import PoseMethod
 from hmc.pose.recovery import Recovery
@@ -54,6 +55,7 @@ def annealed_method(preset: PosePreset, name: str = "apf") -> PoseMethod:
         recover=Recovery(preset) if refines else None,
         alternatives=TellLegs(preset.polish) if refines else None,
         legs=LegSettings() if refines else None,
+        back=BackwardSettings(preset.polish, preset.fit_body) if refines and preset.limbs is None else None,
         limits=canton_limits() if preset.body == "canton" else default_limits(),
         settings=preset,
     )

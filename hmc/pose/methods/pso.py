@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 
 from hmc.body.spin_skeleton import model_of_body, skeleton_landmarks, thesis_body
+from hmc.pose.backward import BackwardSettings
 from hmc.pose.legs import LegSettings, TellLegs
 from hmc.pose.method import Capture, FrameRng, PoseMethod, StartPose
 from hmc.pose.recovery import Recovery
@@ -122,5 +123,6 @@ def pso_method(preset: SwarmPreset, house: PosePreset | None = None, read: Read 
         recover=Recovery(house),
         alternatives=TellLegs(house.polish),
         legs=LegSettings(),
+        back=BackwardSettings(house.polish),
         settings={"swarm": preset, "house": house},
     )

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
+from hmc.pose.backward import BackwardSettings
 from hmc.pose.legs import LegSettings, TellLegs
 from hmc.pose.method import Capture, FrameRng, PoseMethod, StartPose, make_subject, other_rng
 from hmc.pose.objectives.multicue import CueSettings
@@ -105,5 +106,6 @@ def smd_method(preset: SmdPreset, house: PosePreset | None = None) -> PoseMethod
         recover=Recovery(house),
         alternatives=TellLegs(house.polish),
         legs=LegSettings(),
+        back=BackwardSettings(house.polish),
         settings={"descent": preset, "house": house},
     )

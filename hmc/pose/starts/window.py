@@ -14,14 +14,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hmc.body.exchange import swapped_poses
-from hmc.body.flesh import surface_coordinates
 from hmc.body.kinematics import landmarks
 from hmc.body.limbs import LIMBS
 from hmc.body.model import BodyModel, neutral_state
 from hmc.body.proportions import canton_body, default_body
 from hmc.pose.method import Capture, FrameRng, PoseStep, StartPose, StepInfo, Subject, Tracked, begin_tracking
 from hmc.pose.objectives.objective import Objective, cost_at
-from hmc.pose.starts.fit_body import WORTH_IT, fit_body, with_known_stature
+from hmc.pose.starts.fit_body import with_known_stature
+from hmc.pose.starts.own_body import choose_frames, own_body
 from hmc.pose.starts.spectral import spectral_poses
 from hmc.pose.starts.templates import first_poses
 from hmc.pose.steps.annealed import annealed, annealed_subject
@@ -38,8 +38,6 @@ __all__ = [
     "StartSettings", "WindowStart", "candidates", "estimate_height", "possible_heights", "quick_step", "search_all", "walk", "walk_factor",
 ]  # fmt: skip
 
-#: Fewer frames say too little of a body: what they cannot tell apart, such as fat silhouettes from a tall person, would be fitted.
-LEAST_BODY_FRAMES = 6
 #: Fewer surface voxels are too little of a person to start from.
 LEAST_START_SURFACE = 50
 #: The window's frames are thinned out to about so many a second before body and first pose are decided.
@@ -366,31 +364,17 @@ def walk_factor(headings: np.ndarray, velocities: np.ndarray, settings: StartSet
 def _fit(subject: Subject, window: _Window, path: Sequence[tuple[Tracked, StepInfo]], start: WindowStart, height_known: bool) -> Subject:
     """The subject with a body fitted to some frames of the window, if the others agree."""
     preset, settings = start.preset, start.settings
-    costs = np.array([info.cost for _, info in path])
-    good = np.flatnonzero(np.isfinite(costs)).tolist()
-    if len(good) < LEAST_BODY_FRAMES or preset.fit_body is None:
+    chosen = choose_frames(np.array([info.cost for _, info in path]), settings.body_frames)
+    if preset.fit_body is None:
         return subject
-    # Frames in which the pose is in doubt teach nothing of the body: leave the worst third out.
-    limit = np.quantile(costs[good], 0.67)
-    good = [k for k in good if costs[k] <= limit]
-    held_out, rest = good[1::3], [k for k in good if k not in good[1::3]]
-    picks = sorted({rest[round(q * (len(rest) - 1))] for q in np.linspace(0, 1, settings.body_frames)})
-    held_out = held_out[:: max(1, len(held_out) // 8)]
-    objectives = {k: fine_objective(window.frame_rng(k), subject, window.target(k), preset.polish) for k in {*picks, *held_out}}
-    coordinates = surface_coordinates(subject.body, preset.surface_samples)
-    body, _, _ = fit_body(
-        [objectives[k] for k in picks],
-        np.array([path[k][0].state for k in picks]),
-        coordinates,
+    objectives = {k: fine_objective(window.frame_rng(k), subject, window.target(k), preset.polish) for part in chosen for k in part}
+    return own_body(
+        subject,
+        objectives,
+        {k: path[k][0].state for k in objectives},
+        chosen,
         with_known_stature(preset.fit_body, height_known),
+        preset.polish.refine,
+        preset.surface_samples,
+        lambda body: annealed_subject(body, subject.capture, preset),
     )
-    fitted = annealed_subject(body, subject.capture, preset)
-    before, after = (
-        [
-            refine(replace(objectives[k], body=one.body, points=one.points), path[k][0].state, preset.polish.refine)[1].cost_after
-            for k in held_out
-        ]
-        for one in (subject, fitted)
-    )
-    # Of frames that it was not fitted to.
-    return fitted if np.mean(after) < WORTH_IT * np.mean(before) else subject

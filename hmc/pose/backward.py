@@ -1,0 +1,313 @@
+"""The second pass: backward in time, with each person's own body, over poses that a first pass found.
+
+A filter knows only the frames before: a limb that it loses stays lost until the silhouettes show it again, and the body was fitted to the
+first second and a half. When the recording is over more is known:
+
+1. The person's dimensions are fitted anew, to frames of the whole run (`hmc.pose.starts.own_body`).
+2. Each person is followed from the last frame to the first. Nothing is drawn at random but limbs that are lost: the pose of the frame after
+   and the first pass's are refined side by side, so that a limb that was found again is followed back to where it was lost.
+3. Each frame then has two poses, and with every limb of one on the other more. Which are right is the path of least cost through all of
+   them (Viterbi, 1967): what the silhouettes say of each, and the jump of the limbs' velocities from one frame to the next. Where nothing
+   shows a limb, the way in from before and the way out to after are joined where that takes the least jump.
+
+The first two steps go on where they were when a run was stopped. Ours; the papers follow forward only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from functools import partial
+from itertools import product
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hmc.body.dimensions import FitBodySettings
+from hmc.body.kinematics import landmarks
+from hmc.body.limbs import LIMBS
+from hmc.body.model import BodyModel
+from hmc.body.proportions import make_body
+from hmc.io.journal import append_journal, open_journal
+from hmc.io.masks import kept_frames
+from hmc.io.recording import Recording
+from hmc.io.results import TrackTable
+from hmc.pose.legs import LegSettings, choose_legs, limb_points
+from hmc.pose.method import SURFACE_POINTS, Capture, Subject, make_subject
+from hmc.pose.objectives.symmetric import Symmetric
+from hmc.pose.starts.fit_body import with_known_stature
+from hmc.pose.starts.own_body import choose_frames, own_body
+from hmc.pose.steps.polish import PolishSettings, fine_objective, polish
+from hmc.pose.steps.proposal import shows_enough
+from hmc.pose.steps.refine import refine
+from hmc.pose.views.hull_target import HullTarget
+from hmc.pose.views.person_view import PersonView, views_of
+from hmc.tracking.resumable import person_grid
+from hmc.voxels.hulls import stream_hulls
+from hmc.voxels.run_options import RunOptions
+
+if TYPE_CHECKING:
+    from hmc.pose.follow import FollowOptions, PosedPeople
+    from hmc.pose.method import PoseMethod
+
+__all__ = ["BackwardSettings", "backward", "mixed_poses"]
+
+#: Of the random numbers of a frame: those of the backward pass.
+BACKWARD = 3
+#: Frames between whose poses one path is looked for, and how many before them are known and after them looked at.
+BLOCK, CONTEXT, AHEAD = 600, 30, 60
+#: The angles of each limb, and every way to take limbs, and the rest of the body, from one pose or another.
+_LIMB_DOFS = [np.asarray(limb.dofs) for limb in LIMBS.values()]
+_TAKEN = np.array(list(product((0, 1), repeat=1 + len(_LIMB_DOFS))))
+
+
+@dataclass(frozen=True)
+class BackwardSettings:
+    """What the second pass does.
+
+    Parameters
+    ----------
+    polish : PolishSettings
+        How poses are refined and lost limbs looked for.
+    fit_body : FitBodySettings or None
+        How the body is fitted anew; None: it stays.
+    body_frames : int
+        Frames to which it is fitted, at most.
+    path : LegSettings
+        What a jump of the limbs' velocities costs.
+    """
+
+    polish: PolishSettings
+    fit_body: FitBodySettings | None = field(default_factory=FitBodySettings)
+    body_frames: int = 20
+    path: LegSettings = field(default_factory=lambda: LegSettings(jump_weight=6e-5, arms_too=True))
+
+
+@dataclass(frozen=True)
+class _Person:
+    """What is known of one person: rows of the first pass's tables, and what the backward pass finds in them.
+
+    Parameters
+    ----------
+    rows : ndarray of int, shape (n,)
+        In order of time; only those that were fitted.
+    subject : Subject
+        With the person's own body.
+    row_of : mapping of int to int
+        Frame to its place in `rows`.
+    own, back : ndarray, shape (n, 27)
+        The first pass's poses, refined, and those of the backward one.
+    costs : ndarray, shape (n, 32)
+        Of `mixed_poses` of both; zero where nothing tells them apart.
+    """
+
+    rows: np.ndarray
+    subject: Subject
+    row_of: Mapping[int, int]
+    own: np.ndarray
+    back: np.ndarray
+    costs: np.ndarray
+
+
+def backward(
+    recording: Recording, tracks: TrackTable, method: PoseMethod, people: PosedPeople, options: FollowOptions, run: RunOptions
+) -> PosedPeople:
+    """The poses after a second pass.
+
+    Parameters
+    ----------
+    recording : Recording
+    tracks : TrackTable
+    method : PoseMethod
+        As it is where `PoseMethod.back` is None.
+    people : PosedPeople
+        Of the first pass (`hmc.pose.follow.follow`), all of the recording's selection.
+    options : FollowOptions
+    run : RunOptions
+        With the silhouettes that the first pass kept; its journal is another one than the first pass's.
+
+    Returns
+    -------
+    PosedPeople
+        The same rows. With a note and as they were where the silhouettes were not kept.
+    """
+    settings: BackwardSettings | None = method.back
+    fitted = np.array([status == "fitted" for status in people.status], bool)
+    if settings is None or not fitted.any():
+        return people
+    first, end = int(people.frames[fitted].min()), int(people.frames[fitted].max()) + 1
+    if run.masks is None or kept_frames(run.masks, run.key, range(first, end)) is None:
+        return replace(people, notes=(*people.notes, "silhouettes were not kept on disk: poses are those of one pass, forward in time"))
+    pass_ = _Pass(recording, tracks, settings, options, run, Capture(recording.fps, options.voxel_size_m, recording.room, recording.rig))
+    records = open_journal(run.journal, run.key)
+    if records:
+        bodies = {int(person): make_body(body, method.limits) for person, body in records[0]["bodies"].items()}
+    else:
+        bodies = _bodies(pass_, method, people, fitted)
+        if run.journal is not None:
+            append_journal(run.journal, {"bodies": {person: body.dimensions for person, body in bodies.items()}})
+    persons = {person: _begun(people, fitted, person, make_subject(body, pass_.capture)) for person, body in bodies.items()}
+    for record in records[1:]:
+        for person, own, back, costs in record["rows"]:
+            _put(persons[person], record["frame"], np.array(own), np.array(back), np.array(costs))
+        end = record["frame"]
+    _sweep(pass_, persons, first, end)
+    return _joined(people, persons, recording.fps, settings)
+
+
+@dataclass(frozen=True)
+class _Pass:
+    """What is the same for all people and frames."""
+
+    recording: Recording
+    tracks: TrackTable
+    settings: BackwardSettings
+    options: FollowOptions
+    run: RunOptions
+    capture: Capture
+
+    def views(self, frames: Iterable[int]) -> Iterator[tuple[int, dict[int, PersonView]]]:
+        """What some frames show of all people, in any order."""
+        grid = person_grid(self.recording, self.options.voxel_size_m)
+        masks = kept_frames(self.run.masks or "", self.run.key, frames)
+        for hull in stream_hulls(self.recording, grid, self.run.frontend, masks=masks):
+            yield hull.index, views_of(self.recording, grid, self.tracks, hull)
+
+    def rng(self, person: int, frame: int) -> np.random.Generator:
+        """The random numbers of a person's frame."""
+        return np.random.default_rng([self.options.seed, person, frame, BACKWARD])
+
+
+def _bodies(pass_: _Pass, method: PoseMethod, people: PosedPeople, fitted: np.ndarray) -> dict[int, BodyModel]:
+    """Every person's body, fitted to frames of the whole run where others bear it out."""
+    settings, persons = pass_.settings, {}
+    for number, dimensions in people.states.bodies.items():
+        body = make_body({name: float(value) for name, value in dimensions.items()}, method.limits)
+        persons[number] = _begun(people, fitted, number, make_subject(body, pass_.capture))
+    bodies = {number: person.subject.body for number, person in persons.items()}
+    if settings.fit_body is None:
+        return bodies
+    chosen = {number: choose_frames(people.costs[person.rows], settings.body_frames) for number, person in persons.items()}
+    wanted = {number: {int(people.frames[persons[number].rows[k]]) for part in parts for k in part} for number, parts in chosen.items()}
+    objectives: dict[int, dict[int, Symmetric]] = {number: {} for number in persons}
+    states: dict[int, dict[int, np.ndarray]] = {number: {} for number in persons}
+    for frame, views in pass_.views(sorted(set().union(*wanted.values()))):
+        for number, person in persons.items():
+            target = views[number].target if frame in wanted[number] and number in views else None
+            if target is not None and shows_enough(target):
+                k = person.row_of[frame]
+                objectives[number][k] = fine_objective(pass_.rng(number, frame), person.subject, target, settings.polish)
+                states[number][k] = refine(objectives[number][k], person.own[k], settings.polish.refine)[0]
+    for number, person in persons.items():
+        picks, held_out = ([k for k in part if k in objectives[number]] for part in chosen[number])
+        bodies[number] = own_body(
+            person.subject,
+            objectives[number],
+            states[number],
+            (picks, held_out),
+            with_known_stature(settings.fit_body, pass_.options.height_m is not None),
+            settings.polish.refine,
+            SURFACE_POINTS,
+            partial(make_subject, capture=pass_.capture),
+        ).body
+    return bodies
+
+
+def _begun(people: PosedPeople, fitted: np.ndarray, person: int, subject: Subject) -> _Person:
+    """A person before the sweep: nothing of the backward pass is known."""
+    rows = np.flatnonzero(fitted & (people.persons == person))
+    rows = rows[np.argsort(people.frames[rows])]
+    own = people.states.states[rows].copy()
+    row_of = {int(frame): k for k, frame in enumerate(people.frames[rows])}
+    return _Person(rows, subject, row_of, own, own.copy(), np.zeros((len(rows), len(_TAKEN))))
+
+
+def _put(person: _Person, frame: int, own: np.ndarray, back: np.ndarray, costs: np.ndarray) -> None:
+    k = person.row_of[frame]
+    person.own[k], person.back[k], person.costs[k] = own, back, costs
+
+
+def _sweep(pass_: _Pass, persons: Mapping[int, _Person], first: int, end: int) -> None:
+    """Follow everybody back from before frame `end`; what is found goes into the persons' tables and the journal."""
+    steps = pass_.views(range(end - 1, first - 1, -1))
+    for frame, views in pass_.run.progress(steps, end - first) if pass_.run.progress else steps:
+        rows = []
+        for number, person in persons.items():
+            k = person.row_of.get(frame)
+            view = views.get(number)
+            if k is None or view is None or view.target is None or not shows_enough(view.target):
+                continue
+            after = person.back[k + 1] if k + 1 < len(person.rows) else person.own[k]
+            found = _both(pass_.rng(number, frame), person.subject, person.own[k], after, view.target, pass_.settings.polish)
+            _put(person, frame, *found)
+            rows.append((number, *found))
+        if pass_.run.journal is not None:
+            append_journal(pass_.run.journal, {"frame": frame, "rows": rows})
+
+
+def _both(
+    rng: np.random.Generator, subject: Subject, own: np.ndarray, after: np.ndarray, target: HullTarget, settings: PolishSettings
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A frame's first pose, refined; the better of that and the next frame's, with lost limbs looked for; and what their mixtures cost."""
+    objective = fine_objective(rng, subject, target, settings)
+    refined, _ = refine(objective, own, settings.refine)
+    back, _, _ = polish(rng, objective, [refined, after], after, settings)
+    return refined, back, objective.cost(mixed_poses(refined, back))
+
+
+def mixed_poses(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """One pose, another, and all with some of the limbs, or the rest of the body, taken from the one and some from the other.
+
+    Parameters
+    ----------
+    one, other : ndarray, shape (..., 27)
+
+    Returns
+    -------
+    ndarray, shape (..., 32, 27)
+        The first is `one`, the last `other`.
+    """
+    both = np.stack([one, other], axis=-2)
+    out = both[..., _TAKEN[:, 0], :]
+    for dofs, taken in zip(_LIMB_DOFS, _TAKEN[:, 1:].T, strict=True):
+        out[..., dofs] = both[..., taken, :][..., dofs]
+    return out
+
+
+def _joined(people: PosedPeople, persons: Mapping[int, _Person], fps: float, settings: BackwardSettings) -> PosedPeople:
+    """The tables with everybody's path through the poses of both passes."""
+    positions, states, costs = people.positions.copy(), people.states.states.copy(), people.costs.copy()
+    for person in persons.values():
+        frames, body = people.frames[person.rows], person.subject.body
+        picks = _path(frames, person, fps, settings.path)
+        chosen = np.arange(len(picks)), picks
+        states[person.rows] = mixed_poses(person.own, person.back)[chosen]
+        told = person.costs.any(axis=1)
+        costs[person.rows[told]] = person.costs[chosen][told]
+        positions[person.rows] = landmarks(body, states[person.rows])
+    bodies = {**people.states.bodies, **{number: person.subject.body.dimensions for number, person in persons.items()}}
+    return replace(
+        people,
+        poses=replace(people.poses, positions=positions),
+        states=replace(people.states, states=states, bodies=bodies),
+        costs=costs,
+    )
+
+
+def _path(frames: np.ndarray, person: _Person, fps: float, settings: LegSettings) -> np.ndarray:
+    """Which of the mixtures of every frame are on the least costly path, block by block, so that memory is bounded."""
+    picks = np.zeros(len(frames), int)
+    for start in range(0, len(frames), BLOCK):
+        known, end = max(0, start - CONTEXT), min(len(frames), start + BLOCK + AHEAD)
+        poses, costs = mixed_poses(person.own[known:end], person.back[known:end]), person.costs[known:end].copy()
+        decided = picks[known:start]
+        poses[: len(decided)] = poses[np.arange(len(decided)), decided][:, None]
+        costs[: len(decided)] = 0.0
+        points = _points(person.subject.body, poses, settings)
+        picks[start:end] = choose_legs(frames[known:end], costs, points, fps, settings)[len(decided) :]
+    return picks
+
+
+def _points(body: BodyModel, poses: np.ndarray, settings: LegSettings) -> np.ndarray:
+    flat = limb_points(body, poses.reshape(-1, poses.shape[-1]), settings)
+    return flat.reshape(*poses.shape[:2], *flat.shape[1:])

@@ -1,0 +1,92 @@
+"""A person's own body from some of their frames: which frames teach it, and whether the others bear it out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from hmc.body.dimensions import FitBodySettings
+from hmc.body.flesh import surface_coordinates
+from hmc.body.model import BodyModel
+from hmc.pose.method import Subject
+from hmc.pose.objectives.symmetric import Symmetric, body_points
+from hmc.pose.starts.fit_body import WORTH_IT, fit_body
+from hmc.pose.steps.refine import RefineSettings, refine
+
+__all__ = ["LEAST_BODY_FRAMES", "choose_frames", "own_body"]
+
+#: Fewer frames say too little of a body: what they cannot tell apart, such as fat silhouettes from a tall person, would be fitted.
+LEAST_BODY_FRAMES = 6
+#: Frames that a body is tried on and not fitted to, at most.
+MOST_HELD_OUT = 8
+
+
+def choose_frames(costs: np.ndarray, n: int) -> tuple[list[int], list[int]]:
+    """Frames to which a body is fitted, and others on which it is tried: well spread in time, without the worst third.
+
+    Parameters
+    ----------
+    costs : ndarray, shape (n_frames,)
+        Of the poses, in order of time; NaN where there is none. A frame in which the pose is in doubt teaches nothing of the body.
+    n : int
+        Frames to fit to, at most.
+
+    Returns
+    -------
+    picks, held_out : list of int
+        Places in `costs`; both empty where there are fewer than `LEAST_BODY_FRAMES`.
+    """
+    good = np.flatnonzero(np.isfinite(costs)).tolist()
+    if len(good) < LEAST_BODY_FRAMES:
+        return [], []
+    limit = np.quantile(costs[good], 0.67)
+    good = [k for k in good if costs[k] <= limit]
+    held_out, rest = good[1::3], [k for k in good if k not in set(good[1::3])]
+    picks = sorted({rest[round(q * (len(rest) - 1))] for q in np.linspace(0, 1, n)})
+    return picks, held_out[:: max(1, len(held_out) // MOST_HELD_OUT)]
+
+
+def own_body(
+    subject: Subject,
+    objectives: Mapping[int, Symmetric],
+    states: Mapping[int, np.ndarray],
+    chosen: tuple[list[int], list[int]],
+    settings: FitBodySettings,
+    refinement: RefineSettings,
+    surface_samples: int,
+    equip: Callable[[BodyModel], Subject],
+) -> Subject:
+    """The subject with a body fitted to some frames, if others agree.
+
+    Parameters
+    ----------
+    subject : Subject
+        From whose body the fit starts, and to which a prior holds it.
+    objectives : mapping of int to Symmetric
+        Of the frames, with the subject's body.
+    states : mapping of int to ndarray of shape (27,)
+        The poses in them.
+    chosen : (list of int, list of int)
+        As from `choose_frames`.
+    settings : FitBodySettings
+    refinement : RefineSettings
+        With which both bodies are tried on the frames that were held out.
+    surface_samples : int
+        Points of the body's surface.
+    equip : callable
+        A body to its subject.
+    """
+    picks, held_out = chosen
+    if not picks or not held_out:
+        return subject
+    coordinates = surface_coordinates(subject.body, surface_samples)
+    body, _, _ = fit_body([objectives[k] for k in picks], np.array([states[k] for k in picks]), coordinates, settings)
+    fitted, points = equip(body), body_points(body, coordinates)
+    before, after = (
+        [refine(replace(objectives[k], body=body, points=points), states[k], refinement)[1].cost_after for k in held_out]
+        for body, points in ((subject.body, subject.points), (fitted.body, points))
+    )
+    # Of frames that it was not fitted to.
+    return fitted if np.mean(after) < WORTH_IT * np.mean(before) else subject
