@@ -1,0 +1,142 @@
+"""The second pass: what it mends, what it leaves, and that it goes on where it was stopped."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hmc.body.joints import N_DOF
+from hmc.body.kinematics import landmarks
+from hmc.body.limbs import LIMBS
+from hmc.body.proportions import make_body
+from hmc.errors import InputError
+from hmc.landmarks import LANDMARKS
+from hmc.pose import backward as module
+from hmc.pose.backward import backward, mixed_poses
+from hmc.pose.follow import FollowOptions
+from hmc.pose.registry import pose_method
+from hmc.pose.starts.own_body import LEAST_BODY_FRAMES, choose_frames
+from hmc.voxels.run_options import RunOptions
+from tests.methods import HEIGHT_M, VOXEL_M, followed, tiny_clip, true_joints, true_tracks
+
+FRAMES = 10
+LOST = slice(3, 7)
+WRIST = LANDMARKS.index("l_wrist")
+
+
+@pytest.fixture(scope="module")
+def one_pass(tmp_path_factory):
+    """The clip's person after one pass, and the run that kept the silhouettes."""
+    run = RunOptions(masks=tmp_path_factory.mktemp("kept") / "masks", key="clip")
+    return followed(("apf", "default"), FRAMES, run), run
+
+
+def with_a_lost_arm(people):
+    """The same poses, but for an arm that is held up in some frames."""
+    states = people.states.states.copy()
+    states[LOST, LIMBS["l_arm"].dofs] = [0.9, 0.3, -0.2, -0.1]
+    (body,) = (make_body({name: float(value) for name, value in one.items()}) for one in people.states.bodies.values())
+    poses = replace(people.poses, positions=landmarks(body, states))
+    return replace(people, poses=poses, states=replace(people.states, states=states))
+
+
+def second(people, run, method=None):
+    method = method or pose_method("apf")
+    options = FollowOptions(VOXEL_M, 3, HEIGHT_M)
+    return backward(tiny_clip(FRAMES), true_tracks(FRAMES), method, people, options, run)
+
+
+def errors(people):
+    return np.linalg.norm(people.positions - true_joints(FRAMES), axis=2)
+
+
+def test_a_lost_arm_is_taken_up_from_the_frames_after(one_pass):
+    people, run = one_pass
+    lost = with_a_lost_arm(people)
+    found = second(lost, run)
+    assert errors(lost)[LOST, WRIST].min() > 0.2
+    assert errors(found)[LOST, WRIST].max() < 0.06
+    assert np.median(errors(found)) < 1.1 * np.median(errors(people))
+    assert found.status == people.status and np.isfinite(found.costs).all()
+
+
+def test_it_finds_nothing_where_the_silhouettes_show_nothing(one_pass, tmp_path):
+    """On garbage, silhouettes of another place in the room, poses stay as bad as they are."""
+    people, run = one_pass
+    lost = with_a_lost_arm(people)
+    nobody = replace(true_tracks(FRAMES), positions=true_tracks(FRAMES).positions + [50.0, 0, 0])
+    found = backward(tiny_clip(FRAMES), nobody, pose_method("apf"), lost, FollowOptions(VOXEL_M, 3, HEIGHT_M), run)
+    np.testing.assert_allclose(found.positions, lost.positions, atol=1e-9)
+
+
+def test_a_stopped_pass_goes_on_to_the_same_numbers(one_pass, tmp_path):
+    people, run = one_pass
+    run = replace(run, journal=tmp_path / "journal")
+    whole = second(people, run)
+    lines = (tmp_path / "journal").read_text().splitlines(keepends=True)
+    for kept in (1, 2, 5, len(lines)):
+        (tmp_path / "journal").write_text("".join(lines[:kept]) + lines[-1][:10])
+        again = second(people, run)
+        np.testing.assert_array_equal(again.states.states, whole.states.states)
+        np.testing.assert_array_equal(again.positions, whole.positions)
+        assert again.states.bodies == whole.states.bodies
+
+
+def test_without_silhouettes_on_disk_the_poses_stay_and_a_note_says_so(one_pass):
+    people, run = one_pass
+    for without in (replace(run, masks=None), replace(run, key="another")):
+        found = second(people, without)
+        assert found.poses is people.poses and "one pass" in found.notes[-1]
+    assert second(people, run, pose_method("apf", passes=1)) is people
+
+
+def test_long_runs_are_joined_block_by_block(one_pass, monkeypatch):
+    people, run = one_pass
+    lost = with_a_lost_arm(people)
+    whole = second(lost, run)
+    monkeypatch.setattr(module, "BLOCK", 4)
+    monkeypatch.setattr(module, "CONTEXT", 3)
+    monkeypatch.setattr(module, "AHEAD", 3)
+    np.testing.assert_allclose(second(lost, run).positions, whole.positions, atol=0.03)
+
+
+def test_mixtures_take_each_limb_from_one_pose_or_the_other():
+    rng = np.random.default_rng(0)
+    one, other = rng.normal(size=(2, N_DOF))
+    mixed = mixed_poses(one, other)
+    limbs = [set(np.asarray(limb.dofs).tolist()) for limb in LIMBS.values()]
+    rest = set(range(N_DOF)) - set().union(*limbs)
+    expected = set()
+    for number in range(2 ** (1 + len(limbs))):
+        pose = np.empty(N_DOF)
+        for bit, part in enumerate([rest, *limbs]):
+            for dof in part:
+                pose[dof] = other[dof] if number >> bit & 1 else one[dof]
+        expected.add(pose.tobytes())
+    assert {pose.tobytes() for pose in mixed} == expected
+    np.testing.assert_array_equal(mixed[0], one)
+    np.testing.assert_array_equal(mixed[-1], other)
+
+
+@given(st.lists(st.one_of(st.floats(1e-6, 1e-2), st.just(float("nan"))), max_size=80), st.integers(1, 30))
+@settings(max_examples=60, deadline=None)
+def test_a_body_is_tried_on_frames_that_it_was_not_fitted_to(costs, n):
+    costs = np.array(costs, float)
+    picks, held_out = choose_frames(costs, n)
+    good = np.flatnonzero(np.isfinite(costs))
+    if len(good) < LEAST_BODY_FRAMES:
+        assert picks == held_out == []
+        return
+    assert not set(picks) & set(held_out) and picks == sorted(picks) and 1 <= len(picks) <= n and held_out
+    worst = np.sort(costs[good])[int(np.ceil(0.67 * len(good))) :]
+    assert max(costs[[*picks, *held_out]]) <= worst.min() if len(worst) else True
+
+
+def test_other_numbers_of_passes_are_refused():
+    with pytest.raises(InputError, match="1 or 2"):
+        pose_method("apf", passes=3)
+    assert pose_method("apf").back is not None and pose_method("apf", "canton2009").back is None
