@@ -6,9 +6,8 @@ first second and a half. When the recording is over more is known:
 1. The person's dimensions are fitted anew, to frames of the whole run (`hmc.pose.starts.own_body`).
 2. Each person is followed from the last frame to the first. Nothing is drawn at random but limbs that are lost: the pose of the frame after
    and the first pass's are refined side by side, so that a limb that was found again is followed back to where it was lost.
-3. Each frame then has two poses, and with every limb of one on the other more. Which are right is the path of least cost through all of
-   them (Viterbi, 1967): what the silhouettes say of each, and the jump of the limbs' velocities from one frame to the next. Where nothing
-   shows a limb, the way in from before and the way out to after are joined where that takes the least jump.
+3. Each frame then has two poses, and more with limbs of one on the other; the best way through all of them is taken
+   (`hmc.pose.mixtures`). Where nothing shows a limb, the way in from before and the way out to after are joined where they meet best.
 
 The first two steps go on where they were when a run was stopped. Ours; the papers follow forward only.
 """
@@ -16,24 +15,21 @@ The first two steps go on where they were when a run was stopped. Ours; the pape
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
-from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hmc.body.dimensions import FitBodySettings
 from hmc.body.kinematics import landmarks
-from hmc.body.limbs import LIMBS
 from hmc.body.model import BodyModel
 from hmc.body.proportions import make_body
 from hmc.io.journal import append_journal, open_journal
 from hmc.io.masks import kept_frames
 from hmc.io.recording import Recording
 from hmc.io.results import TrackTable
-from hmc.pose.legs import LegSettings, choose_legs, limb_points
-from hmc.pose.method import SURFACE_POINTS, Capture, Subject, make_subject
+from hmc.pose.follow import FollowOptions, PosedPeople
+from hmc.pose.method import SURFACE_POINTS, Capture, PoseMethod, Subject, make_subject
+from hmc.pose.mixtures import N_MIXTURES, BackwardSettings, choose_path, mixed_poses
 from hmc.pose.objectives.symmetric import Symmetric
 from hmc.pose.starts.fit_body import with_known_stature
 from hmc.pose.starts.own_body import choose_frames, own_body
@@ -46,41 +42,10 @@ from hmc.tracking.resumable import person_grid
 from hmc.voxels.hulls import stream_hulls
 from hmc.voxels.run_options import RunOptions
 
-if TYPE_CHECKING:
-    from hmc.pose.follow import FollowOptions, PosedPeople
-    from hmc.pose.method import PoseMethod
-
-__all__ = ["BackwardSettings", "backward", "mixed_poses"]
+__all__ = ["backward"]
 
 #: Of the random numbers of a frame: those of the backward pass.
 BACKWARD = 3
-#: Frames between whose poses one path is looked for, and how many before them are known and after them looked at.
-BLOCK, CONTEXT, AHEAD = 600, 30, 60
-#: The angles of each limb, and every way to take limbs, and the rest of the body, from one pose or another.
-_LIMB_DOFS = [np.asarray(limb.dofs) for limb in LIMBS.values()]
-_TAKEN = np.array(list(product((0, 1), repeat=1 + len(_LIMB_DOFS))))
-
-
-@dataclass(frozen=True)
-class BackwardSettings:
-    """What the second pass does.
-
-    Parameters
-    ----------
-    polish : PolishSettings
-        How poses are refined and lost limbs looked for.
-    fit_body : FitBodySettings or None
-        How the body is fitted anew; None: it stays.
-    body_frames : int
-        Frames to which it is fitted, at most.
-    path : LegSettings
-        What a jump of the limbs' velocities costs.
-    """
-
-    polish: PolishSettings
-    fit_body: FitBodySettings | None = field(default_factory=FitBodySettings)
-    body_frames: int = 20
-    path: LegSettings = field(default_factory=lambda: LegSettings(jump_weight=6e-5, arms_too=True))
 
 
 @dataclass(frozen=True)
@@ -219,7 +184,7 @@ def _begun(people: PosedPeople, fitted: np.ndarray, person: int, subject: Subjec
     rows = rows[np.argsort(people.frames[rows])]
     own = people.states.states[rows].copy()
     row_of = {int(frame): k for k, frame in enumerate(people.frames[rows])}
-    return _Person(rows, subject, row_of, own, own.copy(), np.zeros((len(rows), len(_TAKEN))))
+    return _Person(rows, subject, row_of, own, own.copy(), np.zeros((len(rows), N_MIXTURES)))
 
 
 def _put(person: _Person, frame: int, own: np.ndarray, back: np.ndarray, costs: np.ndarray) -> None:
@@ -255,31 +220,12 @@ def _both(
     return refined, back, objective.cost(mixed_poses(refined, back))
 
 
-def mixed_poses(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """One pose, another, and all with some of the limbs, or the rest of the body, taken from the one and some from the other.
-
-    Parameters
-    ----------
-    one, other : ndarray, shape (..., 27)
-
-    Returns
-    -------
-    ndarray, shape (..., 32, 27)
-        The first is `one`, the last `other`.
-    """
-    both = np.stack([one, other], axis=-2)
-    out = both[..., _TAKEN[:, 0], :]
-    for dofs, taken in zip(_LIMB_DOFS, _TAKEN[:, 1:].T, strict=True):
-        out[..., dofs] = both[..., taken, :][..., dofs]
-    return out
-
-
 def _joined(people: PosedPeople, persons: Mapping[int, _Person], fps: float, settings: BackwardSettings) -> PosedPeople:
     """The tables with everybody's path through the poses of both passes."""
     positions, states, costs = people.positions.copy(), people.states.states.copy(), people.costs.copy()
     for person in persons.values():
         frames, body = people.frames[person.rows], person.subject.body
-        picks = _path(frames, person, fps, settings.path)
+        picks = choose_path(body, frames, person.own, person.back, person.costs, fps, settings.path)
         chosen = np.arange(len(picks)), picks
         states[person.rows] = mixed_poses(person.own, person.back)[chosen]
         told = person.costs.any(axis=1)
@@ -292,22 +238,3 @@ def _joined(people: PosedPeople, persons: Mapping[int, _Person], fps: float, set
         states=replace(people.states, states=states, bodies=bodies),
         costs=costs,
     )
-
-
-def _path(frames: np.ndarray, person: _Person, fps: float, settings: LegSettings) -> np.ndarray:
-    """Which of the mixtures of every frame are on the least costly path, block by block, so that memory is bounded."""
-    picks = np.zeros(len(frames), int)
-    for start in range(0, len(frames), BLOCK):
-        known, end = max(0, start - CONTEXT), min(len(frames), start + BLOCK + AHEAD)
-        poses, costs = mixed_poses(person.own[known:end], person.back[known:end]), person.costs[known:end].copy()
-        decided = picks[known:start]
-        poses[: len(decided)] = poses[np.arange(len(decided)), decided][:, None]
-        costs[: len(decided)] = 0.0
-        points = _points(person.subject.body, poses, settings)
-        picks[start:end] = choose_legs(frames[known:end], costs, points, fps, settings)[len(decided) :]
-    return picks
-
-
-def _points(body: BodyModel, poses: np.ndarray, settings: LegSettings) -> np.ndarray:
-    flat = limb_points(body, poses.reshape(-1, poses.shape[-1]), settings)
-    return flat.reshape(*poses.shape[:2], *flat.shape[1:])

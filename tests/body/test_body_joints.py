@@ -168,7 +168,7 @@ def test_neutral_states():
 
 
 def test_the_body_stands_on_its_soles_with_the_spine_behind():
-    """Flesh ends 2 cm over where the ankle's height says that the floor is, and 2 cm over the crown; chest and crown lie before hips and neck."""
+    """Flesh ends 2 cm over the floor that the ankle's height tells, and 2 cm over the crown; chest and crown lie before hips and neck."""
     body = default_body(1.8)
     points = flesh_points(body, 0.01)
     rotations, positions = segment_transforms(body, neutral_state("down")[None])

@@ -28,9 +28,10 @@ METHOD = OBJECTIVES | {"pose.method"}
 STEPS = METHOD | {"pose.steps"}
 STARTS = STEPS | {"pose.starts"}
 PERSON = STARTS | {"pose.legs", "pose.person"}
+MIXTURES = STEPS | {"pose.legs", "pose.mixtures"}
 FOLLOWING = PERSON | {"pose.records", "pose.follow"}
-METHODS = STARTS | {"pose.legs", "pose.recovery", "pose.methods"}
-POSE = METHODS | FOLLOWING | {"pose.clear_views", "pose.smoothing", "pose.registry"}
+METHODS = STARTS | MIXTURES | {"pose.recovery", "pose.methods"}
+POSE = METHODS | FOLLOWING | {"pose.backward", "pose.clear_views", "pose.smoothing", "pose.registry"}
 METRICS = IO | {"metrics"}
 VIEW = VOXELS | {"body", "view"}
 EVERYTHING = POSE | METRICS | VIEW | {"check", "synthetic", "plugins"}
@@ -54,6 +55,8 @@ MAY_IMPORT = {
     "pose.person": PERSON,
     "pose.records": PERSON | {"pose.records"},
     "pose.follow": FOLLOWING,
+    "pose.mixtures": MIXTURES,
+    "pose.backward": FOLLOWING | MIXTURES | {"pose.backward"},
     "pose.smoothing": FOLLOWING,
     "pose.clear_views": FOLLOWING,
     "pose.methods": METHODS,

@@ -15,9 +15,10 @@ from hmc.body.limbs import LIMBS
 from hmc.body.proportions import make_body
 from hmc.errors import InputError
 from hmc.landmarks import LANDMARKS
-from hmc.pose import backward as module
-from hmc.pose.backward import backward, mixed_poses
+from hmc.pose import mixtures
+from hmc.pose.backward import backward
 from hmc.pose.follow import FollowOptions
+from hmc.pose.mixtures import mixed_poses
 from hmc.pose.registry import pose_method
 from hmc.pose.starts.own_body import LEAST_BODY_FRAMES, choose_frames
 from hmc.voxels.run_options import RunOptions
@@ -98,9 +99,9 @@ def test_long_runs_are_joined_block_by_block(one_pass, monkeypatch):
     people, run = one_pass
     lost = with_a_lost_arm(people)
     whole = second(lost, run)
-    monkeypatch.setattr(module, "BLOCK", 4)
-    monkeypatch.setattr(module, "CONTEXT", 3)
-    monkeypatch.setattr(module, "AHEAD", 3)
+    monkeypatch.setattr(mixtures, "BLOCK", 4)
+    monkeypatch.setattr(mixtures, "CONTEXT", 3)
+    monkeypatch.setattr(mixtures, "AHEAD", 3)
     np.testing.assert_allclose(second(lost, run).positions, whole.positions, atol=0.03)
 
 

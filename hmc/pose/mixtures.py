@@ -1,0 +1,107 @@
+"""Two poses of each frame, all mixtures of their limbs, and the way through them that time bears out.
+
+One pass over a recording may have lost an arm where another has it, and the other way round for a leg. So every limb, and the rest of the
+body, is taken from the one pose or from the other, and which are right is the path of least cost through all mixtures of all frames
+(Viterbi, 1967): what the silhouettes say of each, and the jump of the limbs' velocities from one frame to the next (`hmc.pose.legs`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import product
+
+import numpy as np
+
+from hmc.body.dimensions import FitBodySettings
+from hmc.body.limbs import LIMBS
+from hmc.body.model import BodyModel
+from hmc.pose.legs import LegSettings, choose_legs, limb_points
+from hmc.pose.steps.polish import PolishSettings
+
+__all__ = ["N_MIXTURES", "BackwardSettings", "choose_path", "mixed_poses"]
+
+#: Frames between whose poses one path is looked for, and how many before them are known and after them looked at.
+BLOCK, CONTEXT, AHEAD = 600, 30, 60
+#: The angles of each limb, and every way to take limbs, and the rest of the body, from one pose or another.
+_LIMB_DOFS = [np.asarray(limb.dofs) for limb in LIMBS.values()]
+_TAKEN = np.array(list(product((0, 1), repeat=1 + len(_LIMB_DOFS))))
+N_MIXTURES = len(_TAKEN)
+
+
+@dataclass(frozen=True)
+class BackwardSettings:
+    """What the second pass does.
+
+    Parameters
+    ----------
+    polish : PolishSettings
+        How poses are refined and lost limbs looked for.
+    fit_body : FitBodySettings or None
+        How the body is fitted anew; None: it stays.
+    body_frames : int
+        Frames to which it is fitted, at most.
+    path : LegSettings
+        What a jump of the limbs' velocities costs.
+    """
+
+    polish: PolishSettings
+    fit_body: FitBodySettings | None = field(default_factory=FitBodySettings)
+    body_frames: int = 20
+    path: LegSettings = field(default_factory=lambda: LegSettings(jump_weight=6e-5, arms_too=True))
+
+
+def mixed_poses(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """One pose, another, and all with some of the limbs, or the rest of the body, taken from the one and some from the other.
+
+    Parameters
+    ----------
+    one, other : ndarray, shape (..., 27)
+
+    Returns
+    -------
+    ndarray, shape (..., 32, 27)
+        The first is `one`, the last `other`.
+    """
+    both = np.stack([one, other], axis=-2)
+    out = both[..., _TAKEN[:, 0], :]
+    for dofs, taken in zip(_LIMB_DOFS, _TAKEN[:, 1:].T, strict=True):
+        out[..., dofs] = both[..., taken, :][..., dofs]
+    return out
+
+
+def choose_path(
+    body: BodyModel, frames: np.ndarray, one: np.ndarray, other: np.ndarray, costs: np.ndarray, fps: float, settings: LegSettings
+) -> np.ndarray:
+    """Which mixture of every frame's two poses is on the least costly path; block by block, so that memory is bounded.
+
+    Parameters
+    ----------
+    body : BodyModel
+    frames : ndarray of int, shape (n,)
+        Rising.
+    one, other : ndarray, shape (n, 27)
+    costs : ndarray, shape (n, 32)
+        Of their `mixed_poses`, square metres.
+    fps : float
+    settings : LegSettings
+
+    Returns
+    -------
+    ndarray of int, shape (n,)
+        Places among the mixtures.
+    """
+    picks = np.zeros(len(frames), int)
+    for start in range(0, len(frames), BLOCK):
+        known, end = max(0, start - CONTEXT), min(len(frames), start + BLOCK + AHEAD)
+        poses, told = mixed_poses(one[known:end], other[known:end]), costs[known:end].copy()
+        decided = picks[known:start]
+        poses[: len(decided)] = poses[np.arange(len(decided)), decided][:, None]
+        told[: len(decided)] = 0.0
+        points = _points(body, poses, settings)
+        picks[start:end] = choose_legs(frames[known:end], told, points, fps, settings)[len(decided) :]
+    return picks
+
+
+def _points(body: BodyModel, poses: np.ndarray, settings: LegSettings) -> np.ndarray:
+    flat = limb_points(body, poses.reshape(-1, poses.shape[-1]), settings)
+    return flat.reshape(*poses.shape[:2], *flat.shape[1:])
