@@ -1,6 +1,7 @@
 """The pose command on the small rendered clip: results, resuming, repeated runs and wrong input."""
 
 import csv
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from numpy.testing import assert_array_equal
 from hmc.cli import main
 from hmc.cli import pose as command
 from hmc.io.results import read_joints, read_pose, read_run, read_tracks
-from hmc.pose import follow, registry
+from hmc.pose import backward, follow, registry
 from hmc.voxels import hulls as frontend
 
 
@@ -19,8 +20,9 @@ from hmc.voxels import hulls as frontend
 def little_work():
     """The methods as they are, with less work, people watched for three frames."""
 
-    def lean(name, preset, models, init, skin):
-        return lean_method(name, preset, tuple(models), init, skin)
+    def lean(name, preset, models, init, skin, passes):
+        method = lean_method(name, preset, tuple(models), init, skin)
+        return method if passes == 2 else replace(method, back=None)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(command, "pose_method", lean)
@@ -124,6 +126,35 @@ def test_a_stopped_run_goes_on_and_ends_as_if_it_had_not_been(tmp_path, monkeypa
     one, other = (read_pose(tmp_path / folder / "pose.npz") for folder in ("cut", "whole"))
     assert_array_equal(one.states, other.states)
     assert sorted(path.name for path in (tmp_path / "cut").iterdir()) == ["joints.csv", "pose.npz", "run.toml", "tracks.csv"]
+
+
+@pytest.mark.slow
+def test_a_run_killed_in_the_second_pass_goes_on_there(finished, tmp_path, monkeypatch):
+    views, seen = backward.views_of, []
+
+    def dying(recording, grid, tracks, hull):
+        seen.append(hull.index)
+        if len(seen) == dies_after:
+            raise KeyboardInterrupt
+        return views(recording, grid, tracks, hull)
+
+    default = ("--frames", "5", "--voxel", "0.05")
+    monkeypatch.setattr(backward, "views_of", dying)
+    dies_after = 3
+    assert pose(tmp_path, *default) == 130 and not (tmp_path / "joints.csv").exists()
+    dies_after, before = 0, len(seen)
+    assert pose(tmp_path, *default) == 0
+    assert seen[before:] == list(range(seen[before], -1, -1)) and len(seen) - before < 5  # what was done is not done again
+    for name in ("joints.csv", "tracks.csv"):
+        assert (tmp_path / name).read_bytes() == (finished / name).read_bytes()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["joints.csv", "pose.npz", "run.toml", "tracks.csv"]
+
+
+def test_one_pass_is_another_run(finished, tmp_path):
+    assert pose(tmp_path, "--frames", "5", "--voxel", "0.05", "--passes", "1") == 0
+    one, two = (read_run(folder / "run.toml")["parameters"] for folder in (tmp_path, finished))
+    assert "back" not in one and two["back"]["body_frames"] == 20
+    assert (tmp_path / "joints.csv").read_bytes() != (finished / "joints.csv").read_bytes()
 
 
 @pytest.mark.slow

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from methods import HEIGHT_M, VOXEL_M, followed, tiny_clip, true_joints, true_tracks
 
 from hmc.body.joints import N_DOF
 from hmc.body.kinematics import landmarks
@@ -22,7 +23,6 @@ from hmc.pose.mixtures import mixed_poses
 from hmc.pose.registry import pose_method
 from hmc.pose.starts.own_body import LEAST_BODY_FRAMES, choose_frames
 from hmc.voxels.run_options import RunOptions
-from tests.methods import HEIGHT_M, VOXEL_M, followed, tiny_clip, true_joints, true_tracks
 
 FRAMES = 10
 LOST = slice(3, 7)
