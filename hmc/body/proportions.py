@@ -16,7 +16,9 @@ from hmc.body.model import PART_OF_SEGMENT, BodyModel, Cones
 from hmc.errors import InputError
 from hmc.landmarks import LANDMARKS
 
-__all__ = ["CANTON_LENGTHS", "DEFAULT_LENGTHS", "GIRTHS", "canton_body", "default_body", "landmark_segments", "make_body", "stature"]
+__all__ = [
+    "CANTON_LENGTHS", "DEFAULT_LENGTHS", "GIRTHS", "SOLE", "canton_body", "default_body", "landmark_segments", "make_body", "stature",
+]  # fmt: skip
 
 #: Joint-centre lengths over stature. Trunk: hip centres' middle to the base of the neck. Sources: Winter (2009), figure 4.1
 #: (limbs; shoulders: half its width of .259, less some 4 cm from the tip of the shoulder to the joint's centre; ankle: .039 and a
@@ -37,6 +39,11 @@ CANTON_LENGTHS: dict[str, float] = DEFAULT_LENGTHS | {
     "ankle_height": 0.0, "foot": 0.0, "chest_forward": 0.0, "head_forward": 0.0, "hair": 0.0,
 }  # fmt: skip
 
+#: The foot's axis at the heel, over the floor and over stature. Soles are round and cameras stand higher: the lowest 2 cm of feet are
+#: hardly in any hull, and a flesh that reached to the floor would lift the whole body out of it (`python -m hmc.experiments run
+#: body-bias`).
+SOLE = 0.036
+
 #: Factors on the radii of the flesh, one a group of parts.
 GIRTHS: tuple[str, ...] = ("torso", "depth", "head", "arms", "thighs", "shanks")
 
@@ -55,7 +62,7 @@ def landmark_segments() -> np.ndarray:
     return np.array([_SEGMENT_INDEX[_LANDMARK_SEGMENT[name]] for name in LANDMARKS])
 
 
-def make_body(dimensions: dict[str, float], limits: JointLimits | None = None) -> BodyModel:
+def make_body(dimensions: dict[str, float], limits: JointLimits | None = None, sole: float = SOLE) -> BodyModel:
     """The body of given dimensions.
 
     Parameters
@@ -65,6 +72,8 @@ def make_body(dimensions: dict[str, float], limits: JointLimits | None = None) -
         the flesh ends at the crown, as in results that were made before it was known.
     limits : JointLimits, optional
         `default_limits` unless given.
+    sole : float
+        As `SOLE`: what another height of the feet's flesh does is for studies of the model, and no body is stored with it.
 
     Returns
     -------
@@ -97,7 +106,8 @@ def make_body(dimensions: dict[str, float], limits: JointLimits | None = None) -
         tips[LANDMARKS.index(f"{side}_wrist")] = (0, sign * d["forearm"], 0)
         tips[LANDMARKS.index(f"{side}_ankle")] = (0, 0, -d["shank"])
     tips[LANDMARKS.index("head_top")] = (d["head_forward"], 0, d["head"])
-    return BodyModel(float(d["height"]), offsets, tips, _flesh(d), limits or default_limits(), {name: float(d[name]) for name in wanted})
+    kept = {name: float(d[name]) for name in wanted}
+    return BodyModel(float(d["height"]), offsets, tips, _flesh(d, sole), limits or default_limits(), kept)
 
 
 def default_body(height_m: float) -> BodyModel:
@@ -144,7 +154,7 @@ def _scaled(height_m: float, lengths: dict[str, float]) -> dict[str, float]:
     return {"height": height_m} | {name: value * height_m for name, value in lengths.items()} | {f"girth_{g}": 1.0 for g in GIRTHS}
 
 
-def _flesh(d: dict[str, float]) -> Cones:
+def _flesh(d: dict[str, float], sole: float) -> Cones:
     """Truncated cones around the segments. Radii are fractions of the stature for an average adult, times the girth factors."""
     h = d["height"]
     rows: list[tuple] = []
@@ -181,10 +191,8 @@ def _flesh(d: dict[str, float]) -> Cones:
         calf = (-0.004 * h, 0, -0.4 * shank)
         cone(f"{side}_shank", ((0, 0, 0), calf), ((0.030, 0.032), (0.031, 0.033)), y, shanks)
         cone(f"{side}_shank", (calf, (0, 0, -shank - 0.3 * ankle)), ((0.031, 0.033), (0.020, 0.021)), y, shanks)
-        # The foot's axis at the heel. Soles are round and cameras stand higher: the lowest 2 cm of feet are hardly in any hull, and a flesh
-        # that reached to the floor would lift the whole body out of it (`python -m hmc.experiments run body-bias`).
-        sole = -shank - ankle + 0.036 * h
         if foot > 0:
-            heel, toe = (-0.032 * h, 0, sole), (-0.032 * h + 1.35 * foot, 0, sole - 0.012 * h)
+            low = -shank - ankle + sole * h
+            heel, toe = (-0.032 * h, 0, low), (-0.032 * h + 1.35 * foot, 0, low - 0.012 * h)
             cone(f"{side}_shank", (heel, toe), ((0.020, 0.024), (0.028, 0.012)), y, (1.0, 1.0))
     return Cones(*(np.array(column) for column in zip(*rows, strict=True)))

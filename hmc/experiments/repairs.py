@@ -11,7 +11,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-import cv2
 import matplotlib.pyplot as plt
 import numpy as np
 
@@ -19,7 +18,7 @@ from hmc.camera.segmentation import SegmentationSettings
 from hmc.errors import InputError
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs, rendered
-from hmc.io.recording import Recording
+from hmc.experiments.truth import true_silhouettes
 from hmc.tracking.resumable import person_grid
 from hmc.voxels.carving import carve, make_tables
 from hmc.voxels.hulls import FrontendSettings, stream_masks
@@ -80,7 +79,7 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
     silhouettes, hulls = [], []
     last = min(recording.start + recording.n_frames, recording.start + parameters["frames"])
     for step in stream_masks(recording, settings, last=last, on_problem=lambda line: None):
-        truth = _truth(recording, step.index)
+        truth = true_silhouettes(recording, step.index)
         if truth is None:
             continue
         silhouettes.append([np.nan if mask is None else _overlap(mask, true) for mask, true in zip(step.masks, truth, strict=True)])
@@ -88,16 +87,6 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
     if not silhouettes:
         raise InputError(f"{recording.path}: has no truth/silhouettes in these frames; this experiment judges silhouettes by them")
     return {"silhouettes": np.array(silhouettes), "hulls": np.array(hulls)}
-
-
-def _truth(recording: Recording, frame: int) -> list[np.ndarray] | None:
-    """The true silhouettes of a frame, one a camera; None where there are none."""
-    folder = recording.path / "truth" / "silhouettes"
-    paths = [folder / camera.name / f"{frame:06d}.png" for camera in recording.rig]
-    if not all(path.is_file() for path in paths):
-        return None
-    pictures = [cv2.imread(str(path), cv2.IMREAD_GRAYSCALE) for path in paths]
-    return [np.asarray(picture) > 0 for picture in pictures]
 
 
 def _overlap(found: np.ndarray, true: np.ndarray) -> float:

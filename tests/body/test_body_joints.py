@@ -10,7 +10,7 @@ from hmc.body.flesh import flesh_points
 from hmc.body.joints import DOF_NAMES, N_DOF, SEGMENTS, canton_limits, default_limits, dof_index, mirror_state
 from hmc.body.kinematics import landmarks, segment_transforms
 from hmc.body.model import PARTS, neutral_state
-from hmc.body.proportions import DEFAULT_LENGTHS, canton_body, default_body, make_body
+from hmc.body.proportions import DEFAULT_LENGTHS, SOLE, canton_body, default_body, make_body
 from hmc.errors import InputError
 from hmc.landmarks import LANDMARKS, landmark_index
 
@@ -96,6 +96,16 @@ def test_a_body_of_twice_the_dimensions_is_twice_as_large():
     assert_allclose(landmarks(large, state), 2 * landmarks(small, state))
     for name in ("start", "end", "radii"):
         assert_allclose(getattr(large.cones, name), 2 * getattr(small.cones, name))
+
+
+def test_another_sole_moves_the_feet_alone():
+    usual = default_body(1.8)
+    low = make_body(usual.dimensions, sole=SOLE - 0.01)
+    ends = [np.stack([body.cones.start, body.cones.end]) for body in (usual, low)]
+    moved = np.array([1.8 * 0.01 if abs(down) > 1e-9 else 0.0 for down in (ends[0] - ends[1])[0, :, 2]])
+    assert np.count_nonzero(moved) == 2 and low.dimensions == usual.dimensions
+    assert_allclose(ends[0] - ends[1], moved[:, None] * np.array([0, 0, 1.0]) + np.zeros((2, 1, 1)), atol=1e-12)
+    assert_allclose(low.cones.radii, usual.cones.radii)
 
 
 def test_dimensions_are_what_landmarks_show():

@@ -281,13 +281,20 @@ def overlaps(rng, parameters, noise):
     return {"silhouettes": np.clip(usual + 0.01 * rng.normal(size=(4, 5)), 0, 1), "hulls": np.clip(usual + 0.01 * rng.normal(size=4), 0, 1)}
 
 
+def pulled_off(rng, parameters, noise):
+    """Bodies that are lifted or lowered as a whole, and landmarks off besides."""
+    start, end = (amount(rng, noise, 0.012) * rng.normal(size=(8, len(LANDMARKS), 3)) for _ in range(2))
+    up = rng.uniform(-0.05, 0.05) if noise else 0.015 * rng.normal()
+    return {"start_off_m": start, "off_m": end + np.array([0, 0, up])}
+
+
 #: By the folder of the cells: ``draw(rng, parameters, noise) -> results``.
 RESULTS = {
     "fig-2.4": colored, "fig-3.3": peaks, "fig-3.5": over_annealed, "fig-4.2": components, "table-4.2": classified, "fig-4.4": tree,
     "fig-4.7": ellipsoid, "fig-4.9": samples, "tracking": tracks, "fig-4.12": crossing, "why-behind": behind, "pose": pose,
     "fig-6.11": maps, "markers": marked, "filters": filtered, "markerless": pose, "fig-7.8": schedule, "fig-7.15": behind_furniture,
     "lost-arm": lost_arm, "over-time": unseen, "all-methods": timed, "fig-B.1": square, "hsiao-3.8": ghosts, "hsiao-parts": parts,
-    "hsiao-4": swarmed, "why-hsiao": swarmed, "hsiao-pso": optimised, "repairs": overlaps,
+    "hsiao-4": swarmed, "why-hsiao": swarmed, "hsiao-pso": optimised, "repairs": overlaps, "body-bias": pulled_off,
     "kehl-1": carved, "kehl-4": edges, "kehl-9": displaced, "kehl": descended,
 }  # fmt: skip
 

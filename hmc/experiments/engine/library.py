@@ -51,6 +51,7 @@ EXPERIMENTS = {
     "fig-8.1": "fig_8_1",
     "missing-data": "missing_data",
     "repairs": "repairs",
+    "body-bias": "body_bias",
     "what-each-adds": "what_each_adds",
     "lost-arm": "lost_arm",
     "over-time": "over_time",
