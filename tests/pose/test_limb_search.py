@@ -48,7 +48,7 @@ def lose(state: np.ndarray, limb: str) -> np.ndarray:
 
 def named(rng, scene, state, settings) -> list[str]:
     """The limbs that are looked for at a state."""
-    return lost_limbs(rng, scene[0].linearise(state).misfit, settings)
+    return lost_limbs(rng, scene[0].body, state, scene[0].linearise(state).misfit, settings)
 
 
 @pytest.mark.parametrize("limb", LIMBS)

@@ -143,7 +143,7 @@ def test_lost_limbs_are_looked_for_in_a_sum(scene):
     total, _, true = scene
     settings, away = SearchSettings(draws=40), true.copy()
     away[LIMBS["r_arm"].dofs] = [0.0, -1.2, 0.0, 1.5]
-    named = lost_limbs(np.random.default_rng(0), total.linearise(away).misfit, settings)
+    named = lost_limbs(np.random.default_rng(0), total.body, away, total.linearise(away).misfit, settings)
     assert "r_arm" in named
     state, cost, evaluations = search_limbs(
         np.random.default_rng(1), total, (away, cost_at(total, away)), named, RefineSettings(), settings

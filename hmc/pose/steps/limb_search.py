@@ -35,7 +35,7 @@ class SearchSettings:
     uncovered_share : float
         ... and may be when more than this share of what has to be covered is that far from the body ...
     at_once : int
-        ... then others are looked for too, picked at random, to make up this number.
+        ... then others that reach it are looked for too, picked at random, to make up this number.
     random_share : float
         Share of the frames without a lost limb in which one picked at random is looked for.
     draws : int
@@ -65,8 +65,8 @@ class SearchSettings:
     back_m: float = 0.05
 
 
-def lost_limbs(rng: np.random.Generator, misfit: Misfit, settings: SearchSettings) -> list[str]:
-    """Limbs that the hulls contradict, and some where much of the hull is not covered; else now and then one picked at random.
+def lost_limbs(rng: np.random.Generator, body: BodyModel, state: np.ndarray, misfit: Misfit, settings: SearchSettings) -> list[str]:
+    """Limbs that the hulls contradict, and some that reach what is not covered where that is much; else now and then one picked at random.
 
     Of those that the body's points are of: a body may lack some (`hmc.pose.steps.hidden`).
 
@@ -75,6 +75,9 @@ def lost_limbs(rng: np.random.Generator, misfit: Misfit, settings: SearchSetting
     Parameters
     ----------
     rng : numpy.random.Generator
+    body : BodyModel
+    state : ndarray, shape (27,)
+        The pose.
     misfit : Misfit
         Of the pose.
     settings : SearchSettings
@@ -88,9 +91,12 @@ def lost_limbs(rng: np.random.Generator, misfit: Misfit, settings: SearchSetting
     far = misfit.outside > settings.far_m
     lost = [limb for limb in there if far[np.isin(misfit.part, LIMBS[limb].parts)].mean() > settings.outside_share]
     if (misfit.distance > settings.far_m).mean() > settings.uncovered_share:
-        others = [limb for limb in there if limb not in lost]
-        picked = rng.permutation(len(others))[: max(0, settings.at_once - len(lost))]
-        return lost + [others[k] for k in sorted(picked)]
+        # A foot that is nowhere is no arm's: the more of it a limb reaches, the likelier it is the limb's.
+        goals = np.array([len(_goals(body, state, limb, misfit, settings)) for limb in there])
+        others = [k for k, limb in enumerate(there) if limb not in lost and goals[k]]
+        n = min(len(others), max(0, settings.at_once - len(lost)))
+        picked = rng.choice(others, n, replace=False, p=goals[others] / goals[others].sum()).tolist() if n else []
+        return lost + [there[k] for k in sorted(picked)]
     at_random = [str(rng.choice(there))] if there and rng.random() < settings.random_share else []
     return lost or at_random
 
@@ -159,12 +165,8 @@ def _draw(rng: np.random.Generator, settings: SearchSettings, objective: Objecti
     body = objective.body
     dofs = LIMBS[limb].dofs
     low, high = body.limits.low[dofs], body.limits.high[dofs]
-    centre, _ = limb_joint(body, state, limb)
     misfit = objective.linearise(state).misfit
-    goals = np.zeros((0, 3))
-    if misfit is not None:
-        near = np.linalg.norm(misfit.places - centre, axis=1) < sum(limb_lengths(body, limb)) + settings.far_m
-        goals = misfit.places[near & (misfit.distance > settings.far_m)]
+    goals = np.zeros((0, 3)) if misfit is None else _goals(body, state, limb, misfit, settings)
     n_reach = round(settings.reach_share * settings.draws) if len(goals) else 0
     n_common = (settings.draws - n_reach) // 2
     n_any = settings.draws - n_reach - n_common
@@ -175,3 +177,10 @@ def _draw(rng: np.random.Generator, settings: SearchSettings, objective: Objecti
     if n_reach:
         drawn.append(reach(body, state, limb, goals[rng.integers(len(goals), size=n_reach)], rng.uniform(-np.pi, np.pi, n_reach)))
     return np.concatenate(drawn)
+
+
+def _goals(body: BodyModel, state: np.ndarray, limb: str, misfit: Misfit, settings: SearchSettings) -> np.ndarray:
+    """What the body does not cover and a limb can reach, shape (n, 3), world, metres."""
+    centre, _ = limb_joint(body, state, limb)
+    near = np.linalg.norm(misfit.places - centre, axis=1) < sum(limb_lengths(body, limb)) + settings.far_m
+    return misfit.places[near & (misfit.distance > settings.far_m)]

@@ -80,7 +80,7 @@ def polish(
     estimate, info = min(trials, key=lambda trial: trial[1].cost_after)
     cost = info.cost
     if settings.search is not None and info.misfit is not None:
-        searched = lost_limbs(rng, info.misfit, settings.search)
+        searched = lost_limbs(rng, objective.body, estimate, info.misfit, settings.search)
         estimate, cost, more = search_limbs(rng, objective, (estimate, cost), searched, settings.refine, settings.search)
         evaluations += more
     return estimate, cost, evaluations
