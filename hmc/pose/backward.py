@@ -29,7 +29,7 @@ from hmc.io.recording import Recording
 from hmc.io.results import TrackTable
 from hmc.pose.follow import FollowOptions, PosedPeople
 from hmc.pose.method import SURFACE_POINTS, Capture, PoseMethod, Subject, make_subject
-from hmc.pose.mixtures import N_MIXTURES, BackwardSettings, choose_path, mixed_poses
+from hmc.pose.mixtures import N_MIXTURES, BackwardSettings, choose_path, mixed_poses, mixture
 from hmc.pose.objectives.symmetric import Symmetric
 from hmc.pose.starts.fit_body import with_known_stature
 from hmc.pose.starts.own_body import choose_frames, own_body
@@ -226,10 +226,9 @@ def _joined(people: PosedPeople, persons: Mapping[int, _Person], fps: float, set
     for person in persons.values():
         frames, body = people.frames[person.rows], person.subject.body
         picks = choose_path(body, frames, person.own, person.back, person.costs, fps, settings.path)
-        chosen = np.arange(len(picks)), picks
-        states[person.rows] = mixed_poses(person.own, person.back)[chosen]
+        states[person.rows] = mixture(person.own, person.back, picks)
         told = person.costs.any(axis=1)
-        costs[person.rows[told]] = person.costs[chosen][told]
+        costs[person.rows[told]] = person.costs[np.arange(len(picks)), picks][told]
         positions[person.rows] = landmarks(body, states[person.rows])
     bodies = {**people.states.bodies, **{number: person.subject.body.dimensions for number, person in persons.items()}}
     return replace(

@@ -18,7 +18,7 @@ from hmc.body.model import BodyModel
 from hmc.pose.legs import LegSettings, choose_legs, limb_points
 from hmc.pose.steps.polish import PolishSettings
 
-__all__ = ["N_MIXTURES", "BackwardSettings", "choose_path", "mixed_poses"]
+__all__ = ["N_MIXTURES", "BackwardSettings", "choose_path", "mixed_poses", "mixture"]
 
 #: Frames between whose poses one path is looked for, and how many before them are known and after them looked at.
 BLOCK, CONTEXT, AHEAD = 600, 30, 60
@@ -66,6 +66,25 @@ def mixed_poses(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     out = both[..., _TAKEN[:, 0], :]
     for dofs, taken in zip(_LIMB_DOFS, _TAKEN[:, 1:].T, strict=True):
         out[..., dofs] = both[..., taken, :][..., dofs]
+    return out
+
+
+def mixture(one: np.ndarray, other: np.ndarray, picks: np.ndarray) -> np.ndarray:
+    """One of the `mixed_poses` of each frame, without making all of them.
+
+    Parameters
+    ----------
+    one, other : ndarray, shape (n, 27)
+    picks : ndarray of int, shape (n,)
+
+    Returns
+    -------
+    ndarray, shape (n, 27)
+    """
+    both, rows, taken = np.stack([one, other], axis=1), np.arange(len(picks)), _TAKEN[picks]
+    out = both[rows, taken[:, 0]]
+    for dofs, which in zip(_LIMB_DOFS, taken[:, 1:].T, strict=True):
+        out[:, dofs] = both[rows, which][:, dofs]
     return out
 
 

@@ -19,7 +19,7 @@ from hmc.landmarks import LANDMARKS
 from hmc.pose import mixtures
 from hmc.pose.backward import backward
 from hmc.pose.follow import FollowOptions
-from hmc.pose.mixtures import mixed_poses
+from hmc.pose.mixtures import mixed_poses, mixture
 from hmc.pose.registry import pose_method
 from hmc.pose.starts.own_body import LEAST_BODY_FRAMES, choose_frames
 from hmc.voxels.run_options import RunOptions
@@ -121,6 +121,8 @@ def test_mixtures_take_each_limb_from_one_pose_or_the_other():
     assert {pose.tobytes() for pose in mixed} == expected
     np.testing.assert_array_equal(mixed[0], one)
     np.testing.assert_array_equal(mixed[-1], other)
+    picks = np.arange(len(mixed))
+    np.testing.assert_array_equal(mixture(np.tile(one, (len(mixed), 1)), np.tile(other, (len(mixed), 1)), picks), mixed)
 
 
 @given(st.lists(st.one_of(st.floats(1e-6, 1e-2), st.just(float("nan"))), max_size=80), st.integers(1, 30))
