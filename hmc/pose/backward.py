@@ -154,21 +154,19 @@ def _bodies(pass_: _Pass, method: PoseMethod, people: PosedPeople, fitted: np.nd
         return bodies
     chosen = {number: choose_frames(people.costs[person.rows], settings.body_frames) for number, person in persons.items()}
     wanted = {number: {int(people.frames[persons[number].rows[k]]) for part in parts for k in part} for number, parts in chosen.items()}
-    objectives: dict[int, dict[int, Symmetric]] = {number: {} for number in persons}
-    states: dict[int, dict[int, np.ndarray]] = {number: {} for number in persons}
+    poses: dict[int, dict[int, tuple[Symmetric, np.ndarray]]] = {number: {} for number in persons}
     for frame, views in pass_.views(sorted(set().union(*wanted.values()))):
         for number, person in persons.items():
             target = views[number].target if frame in wanted[number] and number in views else None
             if target is not None and shows_enough(target):
                 k = person.row_of[frame]
-                objectives[number][k] = fine_objective(pass_.rng(number, frame), person.subject, target, settings.polish)
-                states[number][k] = refine(objectives[number][k], person.own[k], settings.polish.refine)[0]
+                objective = fine_objective(pass_.rng(number, frame), person.subject, target, settings.polish)
+                poses[number][k] = objective, refine(objective, person.own[k], settings.polish.refine)[0]
     for number, person in persons.items():
-        picks, held_out = ([k for k in part if k in objectives[number]] for part in chosen[number])
+        picks, held_out = ([k for k in part if k in poses[number]] for part in chosen[number])
         bodies[number] = own_body(
             person.subject,
-            objectives[number],
-            states[number],
+            poses[number],
             (picks, held_out),
             with_known_stature(settings.fit_body, pass_.options.height_m is not None),
             settings.polish.refine,

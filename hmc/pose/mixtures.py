@@ -13,6 +13,7 @@ from itertools import product
 import numpy as np
 
 from hmc.body.dimensions import FitBodySettings
+from hmc.body.joints import N_DOF
 from hmc.body.limbs import LIMBS
 from hmc.body.model import BodyModel
 from hmc.pose.legs import LegSettings, choose_legs, limb_points
@@ -22,9 +23,9 @@ __all__ = ["N_MIXTURES", "BackwardSettings", "choose_path", "mixed_poses", "mixt
 
 #: Frames between whose poses one path is looked for, and how many before them are known and after them looked at.
 BLOCK, CONTEXT, AHEAD = 600, 30, 60
-#: The angles of each limb, and every way to take limbs, and the rest of the body, from one pose or another.
-_LIMB_DOFS = [np.asarray(limb.dofs) for limb in LIMBS.values()]
-_TAKEN = np.array(list(product((0, 1), repeat=1 + len(_LIMB_DOFS))))
+#: Every way to take the rest of the body, and each limb, from one pose (0) or another (1); and in which column each angle stands.
+_TAKEN = np.array(list(product((0, 1), repeat=1 + len(LIMBS))), bool)
+_COLUMN = sum(column * np.isin(np.arange(N_DOF), limb.dofs) for column, limb in enumerate(LIMBS.values(), 1))
 N_MIXTURES = len(_TAKEN)
 
 
@@ -62,30 +63,22 @@ def mixed_poses(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     ndarray, shape (..., 32, 27)
         The first is `one`, the last `other`.
     """
-    both = np.stack([one, other], axis=-2)
-    out = both[..., _TAKEN[:, 0], :]
-    for dofs, taken in zip(_LIMB_DOFS, _TAKEN[:, 1:].T, strict=True):
-        out[..., dofs] = both[..., taken, :][..., dofs]
-    return out
+    return mixture(one[..., None, :], other[..., None, :], np.arange(N_MIXTURES))
 
 
 def mixture(one: np.ndarray, other: np.ndarray, picks: np.ndarray) -> np.ndarray:
-    """One of the `mixed_poses` of each frame, without making all of them.
+    """One of the `mixed_poses` of each pair of poses, without making all of them.
 
     Parameters
     ----------
-    one, other : ndarray, shape (n, 27)
-    picks : ndarray of int, shape (n,)
+    one, other : ndarray, shape (..., 27)
+    picks : ndarray of int, shape (...)
 
     Returns
     -------
-    ndarray, shape (n, 27)
+    ndarray, shape (..., 27)
     """
-    both, rows, taken = np.stack([one, other], axis=1), np.arange(len(picks)), _TAKEN[picks]
-    out = both[rows, taken[:, 0]]
-    for dofs, which in zip(_LIMB_DOFS, taken[:, 1:].T, strict=True):
-        out[:, dofs] = both[rows, which][:, dofs]
-    return out
+    return np.where(_TAKEN[picks][..., _COLUMN], other, one)
 
 
 def choose_path(

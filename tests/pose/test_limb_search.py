@@ -60,6 +60,16 @@ def test_a_limb_in_the_air_is_named(scene, limb):
     assert all(len(pick) == 2 and limb in pick for pick in picks) and set().union(*picks) == set(LIMBS)
 
 
+def test_a_foot_that_nothing_covers_is_looked_for_by_legs(scene):
+    """A foot lifted to the seat leaves the hull about it uncovered, which no arm reaches; picked blindly, half would be arms."""
+    lifted = scene[1].copy()
+    lifted[DOF_NAMES.index("r_knee_y")] = 2.2
+    settings = SearchSettings(outside_share=1.0, uncovered_share=0.005, at_once=1)
+    picks = [named(np.random.default_rng(k), scene, lifted, settings) for k in range(60)]
+    assert all(len(pick) == 1 for pick in picks)
+    assert sum(pick[0].endswith("leg") for pick in picks) >= 45
+
+
 def test_a_good_pose_has_one_limb_looked_at_by_turns(scene):
     settings = SearchSettings(uncovered_share=0.5, far_m=0.08, random_share=1.0)
     picks = [named(np.random.default_rng(k), scene, scene[1], settings) for k in range(30)]

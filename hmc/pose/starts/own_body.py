@@ -11,7 +11,7 @@ from hmc.body.dimensions import FitBodySettings
 from hmc.body.flesh import surface_coordinates
 from hmc.body.model import BodyModel
 from hmc.pose.method import Subject
-from hmc.pose.objectives.symmetric import Symmetric, body_points
+from hmc.pose.objectives.symmetric import Symmetric
 from hmc.pose.starts.fit_body import WORTH_IT, fit_body
 from hmc.pose.steps.refine import RefineSettings, refine
 
@@ -50,8 +50,7 @@ def choose_frames(costs: np.ndarray, n: int) -> tuple[list[int], list[int]]:
 
 def own_body(
     subject: Subject,
-    objectives: Mapping[int, Symmetric],
-    states: Mapping[int, np.ndarray],
+    poses: Mapping[int, tuple[Symmetric, np.ndarray]],
     chosen: tuple[list[int], list[int]],
     settings: FitBodySettings,
     refinement: RefineSettings,
@@ -64,10 +63,8 @@ def own_body(
     ----------
     subject : Subject
         From whose body the fit starts, and to which a prior holds it.
-    objectives : mapping of int to Symmetric
-        Of the frames, with the subject's body.
-    states : mapping of int to ndarray of shape (27,)
-        The poses in them.
+    poses : mapping of int to (Symmetric, ndarray of shape (27,))
+        Of the frames: the objective, with the subject's body, and the pose.
     chosen : (list of int, list of int)
         As from `choose_frames`.
     settings : FitBodySettings
@@ -81,12 +78,13 @@ def own_body(
     picks, held_out = chosen
     if not picks or not held_out:
         return subject
-    coordinates = surface_coordinates(subject.body, surface_samples)
-    body, _, _ = fit_body([objectives[k] for k in picks], np.array([states[k] for k in picks]), coordinates, settings)
-    fitted, points = equip(body), body_points(body, coordinates)
+    objectives, states = zip(*(poses[k] for k in picks), strict=True)
+    body, _, _ = fit_body(objectives, np.array(states), surface_coordinates(subject.body, surface_samples), settings)
+    fitted = equip(body)
+    tried = [poses[k] for k in held_out]
     before, after = (
-        [refine(replace(objectives[k], body=body, points=points), states[k], refinement)[1].cost_after for k in held_out]
-        for body, points in ((subject.body, subject.points), (fitted.body, points))
+        [refine(replace(objective, body=one.body, points=one.points), state, refinement)[1].cost_after for objective, state in tried]
+        for one in (subject, fitted)
     )
     # Of frames that it was not fitted to.
     return fitted if np.mean(after) < WORTH_IT * np.mean(before) else subject

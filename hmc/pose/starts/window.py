@@ -364,14 +364,17 @@ def walk_factor(headings: np.ndarray, velocities: np.ndarray, settings: StartSet
 def _fit(subject: Subject, window: _Window, path: Sequence[tuple[Tracked, StepInfo]], start: WindowStart, height_known: bool) -> Subject:
     """The subject with a body fitted to some frames of the window, if the others agree."""
     preset, settings = start.preset, start.settings
-    chosen = choose_frames(np.array([info.cost for _, info in path]), settings.body_frames)
     if preset.fit_body is None:
         return subject
-    objectives = {k: fine_objective(window.frame_rng(k), subject, window.target(k), preset.polish) for part in chosen for k in part}
+    chosen = choose_frames(np.array([info.cost for _, info in path]), settings.body_frames)
+    poses = {
+        k: (fine_objective(window.frame_rng(k), subject, window.target(k), preset.polish), path[k][0].state)
+        for part in chosen
+        for k in part
+    }
     return own_body(
         subject,
-        objectives,
-        {k: path[k][0].state for k in objectives},
+        poses,
         chosen,
         with_known_stature(preset.fit_body, height_known),
         preset.polish.refine,
