@@ -22,7 +22,7 @@ import numpy as np
 from hmc.camera.background import masked_median, stable_background
 from hmc.camera.people_cut import PeopleColors, View, cut_people, disc, learn_colors
 
-__all__ = ["EmptyScene", "Views", "empty_scenes", "replace_people"]
+__all__ = ["EmptyScene", "SamplePeople", "Views", "empty_scenes", "replace_people"]
 
 Masks = Sequence[np.ndarray | None]
 #: From the masks of all cameras to what the cameras agree on in each view: surely people, and possibly people.
@@ -58,8 +58,27 @@ class EmptyScene:
     colors: PeopleColors | None
 
 
+@dataclass(frozen=True)
+class SamplePeople:
+    """People cut out of samples.
+
+    Attributes
+    ----------
+    masks : list of lists of ndarray of bool, shape (height, width), or None
+        One a camera, a frame at a time; None where there is no image.
+    colors : list of PeopleColors or None, one a camera
+    """
+
+    masks: list[Masks]
+    colors: list[PeopleColors | None]
+
+
 def empty_scenes(
-    samples: Sequence[Masks], sizes: Sequence[tuple[int, int]], views: Views, pool: Executor | None = None
+    samples: Sequence[Masks],
+    sizes: Sequence[tuple[int, int]],
+    views: Views,
+    pool: Executor | None = None,
+    still: Callable[[Sequence[Masks], SamplePeople], Sequence[Masks] | None] | None = None,
 ) -> list[EmptyScene]:
     """The scene of each camera without the people in it.
 
@@ -73,6 +92,9 @@ def empty_scenes(
         What cameras agree on, for masks of these sizes.
     pool : concurrent.futures.Executor, optional
         Threads to spread the cameras over; the result does not depend on it.
+    still : callable, optional
+        From the small samples, and the people who were found in them, to masks of people who do not differ from the scene, as they
+        hardly move; None where there are none.
 
     Returns
     -------
@@ -85,13 +107,15 @@ def empty_scenes(
         for frame in samples
     ]
     known = list(run(lambda c: stable_background(_of(small, c)), range(n_cameras)))
-    hidden: list[list[np.ndarray]] = []
-    colors: list[PeopleColors | None] = []
+    nobody: Sequence[Masks] = [[None] * n_cameras for _ in small]
     for n_round in range(ROUNDS):
-        hidden, colors = _find_people(small, known, views, run, n_round)
-        known = list(run(_scene, (_of(small, c) for c in range(n_cameras)), hidden))
-    scenes = run(_scene, (_of(samples, c) for c in range(n_cameras)), hidden)
-    return [EmptyScene(scene, unseen, color) for (scene, unseen), color in zip(scenes, colors, strict=True)]
+        people = _find_people(small, known, views, run, nobody, n_round)
+        known = list(run(_scene, (_of(small, c) for c in range(n_cameras)), (_of(people.masks, c) for c in range(n_cameras))))
+    bodies = None if still is None else still(small, people)
+    if bodies is not None:
+        people = _find_people(small, known, views, run, bodies, ROUNDS)
+    scenes = run(_scene, (_of(samples, c) for c in range(n_cameras)), (_of(people.masks, c) for c in range(n_cameras)))
+    return [EmptyScene(scene, unseen, color) for (scene, unseen), color in zip(scenes, people.colors, strict=True)]
 
 
 def replace_people(image: np.ndarray, scene: np.ndarray) -> np.ndarray:
@@ -105,20 +129,32 @@ def _of(frames: Sequence[Masks], camera: int) -> list[np.ndarray]:
     return [entry for frame in frames if (entry := frame[camera]) is not None]
 
 
-def _find_people(small, known, views: Views, run, n_round: int) -> tuple[list[list[np.ndarray]], list[PeopleColors | None]]:
-    """Where people are in each camera's samples, as the scene known so far, the other cameras and the colors tell; their colors."""
-    masks = [[None if image is None else _differs(image, *known[c]) for c, image in enumerate(frame)] for frame in small]
+def _find_people(small, known, views: Views, run, bodies: Sequence[Masks], n_round: int) -> SamplePeople:
+    """People in the samples, as the scene known so far, bodies that hardly move, the other cameras and the colors tell; their colors."""
+    masks = [
+        [None if image is None else _with(_differs(image, *known[c]), body[c]) for c, image in enumerate(frame)]
+        for frame, body in zip(small, bodies, strict=True)
+    ]
     agreed = list(run(views, masks))
     cases: list[list[View]] = [[] for _ in known]
-    for images, differs, (surely, possibly) in zip(small, masks, agreed, strict=True):
+    for images, differs, (surely, possibly), body in zip(small, masks, agreed, bodies, strict=True):
         for c, (image, differ) in enumerate(zip(images, differs, strict=True)):
             if image is not None and differ is not None:
-                unseen = known[c][1]
+                unseen = known[c][1] if body[c] is None else known[c][1] & ~body[c]
                 # At first, what changes all the time is people; later, where the scene is not known, colors decide.
                 differ = differ if n_round == 0 else differ & ~unseen
                 cases[c].append(View(image, differ, surely[c], possibly[c], unseen))
     colors = list(run(learn_colors, cases))
-    return list(run(_cut_all, cases, colors)), colors
+    cut = [iter(each) for each in run(_cut_all, cases, colors)]
+    found = [[None if image is None else next(cut[c]) for c, image in enumerate(frame)] for frame in small]
+    # What was cut out head to foot is not given back to the scene for colors that the whole image has.
+    return SamplePeople(
+        [[_with(mask, body[c]) for c, mask in enumerate(frame)] for frame, body in zip(found, bodies, strict=True)], colors
+    )
+
+
+def _with(mask: np.ndarray | None, more: np.ndarray | None) -> np.ndarray | None:
+    return mask if mask is None or more is None else mask | more
 
 
 def _cut_all(views: Sequence[View], colors: PeopleColors | None) -> list[np.ndarray]:

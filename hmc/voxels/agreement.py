@@ -15,7 +15,7 @@ from hmc.camera.model import Camera, project
 from hmc.voxels.carving import CarvingTables, carve_levels
 from hmc.voxels.components import components
 
-__all__ = ["agreed_views"]
+__all__ = ["agreed_views", "bodies", "hull_view"]
 
 #: Smaller blobs are no person, cubic metres.
 LEAST_VOLUME = 0.01
@@ -46,20 +46,20 @@ def agreed_views(
         further all around. ``None`` where there is no mask.
     """
     n_masks = sum(mask is not None for mask in masks)
-    strict, tolerant = (_bodies(hull, tables) for hull in carve_levels(tables, masks, (0, tolerance if n_masks >= 4 else 0)))
+    strict, tolerant = (bodies(hull, tables) for hull in carve_levels(tables, masks, (0, tolerance if n_masks >= 4 else 0)))
     size = tables.grid.voxel_size_m
     lowest = tolerant.argmax(axis=2)
     down = tolerant.any(axis=2) & (lowest * size < LEGS_M)
     tolerant |= down[..., None] & (np.arange(tolerant.shape[2]) < lowest[..., None])
     points = [tables.grid.centres(np.argwhere(hull)) for hull in (strict, tolerant)]
     surely, possibly = (
-        [None if mask is None else _view(camera, centres, radius) for camera, mask in zip(tables.rig, masks, strict=True)]
+        [None if mask is None else hull_view(camera, centres, radius) for camera, mask in zip(tables.rig, masks, strict=True)]
         for centres, radius in zip(points, (0.65 * size, 0.65 * size + REACH_M), strict=True)
     )
     return surely, possibly
 
 
-def _bodies(hull: np.ndarray, tables: CarvingTables) -> np.ndarray:
+def bodies(hull: np.ndarray, tables: CarvingTables) -> np.ndarray:
     """The hull without blobs that are too small for a person."""
     blobs = components(hull, tables.grid, max(1, round(LEAST_VOLUME / tables.grid.voxel_size_m**3)))
     kept = np.zeros_like(hull)
@@ -67,7 +67,7 @@ def _bodies(hull: np.ndarray, tables: CarvingTables) -> np.ndarray:
     return kept
 
 
-def _view(camera: Camera, points: np.ndarray, radius_m: float) -> np.ndarray:
+def hull_view(camera: Camera, points: np.ndarray, radius_m: float) -> np.ndarray:
     """Image of balls, all drawn as large as one at the middle depth."""
     uv, valid = project(camera, points)
     width, height = camera.size

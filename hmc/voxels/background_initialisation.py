@@ -15,7 +15,7 @@ from functools import partial
 import cv2
 import numpy as np
 
-from hmc.camera.empty_scene import empty_scenes, replace_people
+from hmc.camera.empty_scene import Masks, SamplePeople, empty_scenes, replace_people
 from hmc.camera.model import Rig
 from hmc.camera.people_cut import PeopleColors, View, cut_people, disc
 from hmc.camera.segmentation import BackgroundModel, SegmentationSettings, train_background
@@ -24,6 +24,7 @@ from hmc.io.recording import Recording, iterate_frames, open_recording
 from hmc.voxels.agreement import agreed_views
 from hmc.voxels.carving import CarvingTables, make_tables
 from hmc.voxels.grid import VoxelGrid
+from hmc.voxels.still_people import StillPerson, cut_still_people, find_still_people
 
 __all__ = ["UnseenPlaces", "learn_from_people", "with_unseen_places"]
 
@@ -52,6 +53,8 @@ class UnseenPlaces:
     small_unseen : tuple of ndarray of bool
         The same in the size of the small cameras.
     colors : tuple of PeopleColors or None
+    still : tuple of StillPerson
+        People who were there all the time and hardly moved.
     """
 
     cameras: tuple[int, ...]
@@ -59,6 +62,7 @@ class UnseenPlaces:
     unseen: tuple[np.ndarray, ...]
     small_unseen: tuple[np.ndarray, ...]
     colors: tuple[PeopleColors | None, ...]
+    still: tuple[StillPerson, ...] = ()
 
 
 def learn_from_people(
@@ -89,7 +93,14 @@ def learn_from_people(
     samples = _samples(recording, cameras, n_samples, span)
     rig = Rig(tuple(recording.rig[c].scaled(min(1.0, SMALL_PX / max(recording.rig[c].size))) for c in cameras))
     tables = make_tables(VoxelGrid.from_room(recording.room, COARSE_M, len(rig)), rig)
-    scenes = empty_scenes(samples, [camera.size for camera in rig], partial(agreed_views, tables), pool)
+    still: tuple[StillPerson, ...] = ()
+
+    def find_still(small: Sequence[Masks], people: SamplePeople) -> list[Masks] | None:
+        nonlocal still
+        still = find_still_people(tables, small, people.masks)
+        return [cut_still_people(still, frame) for frame in small] if still else None
+
+    scenes = empty_scenes(samples, [camera.size for camera in rig], partial(agreed_views, tables), pool, find_still)
     models = {}
     for i, c in enumerate(cameras):
         # Each image is let go once it is learnt from: large ones and the growing models would not fit side by side.
@@ -97,7 +108,7 @@ def learn_from_people(
         models[c] = train_background(images, settings, scenes[i].unseen)
     unseen = tuple(scene.unseen for scene in scenes)
     small = tuple(_resize(mask, camera.size) for mask, camera in zip(unseen, rig, strict=True))
-    return models, UnseenPlaces(tuple(cameras), tables, unseen, small, tuple(scene.colors for scene in scenes))
+    return models, UnseenPlaces(tuple(cameras), tables, unseen, small, tuple(scene.colors for scene in scenes), still)
 
 
 def with_unseen_places(
@@ -121,16 +132,25 @@ def with_unseen_places(
     unseen = places.small_unseen
     given = [masks[c] for c in places.cameras]
     differs = [None if mask is None else _resize(mask, size) for mask, size in zip(given, sizes, strict=True)]
+    small = [
+        None if images[c] is None or masks[c] is None else cv2.resize(images[c], size, interpolation=cv2.INTER_AREA)
+        for c, size in zip(places.cameras, sizes, strict=True)
+    ]
+    bodies = cut_still_people(places.still, small) if places.still else [None] * len(sizes)
     maybe = [None if differ is None else differ | hidden for differ, hidden in zip(differs, unseen, strict=True)]
     surely, possibly = agreed_views(places.tables, maybe)
 
     def complete(i: int) -> np.ndarray | None:
-        image, mask = images[places.cameras[i]], given[i]
+        image, mask, body = small[i], given[i], bodies[i]
         differ, sure, possible, colors = differs[i], surely[i], possibly[i], places.colors[i]
         if image is None or mask is None or differ is None or sure is None or possible is None or colors is None:
             return mask
-        small = cv2.resize(image, sizes[i], interpolation=cv2.INTER_AREA)
-        people = cut_people(View(small, differ & ~unseen[i], sure, possible, unseen[i]), colors)
+        hidden, differ = unseen[i], differ & ~unseen[i]
+        if body is not None:
+            hidden, differ = hidden & ~body, differ | body
+        people = cut_people(View(image, differ, sure, possible, hidden), colors)
+        if body is not None:
+            people |= body & possible
         whole = np.where(places.unseen[i], _resize(people, mask.shape[::-1]), mask)
         # The two meet in a seam.
         return cv2.morphologyEx(whole.view(np.uint8), cv2.MORPH_CLOSE, disc(whole, SEAM_PX)).view(bool)

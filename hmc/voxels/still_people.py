@@ -1,0 +1,169 @@
+"""People who stay where they are through a recording without frames of the empty scene.
+
+No difference from the scene tells of them: they are in all that is known of it. What does:
+
+- they sway: where a person stands the images stir as far as a person reaches, in all views, and not beside (`hmc.camera.standing`);
+- they are cut out by their colors, camera by camera, head to foot (`hmc.camera.standing_cut`);
+- what is cut out in the views is one body: a hull of a person's size from near the floor up, which fills what was cut out.
+
+Who was found by difference from the scene is not looked for again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hmc.camera.standing import Standing, find_standing
+from hmc.camera.standing_cut import BodyColors, Figure, cut_body, figure, learn_body
+from hmc.camera.stirring import stirring
+from hmc.voxels.agreement import bodies, hull_view
+from hmc.voxels.carving import CarvingTables, carve_levels
+
+__all__ = ["StillPerson", "cut_still_people", "find_still_people"]
+
+#: Samples by which a place is judged.
+JUDGES = 7
+#: A person's voxels are no further than this from their axis, metres.
+REACH_M = 0.5
+#: Somebody who fills more than this share of a figure in the samples is known already.
+KNOWN = 0.1
+#: Hulls of a person: litres, where they begin at most and end at least above the floor, metres, and the share of what is cut out in each
+#: view, or in the hull there, that both have.
+LITRES = (25.0, 220.0)
+LOWEST_M, TOP_M = 0.45, 1.05
+AGREE = 0.45
+
+
+@dataclass(frozen=True)
+class StillPerson:
+    """A person who hardly moves.
+
+    Attributes
+    ----------
+    place : Standing
+    figures : tuple of Figure, one a camera
+    colors : tuple of BodyColors, one a camera
+    """
+
+    place: Standing
+    figures: tuple[Figure, ...]
+    colors: tuple[BodyColors, ...]
+
+
+def find_still_people(
+    tables: CarvingTables, samples: Sequence[Sequence[np.ndarray | None]], people: Sequence[Sequence[np.ndarray | None]]
+) -> tuple[StillPerson, ...]:
+    """People who hardly move and were not found as differing from the scene.
+
+    Parameters
+    ----------
+    tables : CarvingTables
+        Of coarse voxels, and of cameras as large as the samples.
+    samples : sequence of sequences of ndarray of uint8, shape (height, width, 3), or None
+        Small images of all cameras, a frame at a time.
+    people : sequence of sequences of ndarray of bool, shape (height, width), or None
+        People who were found in them.
+
+    Returns
+    -------
+    tuple of StillPerson
+    """
+    whole = [k for k, frame in enumerate(samples) if all(image is not None for image in frame)]
+    if len(whole) < JUDGES:
+        return ()
+    samples, people = [samples[k] for k in whole], [people[k] for k in whole]
+    amounts, known = zip(*(stirring(images, masks) for images, masks in zip(zip(*samples), zip(*people))), strict=True)
+    grid = tables.grid
+    room = np.array([grid.origin, grid.origin + np.array(grid.shape) * grid.voxel_size_m])
+    places = find_standing(tables.rig, room, amounts, known)
+    if not places:
+        return ()
+    judges = np.unique(np.linspace(0, len(samples) - 1, JUDGES).round().astype(int))
+    samples, people = [samples[k] for k in judges], [people[k] for k in judges]
+    hulls = [bodies(carve_levels(tables, masks, (0,))[0], tables) for masks in people]
+    found: list[StillPerson] = []
+    for place in places:
+        if _share(tables, hulls, place) > KNOWN:
+            continue
+        person = _examine(tables, samples, hulls, place)
+        if person is not None and all(np.hypot(person.place.x - one.place.x, person.place.y - one.place.y) > REACH_M for one in found):
+            found.append(person)
+    return tuple(found)
+
+
+def cut_still_people(
+    still: Sequence[StillPerson], images: Sequence[np.ndarray | None]
+) -> list[np.ndarray | None]:
+    """Where people who hardly move are in one frame.
+
+    Parameters
+    ----------
+    still : sequence of StillPerson
+    images : sequence of ndarray of uint8, shape (height, width, 3), or None; one a camera
+        Small.
+
+    Returns
+    -------
+    list of ndarray of bool, shape (height, width), or None; one a camera
+    """
+    return [
+        None if image is None else np.logical_or.reduce([cut_body(image, None, one.figures[c], one.colors[c]) for one in still])
+        for c, image in enumerate(images)
+    ]
+
+
+def _examine(tables: CarvingTables, samples, hulls: Sequence[np.ndarray], place: Standing) -> StillPerson | None:
+    """The person at a place, or None if the views do not show one body there."""
+    for last in (False, True):
+        others = [_others(tables, hull, place) for hull in hulls]
+        figures = tuple(figure(camera, place) for camera in tables.rig)
+        colors = tuple(
+            learn_body([frame[c] for frame in samples], [masks[c] for masks in others], figures[c]) for c in range(len(tables.rig))
+        )
+        measured = []
+        for frame, masks in zip(samples, others, strict=True):
+            cuts = [cut_body(image, mask, *one) for image, mask, *one in zip(frame, masks, figures, colors, strict=True)]
+            measured.append(_measure(tables, place, cuts, masks, figures))
+        litres, lowest, top, x, y, *agree = np.median(np.array(measured), axis=0)
+
+        if not (LITRES[0] <= litres <= LITRES[1] and lowest <= LOWEST_M and top >= TOP_M and np.sort(agree)[1] >= AGREE):
+            return None
+        if not last:
+            place = replace(place, x=float(x), y=float(y), stature_m=float(top))
+    return StillPerson(place, figures, colors)
+
+
+def _measure(tables: CarvingTables, place: Standing, cuts, others, figures: Sequence[Figure]) -> list[float]:
+    """Litres of the hull of what was cut out, its lowest and highest point, its middle in x and y, and how well each view agrees with it."""
+    grid = tables.grid
+    filled = [cut | (mask & one.reach) for cut, mask, one in zip(cuts, others, figures, strict=True)]
+    points = grid.centres(np.argwhere(carve_levels(tables, filled, (0,))[0]))
+    points = points[np.hypot(points[:, 0] - place.x, points[:, 1] - place.y) <= REACH_M]
+    if len(points) == 0:
+        return [0.0, np.inf, 0.0, place.x, place.y, *([0.0] * len(cuts))]
+    agree = []
+    for camera, cut, mask in zip(tables.rig, cuts, others, strict=True):
+        seen = hull_view(camera, points, 0.65 * grid.voxel_size_m)
+        either = (seen | cut) & ~mask
+        agree.append(float((seen & cut & ~mask).sum() / either.sum()) if either.any() else 1.0)
+    top = float(np.quantile(points[:, 2], 0.995)) + grid.voxel_size_m / 2
+    return [1000 * len(points) * grid.voxel_size_m**3, float(points[:, 2].min()), top, *points[:, :2].mean(axis=0).tolist(), *agree]
+
+
+def _others(tables: CarvingTables, hull: np.ndarray, place: Standing) -> list[np.ndarray]:
+    """Where in each view people are who stand elsewhere."""
+    points = tables.grid.centres(np.argwhere(hull))
+    points = points[np.hypot(points[:, 0] - place.x, points[:, 1] - place.y) > 0.8 * REACH_M]
+    return [hull_view(camera, points, 0.65 * tables.grid.voxel_size_m) for camera in tables.rig]
+
+
+def _share(tables: CarvingTables, hulls: Sequence[np.ndarray], place: Standing) -> float:
+    """Share of a place's column, as high as the person, that known people fill on the mean."""
+    grid = tables.grid
+    near = grid.centres(np.argwhere(np.ones((*grid.shape[:2], 1), bool)))[:, :2].reshape(*grid.shape[:2], 2)
+    column = np.hypot(near[..., 0] - place.x, near[..., 1] - place.y) <= 0.1 * place.stature_m
+    high = round(place.stature_m / grid.voxel_size_m)
+    return float(np.mean([hull[column][:, :high].mean() for hull in hulls]))
