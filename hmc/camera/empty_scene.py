@@ -22,7 +22,18 @@ import numpy as np
 from hmc.camera.background import masked_median, stable_background
 from hmc.camera.people_cut import PeopleColors, View, cut_people, disc, learn_colors
 
-__all__ = ["EmptyScene", "SamplePeople", "Views", "empty_scenes", "replace_people"]
+__all__ = [
+    "EmptyScene",
+    "Masks",
+    "SamplePeople",
+    "Views",
+    "add_bodies",
+    "cut_samples",
+    "empty_scenes",
+    "replace_people",
+    "scenes_behind",
+    "shrunk",
+]
 
 Masks = Sequence[np.ndarray | None]
 #: From the masks of all cameras to what the cameras agree on in each view: surely people, and possibly people.
@@ -60,25 +71,25 @@ class EmptyScene:
 
 @dataclass(frozen=True)
 class SamplePeople:
-    """People cut out of samples.
+    """People cut out of small samples.
 
     Attributes
     ----------
-    masks : list of lists of ndarray of bool, shape (height, width), or None
+    masks : sequence of sequences of ndarray of bool, shape (height, width), or None
         One a camera, a frame at a time; None where there is no image.
-    colors : list of PeopleColors or None, one a camera
+    colors : sequence of PeopleColors or None, one a camera
+        By which they were cut out.
+    scenes : sequence of (ndarray of uint8, ndarray of bool), one a camera
+        The scene without them, small, and where it was hardly ever seen.
     """
 
-    masks: list[Masks]
-    colors: list[PeopleColors | None]
+    masks: Sequence[Masks]
+    colors: Sequence[PeopleColors | None]
+    scenes: Sequence[tuple[np.ndarray, np.ndarray]]
 
 
 def empty_scenes(
-    samples: Sequence[Masks],
-    sizes: Sequence[tuple[int, int]],
-    views: Views,
-    pool: Executor | None = None,
-    still: Callable[[Sequence[Masks], SamplePeople], Sequence[Masks] | None] | None = None,
+    samples: Sequence[Masks], sizes: Sequence[tuple[int, int]], views: Views, pool: Executor | None = None
 ) -> list[EmptyScene]:
     """The scene of each camera without the people in it.
 
@@ -92,29 +103,58 @@ def empty_scenes(
         What cameras agree on, for masks of these sizes.
     pool : concurrent.futures.Executor, optional
         Threads to spread the cameras over; the result does not depend on it.
-    still : callable, optional
-        From the small samples, and the people who were found in them, to masks of people who do not differ from the scene, as they
-        hardly move; None where there are none.
 
     Returns
     -------
     list of EmptyScene, one a camera
     """
-    run = map if pool is None else pool.map
-    n_cameras = len(sizes)
-    small = [
+    return scenes_behind(samples, cut_samples(shrunk(samples, sizes), views, pool), pool)
+
+
+def shrunk(samples: Sequence[Masks], sizes: Sequence[tuple[int, int]]) -> list[list[np.ndarray | None]]:
+    """The samples, a frame at a time, each camera's made as small as its (width, height)."""
+    return [
         [None if image is None else cv2.resize(image, size, interpolation=cv2.INTER_AREA) for image, size in zip(frame, sizes, strict=True)]
         for frame in samples
     ]
-    known = list(run(lambda c: stable_background(_of(small, c)), range(n_cameras)))
-    nobody: Sequence[Masks] = [[None] * n_cameras for _ in small]
+
+
+def cut_samples(small: Sequence[Masks], views: Views, pool: Executor | None = None) -> SamplePeople:
+    """People cut out of small samples; other parameters as of `empty_scenes`."""
+    run = map if pool is None else pool.map
+    n_cameras = len(small[0])
+    people = SamplePeople(
+        [[None] * n_cameras for _ in small],
+        [None] * n_cameras,
+        list(run(lambda c: stable_background(_of(small, c)), range(n_cameras))),
+    )
     for n_round in range(ROUNDS):
-        people = _find_people(small, known, views, run, nobody, n_round)
-        known = list(run(_scene, (_of(small, c) for c in range(n_cameras)), (_of(people.masks, c) for c in range(n_cameras))))
-    bodies = None if still is None else still(small, people)
-    if bodies is not None:
-        people = _find_people(small, known, views, run, bodies, ROUNDS)
-    scenes = run(_scene, (_of(samples, c) for c in range(n_cameras)), (_of(people.masks, c) for c in range(n_cameras)))
+        people = _find_people(small, people.scenes, views, run, None, n_round)
+    return people
+
+
+def add_bodies(
+    small: Sequence[Masks], people: SamplePeople, bodies: Sequence[Masks], views: Views, pool: Executor | None = None
+) -> SamplePeople:
+    """People cut out of small samples once more, with bodies that are people though they do not differ from the scene.
+
+    Parameters
+    ----------
+    small : sequence of sequences of ndarray of uint8, shape (height, width, 3), or None
+    people : SamplePeople
+        Those who were found without.
+    bodies : sequence of sequences of ndarray of bool, shape (height, width), or None
+    views, pool
+        As of `empty_scenes`.
+    """
+    return _find_people(small, people.scenes, views, map if pool is None else pool.map, bodies, ROUNDS)
+
+
+def scenes_behind(samples: Sequence[Masks], people: SamplePeople, pool: Executor | None = None) -> list[EmptyScene]:
+    """The scene of each camera, in the samples' full size, behind people who were cut out of them."""
+    run = map if pool is None else pool.map
+    cameras = range(len(people.colors))
+    scenes = run(_scene, (_of(samples, c) for c in cameras), (_of(people.masks, c) for c in cameras))
     return [EmptyScene(scene, unseen, color) for (scene, unseen), color in zip(scenes, people.colors, strict=True)]
 
 
@@ -129,8 +169,9 @@ def _of(frames: Sequence[Masks], camera: int) -> list[np.ndarray]:
     return [entry for frame in frames if (entry := frame[camera]) is not None]
 
 
-def _find_people(small, known, views: Views, run, bodies: Sequence[Masks], n_round: int) -> SamplePeople:
-    """People in the samples, as the scene known so far, bodies that hardly move, the other cameras and the colors tell; their colors."""
+def _find_people(small, known, views: Views, run, bodies: Sequence[Masks] | None, n_round: int) -> SamplePeople:
+    """People in the samples, as the scene known so far, bodies in it, the other cameras and the colors tell."""
+    bodies = [[None] * len(frame) for frame in small] if bodies is None else bodies
     masks = [
         [None if image is None else _with(_differs(image, *known[c]), body[c]) for c, image in enumerate(frame)]
         for frame, body in zip(small, bodies, strict=True)
@@ -138,23 +179,24 @@ def _find_people(small, known, views: Views, run, bodies: Sequence[Masks], n_rou
     agreed = list(run(views, masks))
     cases: list[list[View]] = [[] for _ in known]
     for images, differs, (surely, possibly), body in zip(small, masks, agreed, bodies, strict=True):
-        for c, (image, differ) in enumerate(zip(images, differs, strict=True)):
+        for c, (image, differ, more) in enumerate(zip(images, differs, body, strict=True)):
             if image is not None and differ is not None:
-                unseen = known[c][1] if body[c] is None else known[c][1] & ~body[c]
+                unseen = known[c][1] if more is None else known[c][1] & ~more
                 # At first, what changes all the time is people; later, where the scene is not known, colors decide.
                 differ = differ if n_round == 0 else differ & ~unseen
                 cases[c].append(View(image, differ, surely[c], possibly[c], unseen))
     colors = list(run(learn_colors, cases))
-    cut = [iter(each) for each in run(_cut_all, cases, colors)]
-    found = [[None if image is None else next(cut[c]) for c, image in enumerate(frame)] for frame in small]
-    # What was cut out head to foot is not given back to the scene for colors that the whole image has.
-    return SamplePeople(
-        [[_with(mask, body[c]) for c, mask in enumerate(frame)] for frame, body in zip(found, bodies, strict=True)], colors
-    )
+    cut = [iter(found) for found in run(_cut_all, cases, colors)]
+    people = [
+        [None if image is None else _with(next(cut[c]), body[c]) for c, image in enumerate(frame)]
+        for frame, body in zip(small, bodies, strict=True)
+    ]
+    cameras = range(len(known))
+    return SamplePeople(people, colors, list(run(_scene, (_of(small, c) for c in cameras), (_of(people, c) for c in cameras))))
 
 
-def _with(mask: np.ndarray | None, more: np.ndarray | None) -> np.ndarray | None:
-    return mask if mask is None or more is None else mask | more
+def _with(mask: np.ndarray, more: np.ndarray | None) -> np.ndarray:
+    return mask if more is None else mask | more
 
 
 def _cut_all(views: Sequence[View], colors: PeopleColors | None) -> list[np.ndarray]:

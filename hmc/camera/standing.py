@@ -57,9 +57,7 @@ def half_width(height: np.ndarray, stature_m: float) -> np.ndarray:
     return np.where(share <= 1, np.interp(share, *PROFILE.T) * stature_m, 0.0)
 
 
-def find_standing(
-    rig: Rig, room: np.ndarray, amounts: Sequence[np.ndarray], known: Sequence[np.ndarray], most: int = 8
-) -> list[Standing]:
+def find_standing(rig: Rig, room: np.ndarray, amounts: Sequence[np.ndarray], known: Sequence[np.ndarray], most: int = 8) -> list[Standing]:
     """Places at which a person may stand, best first.
 
     Parameters
@@ -76,7 +74,7 @@ def find_standing(
     -------
     list of Standing
     """
-    (x0, y0), (x1, y1) = np.asarray(room)[:, :2] 
+    (x0, y0), (x1, y1) = np.asarray(room)[:, :2]
     places = np.stack(np.meshgrid(np.arange(x0, x1, STEP_M), np.arange(y0, y1, STEP_M), indexing="ij"), axis=-1).reshape(-1, 2)
     contrasts = np.stack([_contrasts(camera, places, *view) for camera, *view in zip(rig, amounts, known, strict=True)])
     shown = np.isfinite(contrasts)
@@ -128,8 +126,8 @@ def _figure(rows: np.ndarray, columns: np.ndarray, stature_m: float) -> np.ndarr
 def _sample(camera: Camera, points: np.ndarray, amount: np.ndarray, known: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Values of the pixels at points (n, 3), 0 where they are not known, and whether they are, 0 or 1."""
     uv, valid = project(camera, points)
-    pixel = np.round(np.where(valid[:, None], uv, -1)).astype(int)
-    seen = ((pixel >= 0) & (pixel < camera.size)).all(axis=1)
+    pixel = np.round(np.where(valid[:, None] & (np.abs(uv) < 1e6), uv, -1)).astype(int)
+    seen = np.all((pixel >= 0) & (pixel < camera.size), axis=1)
     u, v = np.where(seen[:, None], pixel, 0).T
-    told = (seen & known[v, u]).astype(np.float32)
+    told = np.asarray(seen & known[v, u], np.float32)
     return amount[v, u] * told, told

@@ -1,4 +1,4 @@
-"""A person who hardly moves, cut out of one camera's images: it is known where the person stands, and what belongs to them is told by color.
+"""A person who hardly moves, cut out of one camera's images: where the person stands is known, what belongs to the person is told by color.
 
 A standing person's clothes change from head to foot, and so does what is behind them: dark trousers before a dark floor are told from it
 by little. So a graph cut (Rother et al. (2004), "GrabCut") has models of its own for the shanks, the thighs, the trunk and the head.
@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import cv2
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
 from hmc.camera.model import Camera, project
-from hmc.camera.people_cut import FEWEST_PX, disc
+from hmc.camera.people_cut import FEWEST_PX
 from hmc.camera.standing import Standing, half_width
 
 __all__ = ["BodyColors", "Figure", "cut_body", "figure", "learn_body"]
@@ -23,8 +24,8 @@ __all__ = ["BodyColors", "Figure", "cut_body", "figure", "learn_body"]
 PARTS = ((0.0, 0.25), (0.25, 0.5), (0.5, 0.8), (0.8, 1.2))
 #: How far from a figure its person may reach, and how far the surroundings are looked at, metres.
 REACH_M, AROUND_M = 0.15, 0.28
-#: Share of a figure's width that is surely the person, above this height in statures: below, the floor is seen between the legs.
-CORE_WIDTH, CORE_FROM = 0.4, 0.5
+#: Share of a figure's width that is surely the person, between these heights in statures: below, the floor is seen between the legs.
+CORE_WIDTH, CORE_FROM, CORE_TO = 0.4, 0.5, 0.97
 #: Times that colors are learnt of what was cut out with the last ones.
 ROUNDS = 3
 #: A pixel of the core shows the person where it is no further than this from what it showed in the samples, grey levels.
@@ -81,9 +82,8 @@ def figure(camera: Camera, place: Standing) -> Figure:
     parts = np.full(camera.size[::-1], -1, np.int8)
     for k, (low, high) in enumerate(PARTS):
         parts[_drawn(camera, place, low * top, high * top, AROUND_M)] = k
-    return Figure(
-        _drawn(camera, place, 0, top), _drawn(camera, place, CORE_FROM * top, 0.97 * top, 0, CORE_WIDTH), _drawn(camera, place, 0, top, REACH_M), parts
-    )
+    core = _drawn(camera, place, CORE_FROM * top, CORE_TO * top, share=CORE_WIDTH)
+    return Figure(_drawn(camera, place, 0, top), core, _drawn(camera, place, 0, top, REACH_M), parts)
 
 
 def learn_body(images: Sequence[np.ndarray], others: Sequence[np.ndarray], figure: Figure) -> BodyColors:
@@ -186,9 +186,7 @@ def _cut(image: np.ndarray, labels: np.ndarray, figure: Figure, models) -> np.nd
         given = np.where(mine, labels[box], result[box] % 2)
         if given.max() <= cv2.GC_FGD and (given.min() == given.max() or not mine.any()):
             continue
-        cv2.grabCut(
-            np.ascontiguousarray(image[box]), given, None, colors[0].copy(), colors[1].copy(), 1, cv2.GC_EVAL_FREEZE_MODEL
-        )  # type: ignore[call-overload]
+        cv2.grabCut(np.ascontiguousarray(image[box]), given, None, colors[0].copy(), colors[1].copy(), 1, cv2.GC_EVAL_FREEZE_MODEL)  # type: ignore[call-overload]
         result[box][mine] = given[mine]
     return result
 
@@ -207,6 +205,6 @@ def _drawn(camera: Camera, place: Standing, low: float, high: float, grow: float
     uv, valid = project(camera, rings.reshape(-1, 3))
     if valid.all() and np.abs(uv).max() < 1e5:
         uv = uv.reshape(len(heights), POINTS, 2).round().astype(np.int32)
-        for below, above in zip(uv[:-1], uv[1:], strict=True):
+        for below, above in pairwise(uv):
             cv2.fillConvexPoly(mask, cv2.convexHull(np.concatenate([below, above])), 1)
     return mask.view(bool)

@@ -15,10 +15,11 @@ from functools import partial
 import cv2
 import numpy as np
 
-from hmc.camera.empty_scene import Masks, SamplePeople, empty_scenes, replace_people
+from hmc.camera.empty_scene import add_bodies, cut_samples, replace_people, scenes_behind, shrunk
 from hmc.camera.model import Rig
 from hmc.camera.people_cut import PeopleColors, View, cut_people, disc
 from hmc.camera.segmentation import BackgroundModel, SegmentationSettings, train_background
+from hmc.camera.standing import Standing
 from hmc.errors import InputError
 from hmc.io.recording import Recording, iterate_frames, open_recording
 from hmc.voxels.agreement import agreed_views
@@ -54,7 +55,9 @@ class UnseenPlaces:
         The same in the size of the small cameras.
     colors : tuple of PeopleColors or None
     still : tuple of StillPerson
-        People who were there all the time and hardly moved.
+        People who were there all the time and hardly moved (`hmc.voxels.still_people`).
+    doubted : tuple of Standing
+        Places at which a person seemed to stand, but of which the views do not show one body.
     """
 
     cameras: tuple[int, ...]
@@ -63,6 +66,7 @@ class UnseenPlaces:
     small_unseen: tuple[np.ndarray, ...]
     colors: tuple[PeopleColors | None, ...]
     still: tuple[StillPerson, ...] = ()
+    doubted: tuple[Standing, ...] = ()
 
 
 def learn_from_people(
@@ -93,22 +97,22 @@ def learn_from_people(
     samples = _samples(recording, cameras, n_samples, span)
     rig = Rig(tuple(recording.rig[c].scaled(min(1.0, SMALL_PX / max(recording.rig[c].size))) for c in cameras))
     tables = make_tables(VoxelGrid.from_room(recording.room, COARSE_M, len(rig)), rig)
-    still: tuple[StillPerson, ...] = ()
-
-    def find_still(small: Sequence[Masks], people: SamplePeople) -> list[Masks] | None:
-        nonlocal still
-        still = find_still_people(tables, small, people.masks)
-        return [cut_still_people(still, frame) for frame in small] if still else None
-
-    scenes = empty_scenes(samples, [camera.size for camera in rig], partial(agreed_views, tables), pool, find_still)
+    views = partial(agreed_views, tables)
+    small = shrunk(samples, [camera.size for camera in rig])
+    people = cut_samples(small, views, pool)
+    still, doubted = find_still_people(tables, small, people.masks)
+    if still:
+        people = add_bodies(small, people, [cut_still_people(still, frame) for frame in small], views, pool)
+    scenes = scenes_behind(samples, people, pool)
     models = {}
     for i, c in enumerate(cameras):
         # Each image is let go once it is learnt from: large ones and the growing models would not fit side by side.
         images = (replace_people(image, scenes[i].image) for image in _take(samples, i) if image is not None)
         models[c] = train_background(images, settings, scenes[i].unseen)
     unseen = tuple(scene.unseen for scene in scenes)
-    small = tuple(_resize(mask, camera.size) for mask, camera in zip(unseen, rig, strict=True))
-    return models, UnseenPlaces(tuple(cameras), tables, unseen, small, tuple(scene.colors for scene in scenes), still)
+    small_unseen = tuple(_resize(mask, camera.size) for mask, camera in zip(unseen, rig, strict=True))
+    colors = tuple(scene.colors for scene in scenes)
+    return models, UnseenPlaces(tuple(cameras), tables, unseen, small_unseen, colors, still, doubted)
 
 
 def with_unseen_places(
@@ -132,10 +136,7 @@ def with_unseen_places(
     unseen = places.small_unseen
     given = [masks[c] for c in places.cameras]
     differs = [None if mask is None else _resize(mask, size) for mask, size in zip(given, sizes, strict=True)]
-    small = [
-        None if images[c] is None or masks[c] is None else cv2.resize(images[c], size, interpolation=cv2.INTER_AREA)
-        for c, size in zip(places.cameras, sizes, strict=True)
-    ]
+    (small,) = shrunk([[None if masks[c] is None else images[c] for c in places.cameras]], sizes)
     bodies = cut_still_people(places.still, small) if places.still else [None] * len(sizes)
     maybe = [None if differ is None else differ | hidden for differ, hidden in zip(differs, unseen, strict=True)]
     surely, possibly = agreed_views(places.tables, maybe)

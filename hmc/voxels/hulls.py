@@ -221,6 +221,8 @@ def _learn(recording: Recording, settings: FrontendSettings, report: Report) -> 
         with ThreadPoolExecutor(settings.threads or os.cpu_count() or 1) as pool:
             learnt, places = learn_from_people(recording, left, settings.segmentation, settings.median_frames, settings.median_span, pool)
         models |= learnt
+        for line in _say_still(places):
+            report(line)
     return tuple(models.get(c) for c in range(len(names))), places
 
 
@@ -275,6 +277,15 @@ def _read_ahead(items: Iterable[T], reader: ThreadPoolExecutor) -> Iterator[T]:
             yield item  # type: ignore[misc]
     finally:
         coming.cancel()
+
+
+def _say_still(places: UnseenPlaces) -> Iterator[str]:
+    for place in (one.place for one in places.still):
+        at = f"({place.x:.1f}, {place.y:.1f}) m"
+        yield f"a person who hardly moves stands at {at}: found by swaying and told by colors, which is less sure; film the empty scene"
+    for place in places.doubted:
+        at = f"({place.x:.1f}, {place.y:.1f}) m"
+        yield f"a person may stand at {at} and hardly move: the images stir there, but the views do not show one body; not counted"
 
 
 def _say_changed(name: str, first: int, last: int) -> str:

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hmc.camera.standing import Standing, find_standing
+from hmc.camera.standing import APART_M, Standing, find_standing
 from hmc.camera.standing_cut import BodyColors, Figure, cut_body, figure, learn_body
 from hmc.camera.stirring import stirring
 from hmc.voxels.agreement import bodies, hull_view
@@ -55,7 +55,7 @@ class StillPerson:
 
 def find_still_people(
     tables: CarvingTables, samples: Sequence[Sequence[np.ndarray | None]], people: Sequence[Sequence[np.ndarray | None]]
-) -> tuple[StillPerson, ...]:
+) -> tuple[tuple[StillPerson, ...], tuple[Standing, ...]]:
     """People who hardly move and were not found as differing from the scene.
 
     Parameters
@@ -69,34 +69,37 @@ def find_still_people(
 
     Returns
     -------
-    tuple of StillPerson
+    found : tuple of StillPerson
+    doubted : tuple of Standing
+        Places where the images stir as if a person stood there, but of which the views do not show one body.
     """
     whole = [k for k, frame in enumerate(samples) if all(image is not None for image in frame)]
     if len(whole) < JUDGES:
-        return ()
-    samples, people = [samples[k] for k in whole], [people[k] for k in whole]
-    amounts, known = zip(*(stirring(images, masks) for images, masks in zip(zip(*samples), zip(*people))), strict=True)
+        return (), ()
+    images, masks = ([[one for one in frames[k] if one is not None] for k in whole] for frames in (samples, people))
+    stirred = [stirring([frame[c] for frame in images], [frame[c] for frame in masks]) for c in range(len(tables.rig))]
     grid = tables.grid
     room = np.array([grid.origin, grid.origin + np.array(grid.shape) * grid.voxel_size_m])
-    places = find_standing(tables.rig, room, amounts, known)
+    places = find_standing(tables.rig, room, [amount for amount, _ in stirred], [known for _, known in stirred])
     if not places:
-        return ()
-    judges = np.unique(np.linspace(0, len(samples) - 1, JUDGES).round().astype(int))
-    samples, people = [samples[k] for k in judges], [people[k] for k in judges]
-    hulls = [bodies(carve_levels(tables, masks, (0,))[0], tables) for masks in people]
+        return (), ()
+    judges = np.unique(np.linspace(0, len(images) - 1, JUDGES).round().astype(int))
+    images = [images[k] for k in judges]
+    hulls = [bodies(carve_levels(tables, masks[k], (0,))[0], tables) for k in judges]
     found: list[StillPerson] = []
+    doubted: list[Standing] = []
     for place in places:
         if _share(tables, hulls, place) > KNOWN:
             continue
-        person = _examine(tables, samples, hulls, place)
-        if person is not None and all(np.hypot(person.place.x - one.place.x, person.place.y - one.place.y) > REACH_M for one in found):
+        person = _examine(tables, images, hulls, place)
+        if person is None:
+            doubted.append(place)
+        elif all(np.hypot(person.place.x - one.place.x, person.place.y - one.place.y) > APART_M for one in found):
             found.append(person)
-    return tuple(found)
+    return tuple(found), tuple(doubted)
 
 
-def cut_still_people(
-    still: Sequence[StillPerson], images: Sequence[np.ndarray | None]
-) -> list[np.ndarray | None]:
+def cut_still_people(still: Sequence[StillPerson], images: Sequence[np.ndarray | None]) -> list[np.ndarray | None]:
     """Where people who hardly move are in one frame.
 
     Parameters
@@ -125,7 +128,7 @@ def _examine(tables: CarvingTables, samples, hulls: Sequence[np.ndarray], place:
         )
         measured = []
         for frame, masks in zip(samples, others, strict=True):
-            cuts = [cut_body(image, mask, *one) for image, mask, *one in zip(frame, masks, figures, colors, strict=True)]
+            cuts = [cut_body(image, mask, *one) for image, mask, one in zip(frame, masks, zip(figures, colors, strict=True), strict=True)]
             measured.append(_measure(tables, place, cuts, masks, figures))
         litres, lowest, top, x, y, *agree = np.median(np.array(measured), axis=0)
 
@@ -137,7 +140,7 @@ def _examine(tables: CarvingTables, samples, hulls: Sequence[np.ndarray], place:
 
 
 def _measure(tables: CarvingTables, place: Standing, cuts, others, figures: Sequence[Figure]) -> list[float]:
-    """Litres of the hull of what was cut out, its lowest and highest point, its middle in x and y, and how well each view agrees with it."""
+    """Litres of the hull of what was cut out, its lowest and highest point, its middle in x and y, and how well each view agrees."""
     grid = tables.grid
     filled = [cut | (mask & one.reach) for cut, mask, one in zip(cuts, others, figures, strict=True)]
     points = grid.centres(np.argwhere(carve_levels(tables, filled, (0,))[0]))
