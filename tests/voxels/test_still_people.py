@@ -1,0 +1,72 @@
+"""People who stay where they are through a whole recording without frames of the empty scene; and furniture, which is none."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hmc.camera.model import Rig
+from hmc.camera.standing import Standing
+from hmc.camera.standing_cut import figure
+from hmc.voxels.carving import make_tables
+from hmc.voxels.grid import VoxelGrid
+from hmc.voxels.still_people import cut_still_people, find_still_people
+
+PLACE = Standing(0.3, -0.2, 1.7, 1.0)
+N = 10
+
+
+def drawn(ring, sway_m):
+    """Tables, and images of a person in checked clothes before a dull room, who sways by so many metres; nobody is known in them."""
+    rig = Rig(tuple(camera.scaled(2.0) for camera in ring))
+    tables = make_tables(VoxelGrid(np.array([-1.5, -1.5, 0.0]), 0.05, (60, 60, 42)), rig)
+    rng = np.random.default_rng(0)
+    samples = []
+    empty = [rng.integers(100, 115, (*camera.size[::-1], 3)) for camera in rig]
+    checks = (np.indices((240, 320)).sum(axis=0) // 5 % 2)[..., None] * np.array([10, 20, 60])
+    for k in range(N):
+        here = replace(PLACE, x=PLACE.x + sway_m * np.sin(2.1 * k), y=PLACE.y + sway_m * np.cos(1.3 * k))
+        frame = []
+        for camera, scene in zip(rig, empty, strict=True):
+            moved = np.roll(checks, round(100 * sway_m * np.sin(2.1 * k)), axis=1)
+            seen = np.where(figure(camera, here).body[..., None], np.array([40, 50, 140]) + moved, scene)
+            frame.append((seen + rng.normal(0, 1.5, seen.shape)).clip(0, 255).astype(np.uint8))
+        samples.append(frame)
+    return tables, samples, [[np.zeros(image.shape[:2], bool) for image in frame] for frame in samples]
+
+
+@pytest.fixture(scope="module")
+def swaying(ring):
+    tables, samples, nobody = drawn(ring, 0.03)
+    return tables, samples, *find_still_people(tables, samples, nobody)
+
+
+def test_who_sways_in_place_is_found_at_the_right_depth(swaying):
+    _, _, found, doubted = swaying
+    assert len(found) == 1 and not doubted
+    place = found[0].place
+    assert np.hypot(place.x - PLACE.x, place.y - PLACE.y) < 0.1 and abs(place.stature_m - PLACE.stature_m) < 0.12
+
+
+def test_who_sways_in_place_is_cut_out_in_every_view_that_has_an_image(swaying):
+    tables, samples, found, _ = swaying
+    first, *others = cut_still_people(found, [None, *samples[4][1:]])
+    assert first is None
+    for camera, mask in zip(tables.rig.cameras[1:], others, strict=True):
+        truth = figure(camera, PLACE).body
+        assert (mask & truth).sum() > 0.75 * (mask | truth).sum()
+
+
+def test_what_does_not_sway_is_furniture(ring):
+    assert find_still_people(*drawn(ring, 0.0)) == ((), ())
+
+
+def test_who_is_known_already_is_not_found_once_more(ring):
+    tables, samples, nobody = drawn(ring, 0.03)
+    people = [[figure(camera, PLACE).body for camera in tables.rig] if k % 2 else masks for k, masks in enumerate(nobody)]
+    assert find_still_people(tables, samples, people)[0] == ()
+
+
+def test_too_few_samples_tell_nothing(ring):
+    tables, samples, nobody = drawn(ring, 0.03)
+    assert find_still_people(tables, samples[:4], nobody[:4]) == ((), ())
