@@ -26,11 +26,12 @@ from hmc.body.proportions import make_body
 from hmc.io.journal import append_journal, open_journal
 from hmc.io.masks import kept_frames
 from hmc.io.recording import Recording
-from hmc.io.results import TrackTable
+from hmc.io.results import PoseStates, TrackTable
 from hmc.pose.follow import FollowOptions, PosedPeople
 from hmc.pose.method import SURFACE_POINTS, Capture, PoseMethod, Subject, make_subject
 from hmc.pose.mixtures import N_MIXTURES, BackwardSettings, choose_path, mixed_poses, mixture
-from hmc.pose.objectives.symmetric import Symmetric
+from hmc.pose.objectives.symmetric import Symmetric, body_distance
+from hmc.pose.occluders import HiddenPlaces, learn_hidden_places, unseen_voxels
 from hmc.pose.starts.fit_body import with_known_stature
 from hmc.pose.starts.own_body import choose_frames, own_body
 from hmc.pose.steps.polish import PolishSettings, fine_objective, polish
@@ -46,6 +47,8 @@ __all__ = ["backward"]
 
 #: Of the random numbers of a frame: those of the backward pass.
 BACKWARD = 3
+#: A ray that passes another's body as near as this may be of that one, metres: as wide as clothes are.
+OTHERS_M = 0.03
 
 
 @dataclass(frozen=True)
@@ -103,7 +106,9 @@ def backward(
     first, end = int(people.frames[fitted].min()), int(people.frames[fitted].max()) + 1
     if run.masks is None or kept_frames(run.masks, run.key, range(first, end)) is None:
         return replace(people, notes=(*people.notes, "silhouettes were not kept on disk: poses are those of one pass, forward in time"))
-    pass_ = _Pass(recording, tracks, settings, options, run, Capture(recording.fps, options.voxel_size_m, recording.room, recording.rig))
+    capture = Capture(recording.fps, options.voxel_size_m, recording.room, recording.rig)
+    places = learn_hidden_places(recording.rig, person_grid(recording, options.voxel_size_m), run, people.states)
+    pass_ = _Pass(recording, tracks, settings, options, run, capture, people.states, places)
     records = open_journal(run.journal, run.key)
     if records:
         bodies = {int(person): make_body(body, method.limits) for person, body in records[0]["bodies"].items()}
@@ -130,17 +135,35 @@ class _Pass:
     options: FollowOptions
     run: RunOptions
     capture: Capture
+    states: PoseStates
+    places: HiddenPlaces | None
 
     def views(self, frames: Iterable[int]) -> Iterator[tuple[int, dict[int, PersonView]]]:
-        """What some frames show of all people, in any order."""
+        """What some frames show of all people, in any order, by what the first pass tells of the scene and of the others' poses."""
+        bodies = {person: make_body({name: float(value) for name, value in body.items()}) for person, body in self.states.bodies.items()}
         grid = person_grid(self.recording, self.options.voxel_size_m)
         masks = kept_frames(self.run.masks or "", self.run.key, frames)
         for hull in stream_hulls(self.recording, grid, self.run.frontend, masks=masks):
-            yield hull.index, views_of(self.recording, grid, self.tracks, hull)
+            unseen = None if self.places is None else unseen_voxels(self.places, hull.masks)
+            views = views_of(self.recording, grid, self.tracks, hull, unseen=unseen)
+            rows = np.flatnonzero((self.states.frames == hull.index) & np.isfinite(self.states.states).all(axis=1))
+            poses = {person: (bodies[person], self.states.states[row]) for person, row in zip(self.states.persons[rows].tolist(), rows)}
+            yield hull.index, {person: _with_own_rays(view, person, poses) for person, view in views.items()}
 
     def rng(self, person: int, frame: int) -> np.random.Generator:
         """The random numbers of a person's frame."""
         return np.random.default_rng([self.options.seed, person, frame, BACKWARD])
+
+
+def _with_own_rays(view: PersonView, person: int, poses: Mapping[int, tuple[BodyModel, np.ndarray]]) -> PersonView:
+    """A person's view without the rays that another's pose covers: what another may be of asks nothing."""
+    if view.target is None or view.target.rays is None or not len(view.target.rays):
+        return view
+    rays = view.target.rays
+    for other, (body, state) in poses.items():
+        if other != person and len(rays):
+            rays = rays[body_distance(body, state[None], rays)[0] > OTHERS_M]
+    return replace(view, target=replace(view.target, rays=rays))
 
 
 def _bodies(pass_: _Pass, method: PoseMethod, people: PosedPeople, fitted: np.ndarray) -> dict[int, BodyModel]:

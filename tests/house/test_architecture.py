@@ -31,7 +31,7 @@ PERSON = STARTS | {"pose.legs", "pose.person"}
 MIXTURES = STEPS | {"pose.legs", "pose.mixtures"}
 FOLLOWING = PERSON | {"pose.records", "pose.follow"}
 METHODS = STARTS | MIXTURES | {"pose.recovery", "pose.methods"}
-POSE = METHODS | FOLLOWING | {"pose.backward", "pose.clear_views", "pose.smoothing", "pose.registry"}
+POSE = METHODS | FOLLOWING | {"pose.backward", "pose.clear_views", "pose.occluders", "pose.smoothing", "pose.registry"}
 METRICS = IO | {"metrics"}
 VIEW = VOXELS | {"body", "view"}
 EVERYTHING = POSE | METRICS | VIEW | {"check", "synthetic", "plugins"}
@@ -56,7 +56,8 @@ MAY_IMPORT = {
     "pose.records": PERSON | {"pose.records"},
     "pose.follow": FOLLOWING,
     "pose.mixtures": MIXTURES,
-    "pose.backward": FOLLOWING | MIXTURES | {"pose.backward"},
+    "pose.occluders": VIEWS,
+    "pose.backward": FOLLOWING | MIXTURES | {"pose.backward", "pose.occluders"},
     "pose.smoothing": FOLLOWING,
     "pose.clear_views": FOLLOWING,
     "pose.methods": METHODS,

@@ -25,6 +25,8 @@ STRICT_SHARE = np.float32(0.3)
 STRICT_CAP_M = np.float32(0.08)
 #: Distance that a place in the loose hull alone counts as, metres.
 LOOSE_M = np.float32(0.02)
+#: The same of a place that nothing is known of, metres.
+UNSEEN_M = np.float32(0.01)
 
 
 @dataclass(frozen=True)
@@ -85,6 +87,7 @@ def make_target(
     loose: np.ndarray | None = None,
     floor_z: float | None = None,
     new: Callable[[np.ndarray], np.ndarray] | None = None,
+    unseen: np.ndarray | None = None,
 ) -> HullTarget | None:
     """Prepare one person's hulls.
 
@@ -102,6 +105,9 @@ def make_target(
     new : callable, optional
         Which of some points, shape (n, 3), world, metres, show on silhouettes where the strict hull does not
         (`hmc.pose.views.uncovered`). What else is in the tolerant and in the loose hull is no place for a body then.
+    unseen : ndarray of int, shape (k, 3), optional
+        Voxels (i, j, k) that something hides from all cameras that do not show the person there (`hmc.pose.views.occluders`). A body may be
+        there at a small price.
 
     Returns
     -------
@@ -135,6 +141,11 @@ def make_target(
     distance += STRICT_SHARE * np.minimum(_distance_to(core, grid.voxel_size_m), STRICT_CAP_M)
     if loose is not None:
         distance = np.minimum(distance, _distance_to(maybe & needed, grid.voxel_size_m) + LOOSE_M)
+    if unseen is not None and len(unseen):
+        hidden = np.zeros(shape, bool)
+        inside = unseen[np.all((unseen >= low) & (unseen < low + shape), axis=1)] - low
+        hidden[tuple(inside.T)] = True
+        distance = np.minimum(distance, _distance_to(hidden, grid.voxel_size_m) + UNSEEN_M)
     if floor_z is not None:
         # Hulls end at the floor because voxels do. A toe that points down, as the body has no ankles, is not outside of them for that; how
         # deep a sole may sink is for `hmc.body.floor`.

@@ -100,7 +100,12 @@ def check_needs(needs: Collection[str]) -> frozenset[str]:
 
 
 def views_of(
-    recording: Recording, grid: VoxelGrid, tracks: TrackTable, hull: HullStep, needs: Collection[str] = ("hulls",)
+    recording: Recording,
+    grid: VoxelGrid,
+    tracks: TrackTable,
+    hull: HullStep,
+    needs: Collection[str] = ("hulls",),
+    unseen: np.ndarray | None = None,
 ) -> dict[int, PersonView]:
     """What a frame shows of every person who is tracked in it.
 
@@ -112,6 +117,8 @@ def views_of(
     hull : HullStep
     needs : collection of str
         Of `EVIDENCE`, without detections.
+    unseen : ndarray of int, shape (k, 3), optional
+        Voxels where the scene hides people (`hmc.pose.views.occluders.unseen_voxels`).
 
     Returns
     -------
@@ -127,14 +134,14 @@ def views_of(
     strict = [voxels[hull.strict[tuple(voxels.T)]] for voxels in tolerant]
     targets: list[HullTarget | None] = [None] * len(persons)
     if "hulls" in needs:
-        targets = _targets(recording, grid, hull, strict, tolerant)
+        targets = _targets(recording, grid, hull, strict, tolerant, unseen)
     return {
         person: PersonView(hull.index, target, *_voxels_and_skin(recording, grid, hull, own, fat, needs))
         for person, target, own, fat in zip(persons, targets, strict, tolerant, strict=True)
     }
 
 
-def _targets(recording, grid, hull, strict, tolerant) -> list[HullTarget | None]:
+def _targets(recording, grid, hull, strict, tolerant, unseen) -> list[HullTarget | None]:
     """Every person's hulls and rays. The tolerant hull is shared out among the people; what nobody got, and the rest of the loose one, may
     be any person's: a hand beyond a sleeve that is lost is a piece of its own."""
     spare, floor_z = hull.loose.copy(), float(recording.room[0, 2])
@@ -146,7 +153,7 @@ def _targets(recording, grid, hull, strict, tolerant) -> list[HullTarget | None]
         new = partial(on_uncovered_pixels, recording.rig, hull.masks, all_strict, spacing_m=grid.voxel_size_m)
     targets = []
     for k in range(len(strict)):
-        target = make_target(grid, strict[k], tolerant[k], spare, floor_z, new)
+        target = make_target(grid, strict[k], tolerant[k], spare, floor_z, new, unseen)
         if target is not None:
             others = grid.centres(np.concatenate([nothing, *strict[:k], *strict[k + 1 :]]))
             target = with_rays(target, recording.rig, hull.masks, others)
