@@ -3,6 +3,8 @@
 A filter knows only the frames before: a limb that it loses stays lost until the silhouettes show it again, and the body was fitted to the
 first second and a half. When the recording is over more is known:
 
+0. What the scene hides from single cameras is learnt from the first pass's poses (`hmc.pose.occluders`), and rays that another's
+   pose covers ask nothing of a person.
 1. The person's dimensions are fitted anew, to frames of the whole run (`hmc.pose.starts.own_body`).
 2. Each person is followed from the last frame to the first. Nothing is drawn at random but limbs that are lost: the pose of the frame after
    and the first pass's are refined side by side, so that a limb that was found again is followed back to where it was lost.
@@ -43,7 +45,7 @@ from hmc.tracking.resumable import person_grid
 from hmc.voxels.hulls import stream_hulls
 from hmc.voxels.run_options import RunOptions
 
-__all__ = ["backward"]
+__all__ = ["backward", "with_own_rays"]
 
 #: Of the random numbers of a frame: those of the backward pass.
 BACKWARD = 3
@@ -147,15 +149,18 @@ class _Pass:
             unseen = None if self.places is None else unseen_voxels(self.places, hull.masks)
             views = views_of(self.recording, grid, self.tracks, hull, unseen=unseen)
             rows = np.flatnonzero((self.states.frames == hull.index) & np.isfinite(self.states.states).all(axis=1))
-            poses = {person: (bodies[person], self.states.states[row]) for person, row in zip(self.states.persons[rows].tolist(), rows)}
-            yield hull.index, {person: _with_own_rays(view, person, poses) for person, view in views.items()}
+            poses = {
+                person: (bodies[person], self.states.states[row])
+                for person, row in zip(self.states.persons[rows].tolist(), rows, strict=True)
+            }
+            yield hull.index, {person: with_own_rays(view, person, poses) for person, view in views.items()}
 
     def rng(self, person: int, frame: int) -> np.random.Generator:
         """The random numbers of a person's frame."""
         return np.random.default_rng([self.options.seed, person, frame, BACKWARD])
 
 
-def _with_own_rays(view: PersonView, person: int, poses: Mapping[int, tuple[BodyModel, np.ndarray]]) -> PersonView:
+def with_own_rays(view: PersonView, person: int, poses: Mapping[int, tuple[BodyModel, np.ndarray]]) -> PersonView:
     """A person's view without the rays that another's pose covers: what another may be of asks nothing."""
     if view.target is None or view.target.rays is None or not len(view.target.rays):
         return view

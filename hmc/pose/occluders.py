@@ -27,7 +27,27 @@ from hmc.voxels.carving import pixel_of_voxel
 from hmc.voxels.grid import VoxelGrid
 from hmc.voxels.run_options import RunOptions
 
-__all__ = ["BlockedView", "HiddenPlaces", "Sightings", "blocked_from", "count_bodies", "hidden_places", "learn_hidden_places", "no_sightings", "unseen_voxels"]
+__all__ = [
+    "BlockedView",
+    "HiddenPlaces",
+    "Sightings",
+    "blocked_from",
+    "count_bodies",
+    "hidden_places",
+    "learn_hidden_places",
+    "no_sightings",
+    "unseen_voxels",
+]
+    "BlockedView",
+    "HiddenPlaces",
+    "Sightings",
+    "blocked_from",
+    "count_bodies",
+    "hidden_places",
+    "learn_hidden_places",
+    "no_sightings",
+    "unseen_voxels",
+]
 
 #: Frames that are looked at, at most, well spread: furniture does not move, and people do.
 MOST_FRAMES = 300
