@@ -38,16 +38,6 @@ __all__ = [
     "no_sightings",
     "unseen_voxels",
 ]
-    "BlockedView",
-    "HiddenPlaces",
-    "Sightings",
-    "blocked_from",
-    "count_bodies",
-    "hidden_places",
-    "learn_hidden_places",
-    "no_sightings",
-    "unseen_voxels",
-]
 
 #: Frames that are looked at, at most, well spread: furniture does not move, and people do.
 MOST_FRAMES = 300
