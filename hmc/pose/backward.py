@@ -3,15 +3,15 @@
 A filter knows only the frames before: a limb that it loses stays lost until the silhouettes show it again, and the body was fitted to the
 first second and a half. When the recording is over more is known:
 
-0. What the scene hides from single cameras is learnt from the first pass's poses (`hmc.pose.occluders`), and rays that another's
-   pose covers ask nothing of a person.
-1. The person's dimensions are fitted anew, to frames of the whole run (`hmc.pose.starts.own_body`).
-2. Each person is followed from the last frame to the first. Nothing is drawn at random but limbs that are lost: the pose of the frame after
+1. What the scene hides from single cameras is learnt from the first pass's poses (`hmc.pose.occluders`); and what another's pose
+   covers asks nothing of a person.
+2. The person's dimensions are fitted anew, to frames of the whole run (`hmc.pose.starts.own_body`).
+3. Each person is followed from the last frame to the first. Nothing is drawn at random but limbs that are lost: the pose of the frame after
    and the first pass's are refined side by side, so that a limb that was found again is followed back to where it was lost.
-3. Each frame then has two poses, and more with limbs of one on the other; the best way through all of them is taken
+4. Each frame then has two poses, and more with limbs of one on the other; the best way through all of them is taken
    (`hmc.pose.mixtures`). Where nothing shows a limb, the way in from before and the way out to after are joined where they meet best.
 
-The first two steps go on where they were when a run was stopped. Ours; the papers follow forward only.
+The second and the third go on where they were when a run was stopped; the others take a moment. Ours; the papers follow forward only.
 """
 
 from __future__ import annotations

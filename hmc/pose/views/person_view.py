@@ -118,7 +118,7 @@ def views_of(
     needs : collection of str
         Of `EVIDENCE`, without detections.
     unseen : ndarray of int, shape (k, 3), optional
-        Voxels where the scene hides people (`hmc.pose.views.occluders.unseen_voxels`).
+        Voxels where the scene hides people (`hmc.pose.occluders.unseen_voxels`).
 
     Returns
     -------
