@@ -132,11 +132,11 @@ def test_a_stopped_run_goes_on_and_ends_as_if_it_had_not_been(tmp_path, monkeypa
 def test_a_run_killed_in_the_second_pass_goes_on_there(finished, tmp_path, monkeypatch):
     views, seen = backward.views_of, []
 
-    def dying(recording, grid, tracks, hull):
+    def dying(recording, grid, tracks, hull, **options):
         seen.append(hull.index)
         if len(seen) == dies_after:
             raise KeyboardInterrupt
-        return views(recording, grid, tracks, hull)
+        return views(recording, grid, tracks, hull, **options)
 
     default = ("--frames", "5", "--voxel", "0.05")
     monkeypatch.setattr(backward, "views_of", dying)
