@@ -17,7 +17,8 @@ from hmc.errors import InputError
 from hmc.landmarks import LANDMARKS
 
 __all__ = [
-    "CANTON_LENGTHS", "DEFAULT_LENGTHS", "GIRTHS", "SOLE", "canton_body", "default_body", "landmark_segments", "make_body", "stature",
+    "CANTON_LENGTHS", "DEFAULT_LENGTHS", "GIRTHS", "SOLE", "canton_body", "default_body", "landmark_segments", "make_bodies", "make_body",
+    "stature",
 ]  # fmt: skip
 
 #: Joint-centre lengths over stature. Trunk: hip centres' middle to the base of the neck. Sources: Winter (2009), figure 4.1
@@ -108,6 +109,11 @@ def make_body(dimensions: dict[str, float], limits: JointLimits | None = None, s
     tips[LANDMARKS.index("head_top")] = (d["head_forward"], 0, d["head"])
     kept = {name: float(d[name]) for name in wanted}
     return BodyModel(float(d["height"]), offsets, tips, _flesh(d, sole), limits or default_limits(), kept)
+
+
+def make_bodies(dimensions: Mapping[int, Mapping[str, float | np.ndarray]], limits: JointLimits | None = None) -> dict[int, BodyModel]:
+    """The bodies of several people by number, as a result keeps their dimensions; parameters and errors as of `make_body`."""
+    return {person: make_body({name: float(value) for name, value in own.items()}, limits) for person, own in dimensions.items()}
 
 
 def default_body(height_m: float) -> BodyModel:

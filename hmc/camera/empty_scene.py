@@ -29,7 +29,6 @@ __all__ = [
     "Views",
     "add_bodies",
     "cut_samples",
-    "empty_scenes",
     "replace_people",
     "scenes_behind",
     "shrunk",
@@ -88,31 +87,8 @@ class SamplePeople:
     scenes: Sequence[tuple[np.ndarray, np.ndarray]]
 
 
-def empty_scenes(
-    samples: Sequence[Masks], sizes: Sequence[tuple[int, int]], views: Views, pool: Executor | None = None
-) -> list[EmptyScene]:
-    """The scene of each camera without the people in it.
-
-    Parameters
-    ----------
-    samples : sequence of sequences of ndarray of uint8, shape (height, width, 3), or None
-        Images of all cameras, a frame at a time, spread over a time in which people move; one image of each camera at least.
-    sizes : sequence of (width, height), one a camera
-        Of the small images on which people are cut out; some 320 pixels are enough.
-    views : callable
-        What cameras agree on, for masks of these sizes.
-    pool : concurrent.futures.Executor, optional
-        Threads to spread the cameras over; the result does not depend on it.
-
-    Returns
-    -------
-    list of EmptyScene, one a camera
-    """
-    return scenes_behind(samples, cut_samples(shrunk(samples, sizes), views, pool), pool)
-
-
 def shrunk(samples: Sequence[Masks], sizes: Sequence[tuple[int, int]]) -> list[list[np.ndarray | None]]:
-    """The samples, a frame at a time, each camera's made as small as its (width, height)."""
+    """The samples, a frame at a time, each camera's made as small as its (width, height); some 320 pixels are enough to cut out people."""
     return [
         [None if image is None else cv2.resize(image, size, interpolation=cv2.INTER_AREA) for image, size in zip(frame, sizes, strict=True)]
         for frame in samples
@@ -120,7 +96,17 @@ def shrunk(samples: Sequence[Masks], sizes: Sequence[tuple[int, int]]) -> list[l
 
 
 def cut_samples(small: Sequence[Masks], views: Views, pool: Executor | None = None) -> SamplePeople:
-    """People cut out of small samples; other parameters as of `empty_scenes`."""
+    """People cut out of small samples.
+
+    Parameters
+    ----------
+    small : sequence of sequences of ndarray of uint8, shape (height, width, 3), or None
+        Images of all cameras, a frame at a time, spread over a time in which people move; one image of each camera at least.
+    views : callable
+        What cameras agree on, for masks of these sizes.
+    pool : concurrent.futures.Executor, optional
+        Threads to spread the cameras over; the result does not depend on it.
+    """
     run = map if pool is None else pool.map
     n_cameras = len(small[0])
     people = SamplePeople(
@@ -145,7 +131,7 @@ def add_bodies(
         Those who were found without.
     bodies : sequence of sequences of ndarray of bool, shape (height, width), or None
     views, pool
-        As of `empty_scenes`.
+        As of `cut_samples`.
     """
     return _find_people(small, people.scenes, views, map if pool is None else pool.map, bodies, ROUNDS)
 

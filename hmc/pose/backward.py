@@ -24,7 +24,7 @@ import numpy as np
 
 from hmc.body.kinematics import landmarks
 from hmc.body.model import BodyModel
-from hmc.body.proportions import make_body
+from hmc.body.proportions import make_bodies
 from hmc.io.journal import append_journal, open_journal
 from hmc.io.masks import kept_frames
 from hmc.io.recording import Recording
@@ -110,12 +110,13 @@ def backward(
         return replace(people, notes=(*people.notes, "silhouettes were not kept on disk: poses are those of one pass, forward in time"))
     capture = Capture(recording.fps, options.voxel_size_m, recording.room, recording.rig)
     places = learn_hidden_places(recording.rig, person_grid(recording, options.voxel_size_m), run, people.states)
-    pass_ = _Pass(recording, tracks, settings, options, run, capture, people.states, places)
+    first_bodies = make_bodies(people.states.bodies, method.limits)
+    pass_ = _Pass(recording, tracks, settings, options, run, capture, people.states, first_bodies, places)
     records = open_journal(run.journal, run.key)
     if records:
-        bodies = {int(person): make_body(body, method.limits) for person, body in records[0]["bodies"].items()}
+        bodies = make_bodies({int(person): body for person, body in records[0]["bodies"].items()}, method.limits)
     else:
-        bodies = _bodies(pass_, method, people, fitted)
+        bodies = _bodies(pass_, people, fitted)
         if run.journal is not None:
             append_journal(run.journal, {"bodies": {person: body.dimensions for person, body in bodies.items()}})
     persons = {person: _begun(people, fitted, person, make_subject(body, pass_.capture)) for person, body in bodies.items()}
@@ -138,11 +139,11 @@ class _Pass:
     run: RunOptions
     capture: Capture
     states: PoseStates
+    bodies: Mapping[int, BodyModel]
     places: HiddenPlaces | None
 
     def views(self, frames: Iterable[int]) -> Iterator[tuple[int, dict[int, PersonView]]]:
         """What some frames show of all people, in any order, by what the first pass tells of the scene and of the others' poses."""
-        bodies = {person: make_body({name: float(value) for name, value in body.items()}) for person, body in self.states.bodies.items()}
         grid = person_grid(self.recording, self.options.voxel_size_m)
         masks = kept_frames(self.run.masks or "", self.run.key, frames)
         for hull in stream_hulls(self.recording, grid, self.run.frontend, masks=masks):
@@ -150,7 +151,7 @@ class _Pass:
             views = views_of(self.recording, grid, self.tracks, hull, unseen=unseen)
             rows = np.flatnonzero((self.states.frames == hull.index) & np.isfinite(self.states.states).all(axis=1))
             poses = {
-                person: (bodies[person], self.states.states[row])
+                person: (self.bodies[person], self.states.states[row])
                 for person, row in zip(self.states.persons[rows].tolist(), rows, strict=True)
             }
             yield hull.index, {person: with_own_rays(view, person, poses) for person, view in views.items()}
@@ -171,13 +172,10 @@ def with_own_rays(view: PersonView, person: int, poses: Mapping[int, tuple[BodyM
     return replace(view, target=replace(view.target, rays=rays))
 
 
-def _bodies(pass_: _Pass, method: PoseMethod, people: PosedPeople, fitted: np.ndarray) -> dict[int, BodyModel]:
+def _bodies(pass_: _Pass, people: PosedPeople, fitted: np.ndarray) -> dict[int, BodyModel]:
     """Every person's body, fitted to frames of the whole run where others bear it out."""
-    settings, persons = pass_.settings, {}
-    for number, dimensions in people.states.bodies.items():
-        body = make_body({name: float(value) for name, value in dimensions.items()}, method.limits)
-        persons[number] = _begun(people, fitted, number, make_subject(body, pass_.capture))
-    bodies = {number: person.subject.body for number, person in persons.items()}
+    settings, bodies = pass_.settings, dict(pass_.bodies)
+    persons = {number: _begun(people, fitted, number, make_subject(body, pass_.capture)) for number, body in bodies.items()}
     if settings.fit_body is None:
         return bodies
     chosen = {number: choose_frames(people.costs[person.rows], settings.body_frames) for number, person in persons.items()}

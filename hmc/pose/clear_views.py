@@ -18,7 +18,7 @@ from hmc.body.flesh import flesh_points, place_points
 from hmc.body.kinematics import landmarks, segment_transforms
 from hmc.body.limbs import CHAIN_OF_PART, LIMBS
 from hmc.body.model import BodyModel, neutral_state
-from hmc.body.proportions import make_body
+from hmc.body.proportions import make_bodies
 from hmc.camera.model import Camera, Rig
 from hmc.io.masks import MaskStep, kept_masks
 from hmc.io.recording import Recording
@@ -91,7 +91,7 @@ def clear_views(rig: Rig, steps: Iterable[MaskStep], states: PoseStates) -> Born
     -------
     BorneOut
     """
-    bodies = {person: make_body({name: float(value) for name, value in body.items()}) for person, body in states.bodies.items()}
+    bodies = make_bodies(states.bodies)
     flesh = {person: _flesh_of(body) for person, body in bodies.items()}
     views = np.zeros((len(states.frames), len(LANDMARKS)), int)
     posed = np.isfinite(states.states).any(axis=1)

@@ -19,7 +19,7 @@ import numpy as np
 
 from hmc.body.flesh import flesh_points, place_points
 from hmc.body.kinematics import segment_transforms
-from hmc.body.proportions import make_body
+from hmc.body.proportions import make_bodies
 from hmc.camera.model import Camera, Rig
 from hmc.io.masks import MaskStep, kept_frames
 from hmc.io.results import PoseStates
@@ -127,7 +127,7 @@ def learn_hidden_places(rig: Rig, grid: VoxelGrid, run: RunOptions, states: Pose
     steps = kept_frames(run.masks or "", run.key, frames.tolist())
     if steps is None or not len(frames):
         return None
-    bodies = {person: make_body({name: float(value) for name, value in body.items()}) for person, body in states.bodies.items()}
+    bodies = make_bodies(states.bodies)
     skin = {}
     for person, body in bodies.items():
         flesh = flesh_points(body, PATCH_M)

@@ -15,7 +15,7 @@ from scipy.signal import savgol_filter
 from hmc.body.inverse import fit_landmarks
 from hmc.body.joints import JointLimits
 from hmc.body.kinematics import landmarks
-from hmc.body.proportions import make_body
+from hmc.body.proportions import make_bodies
 from hmc.pose.follow import PosedPeople
 
 __all__ = ["smooth_landmarks", "smooth_people"]
@@ -72,8 +72,7 @@ def smooth_people(people: PosedPeople, limits: JointLimits, fps: float, window_s
         Costs and notes are those of the poses as they were estimated.
     """
     states, positions = people.states.states.copy(), people.poses.positions.copy()
-    for person, dimensions in people.states.bodies.items():
-        body = make_body({name: float(value) for name, value in dimensions.items()}, limits)
+    for person, body in make_bodies(people.states.bodies, limits).items():
         rows = np.flatnonzero(people.poses.persons == person)
         wanted = smooth_landmarks(people.poses.frames[rows], positions[rows], fps, window_s)
         changed = np.flatnonzero((wanted != positions[rows]).any(axis=(1, 2)) & np.isfinite(wanted).all(axis=(1, 2)))

@@ -13,7 +13,7 @@ from scipy.ndimage import uniform_filter1d
 
 from hmc.body.joints import DOF_NAMES
 from hmc.body.model import BodyModel
-from hmc.body.proportions import make_body
+from hmc.body.proportions import make_bodies
 from hmc.camera.model import Camera
 from hmc.errors import InputError
 from hmc.io.recording import Frame, Recording, iterate_frames
@@ -101,7 +101,7 @@ def read_result(directory: str | Path) -> Result:
 
 def with_bodies(result: Result, states: PoseStates) -> Result:
     """A result with its states and the bodies that they are of, so that flesh can be drawn."""
-    bodies = {person: make_body({name: float(value) for name, value in body.items()}) for person, body in states.bodies.items()}
+    bodies = make_bodies(states.bodies)
     return replace(result, states=states, bodies=bodies)
 
 

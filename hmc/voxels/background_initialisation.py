@@ -102,7 +102,8 @@ def learn_from_people(
     people = cut_samples(small, views, pool)
     still, doubted = find_still_people(tables, small, people.masks)
     if still:
-        people = add_bodies(small, people, [cut_still_people(still, frame) for frame in small], views, pool)
+        bodies = [[cut_still_people(still, c, image) for c, image in enumerate(frame)] for frame in small]
+        people = add_bodies(small, people, bodies, views, pool)
     scenes = scenes_behind(samples, people, pool)
     models = {}
     for i, c in enumerate(cameras):
@@ -136,20 +137,20 @@ def with_unseen_places(
     unseen = places.small_unseen
     given = [masks[c] for c in places.cameras]
     differs = [None if mask is None else _resize(mask, size) for mask, size in zip(given, sizes, strict=True)]
-    (small,) = shrunk([[None if masks[c] is None else images[c] for c in places.cameras]], sizes)
-    bodies = cut_still_people(places.still, small) if places.still else [None] * len(sizes)
     maybe = [None if differ is None else differ | hidden for differ, hidden in zip(differs, unseen, strict=True)]
     surely, possibly = agreed_views(places.tables, maybe)
 
     def complete(i: int) -> np.ndarray | None:
-        image, mask, body = small[i], given[i], bodies[i]
+        image, mask = images[places.cameras[i]], given[i]
         differ, sure, possible, colors = differs[i], surely[i], possibly[i], places.colors[i]
         if image is None or mask is None or differ is None or sure is None or possible is None or colors is None:
             return mask
+        small = cv2.resize(image, sizes[i], interpolation=cv2.INTER_AREA)
         hidden, differ = unseen[i], differ & ~unseen[i]
+        body = cut_still_people(places.still, i, small)
         if body is not None:
             hidden, differ = hidden & ~body, differ | body
-        people = cut_people(View(image, differ, sure, possible, hidden), colors)
+        people = cut_people(View(small, differ, sure, possible, hidden), colors)
         if body is not None:
             people |= body & possible
         whole = np.where(places.unseen[i], _resize(people, mask.shape[::-1]), mask)

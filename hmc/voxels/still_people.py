@@ -99,23 +99,25 @@ def find_still_people(
     return tuple(found), tuple(doubted)
 
 
-def cut_still_people(still: Sequence[StillPerson], images: Sequence[np.ndarray | None]) -> list[np.ndarray | None]:
-    """Where people who hardly move are in one frame.
+def cut_still_people(still: Sequence[StillPerson], camera: int, image: np.ndarray | None) -> np.ndarray | None:
+    """Where people who hardly move are in one image.
 
     Parameters
     ----------
     still : sequence of StillPerson
-    images : sequence of ndarray of uint8, shape (height, width, 3), or None; one a camera
+    camera : int
+        Place among those by which they were found.
+    image : ndarray of uint8, shape (height, width, 3), or None
         Small.
 
     Returns
     -------
-    list of ndarray of bool, shape (height, width), or None; one a camera
+    ndarray of bool, shape (height, width), or None
+        None where there is no image, or nobody who hardly moves.
     """
-    return [
-        None if image is None else np.logical_or.reduce([cut_body(image, None, one.figures[c], one.colors[c]) for one in still])
-        for c, image in enumerate(images)
-    ]
+    if image is None or not still:
+        return None
+    return np.logical_or.reduce([cut_body(image, None, one.figures[camera], one.colors[camera]) for one in still])
 
 
 def _examine(tables: CarvingTables, samples, hulls: Sequence[np.ndarray], place: Standing) -> StillPerson | None:
@@ -131,7 +133,6 @@ def _examine(tables: CarvingTables, samples, hulls: Sequence[np.ndarray], place:
             cuts = [cut_body(image, mask, *one) for image, mask, one in zip(frame, masks, zip(figures, colors, strict=True), strict=True)]
             measured.append(_measure(tables, place, cuts, masks, figures))
         litres, lowest, top, x, y, *agree = np.median(np.array(measured), axis=0)
-
         if not (LITRES[0] <= litres <= LITRES[1] and lowest <= LOWEST_M and top >= TOP_M and np.sort(agree)[1] >= AGREE):
             return None
         if not last:

@@ -7,12 +7,16 @@ import pytest
 from drawn import draw_recording, walk
 
 from hmc.camera.background import masked_median
-from hmc.camera.empty_scene import empty_scenes, replace_people
+from hmc.camera.empty_scene import cut_samples, replace_people, scenes_behind, shrunk
 from hmc.camera.model import Rig
 from hmc.io.recording import background_frames, iterate_frames, open_recording
 from hmc.voxels.agreement import agreed_views
 from hmc.voxels.carving import make_tables
 from hmc.voxels.grid import VoxelGrid
+
+
+def empty_scenes(samples, sizes, views):
+    return scenes_behind(samples, cut_samples(shrunk(samples, sizes), views))
 
 
 def scenes_of(recording, every):

@@ -13,7 +13,7 @@ from methods import HEIGHT_M, VOXEL_M, followed, tiny_clip, true_joints, true_tr
 from hmc.body.joints import N_DOF
 from hmc.body.kinematics import landmarks
 from hmc.body.limbs import LIMBS
-from hmc.body.proportions import make_body
+from hmc.body.proportions import make_bodies
 from hmc.errors import InputError
 from hmc.landmarks import LANDMARKS
 from hmc.pose import mixtures
@@ -40,7 +40,7 @@ def with_a_lost_arm(people):
     """The same poses, but for an arm that is held up in some frames."""
     states = people.states.states.copy()
     states[LOST, LIMBS["l_arm"].dofs] = [0.9, 0.3, -0.2, -0.1]
-    (body,) = (make_body({name: float(value) for name, value in one.items()}) for one in people.states.bodies.values())
+    (body,) = make_bodies(people.states.bodies).values()
     poses = replace(people.poses, positions=landmarks(body, states))
     return replace(people, poses=poses, states=replace(people.states, states=states))
 

@@ -50,7 +50,7 @@ def test_who_sways_in_place_is_found_at_the_right_depth(swaying):
 
 def test_who_sways_in_place_is_cut_out_in_every_view_that_has_an_image(swaying):
     tables, samples, found, _ = swaying
-    first, *others = cut_still_people(found, [None, *samples[4][1:]])
+    first, *others = (cut_still_people(found, c, image) for c, image in enumerate([None, *samples[4][1:]]))
     assert first is None
     for camera, mask in zip(tables.rig.cameras[1:], others, strict=True):
         truth = figure(camera, PLACE).body
