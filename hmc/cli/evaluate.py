@@ -109,6 +109,7 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"{args.directory}: --angles needs joints.csv there, and true joints")
     if args.offsets and poses is None:
         raise InputError(f"{args.directory}: --offsets needs joints.csv there, and true joints in metres")
+    offsets = evaluate_offsets(poses.persons) if args.offsets and poses is not None else None
 
     report: dict = {}
     notes: list[str] = []
@@ -121,8 +122,7 @@ def run(args: argparse.Namespace) -> int:
         if args.angles:
             groups = {str(person.person): (person.estimate, person.truth) for person in poses.persons}
             angles = angle_rows("person", groups, poses.thresholds_m[0])
-        if args.offsets:
-            offsets = evaluate_offsets(poses.persons)
+        if offsets is not None:
             print_offsets(offsets, args.quiet)
             write_rows(args.directory / "offsets.csv", offsets.rows)
             report["offsets"] = offsets.summary

@@ -161,6 +161,30 @@ def test_noise_alone_looks_constant_the_more_so_the_fewer_frames():
     np.testing.assert_allclose(one.remaining, 0, atol=1e-12)
 
 
+@pytest.mark.parametrize("n", [50, 200, 800])
+def test_of_noise_alone_hardly_anything_is_constant(n):
+    """A part of an offset scatters as a median of n: by sqrt(pi / 2) sigma / sqrt(n). The mean error stays what it was."""
+    truth, _ = walker(n)
+    found = constant_offsets(truth + np.random.default_rng(n).normal(0, 0.02, truth.shape), truth)
+    scatter = np.sqrt(np.pi / 2) * 0.02 / np.sqrt(n)
+    # The root mean square of 45 parts scatters by a tenth itself.
+    assert 0.7 < np.sqrt(np.mean(found.offsets**2)) / scatter < 1.3
+    assert 0.95 < found.remaining.mean() / found.errors.mean() < 1.001
+
+
+def test_landmarks_that_are_not_estimated_have_no_offset_and_the_others_have():
+    offsets = np.full((15, 3), 0.02)
+    estimate = moved(offsets)
+    missing = [landmark_index(name) for name in ("pelvis", "neck", "l_hip")]  # the trunk is the truth's
+    estimate[:, missing] = np.nan
+    found = constant_offsets(estimate, TRUTH)
+    assert np.isnan(found.offsets[missing]).all() and (found.compared[missing] == 0).all()
+    others = np.setdiff1d(np.arange(15), missing)
+    np.testing.assert_allclose(found.offsets[others], offsets[others], atol=1e-12)
+    np.testing.assert_allclose(found.remaining[:, others], 0, atol=1e-12)
+    assert not found.missing.any()
+
+
 def test_the_median_may_cost_a_little():
     """The component-wise median of three vectors is farther from them than nothing is."""
     errors = np.array([[0.01, 0.01, -0.01], [0.01, -0.01, 0.01], [-0.01, 0.01, 0.01]])
@@ -223,21 +247,23 @@ def test_the_command_prints_and_writes(tmp_path, offsets, capsys):
     rows = table(tmp_path / "result" / "offsets.csv")
     assert len(rows) == 3 * 16
     assert list(rows["all", "neck"]) == [
-        "person", "landmark", "mean_mm", "forward_mm", "left_mm", "up_mm", "offset_mm", "mean_without_mm", "frames"
+        "person", "landmark", "mean_mm", "mean_without_mm", "offset_mm", "forward_mm", "outward_mm", "up_mm", "frames"
     ]  # fmt: skip
 
     def figures(person, landmark):
         return [float(value) for value in list(rows[person, landmark].values())[2:]]
 
     lengths = [50, np.hypot(30, 20)]
-    assert figures("0", "l_hip") == pytest.approx([50, 0, 30, 40, 50, 0, 40], abs=2e-3)
-    assert figures("0", "r_hip") == pytest.approx([50, 0, -30, 40, 50, 0, 40], abs=2e-3)
-    assert figures("1", "l_hip") == pytest.approx([lengths[1], 0, -30, 20, lengths[1], 0, 40], abs=2e-3)
+    # Outward on both sides in one person, inward in the other.
+    for name in ("l_hip", "r_hip"):
+        assert figures("0", name) == pytest.approx([50, 0, 50, 0, 30, 40, 40], abs=2e-3)
+        assert figures("1", name) == pytest.approx([lengths[1], 0, lengths[1], 0, -30, 20, 40], abs=2e-3)
+    assert figures("0", "overall")[4:6] == pytest.approx([2 * 30 / 12, 2 * 40 / 15], abs=2e-3)
     # Over persons: plain means, the sides cancel, the length does not.
-    assert figures("all", "l_hip") == pytest.approx([np.mean(lengths), 0, 0, 30, np.mean(lengths), 0, 80], abs=2e-3)
-    assert figures("0", "r_wrist") == pytest.approx([50, 0, 0, 0, 0, 50, 40], abs=2e-3)
+    assert figures("all", "l_hip") == pytest.approx([np.mean(lengths), 0, np.mean(lengths), 0, 0, 30, 80], abs=2e-3)
+    assert figures("0", "r_wrist") == pytest.approx([50, 50, 0, 0, 0, 0, 40], abs=2e-3)
     mean, without = (2 * sum(lengths) + 50) / 30, 50 / 30
-    assert figures("all", "overall") == pytest.approx([mean, 0, 0, 60 / 15, 2 * np.mean(lengths) / 15, without, 80], abs=2e-3)
+    assert figures("all", "overall") == pytest.approx([mean, without, 2 * np.mean(lengths) / 15, 0, 0, 60 / 15, 80], abs=2e-3)
     metrics = table(tmp_path / "result" / "metrics.csv")
     assert all(float(row["mean_mm"]) == pytest.approx(float(metrics[key]["mean_mm"]), abs=2e-3) for key, row in rows.items())
     report = tomllib.loads((tmp_path / "result" / "metrics.toml").read_text())
@@ -284,6 +310,31 @@ def test_a_short_clip_has_a_note_and_no_offsets(tmp_path, offsets, capsys):
     assert "note: person 1: no landmark has an offset, compared in fewer than 10 frames" in out and "along the true trunk" not in out
     report = tomllib.loads((tmp_path / "result" / "metrics.toml").read_text())
     assert report["offsets"]["frames"] == 0 and np.isnan(report["offsets"]["constant_share"])
+
+
+def test_a_truth_without_trunks_is_one_line_and_exit_code_2(tmp_path, offsets, capsys):
+    """Whether hips and shoulders are missing or lie along the spine; nothing is printed or written."""
+    for name, lacking in (("missing", np.nan), ("flat", TRUTH[0, LEFT])):
+        truth, estimate = two_persons(offsets)
+        for side in (LEFT, RIGHT):
+            truth.positions[:, side] = lacking
+        result, recording = made(tmp_path / name, truth, estimate)
+        assert main(["evaluate", result, recording, "--offsets"]) == 2
+        captured = capsys.readouterr()
+        assert "in no frame with an estimate does the truth have a trunk (pelvis, neck, l_hip, r_hip" in captured.err
+        assert captured.err.count("\n") == 1 and captured.out == ""
+        assert not (tmp_path / name / "result" / "metrics.csv").exists()
+        with pytest.raises(InputError, match="have a trunk"):
+            evaluate_offsets(evaluate_pose(estimate, truth).persons)
+
+
+def test_one_person_without_a_trunk_is_a_note(offsets):
+    truth, estimate = two_persons(offsets)
+    truth.positions[:40, LEFT] = np.nan
+    found = evaluate_offsets(evaluate_pose(estimate, truth).persons)
+    rows = {(row["person"], row["landmark"]): row for row in found.rows}
+    assert rows["0", "neck"]["frames"] == 0 and rows["all", "l_hip"]["up_mm"] == pytest.approx(20)
+    assert len(found.notes) == 1 and found.notes[0].startswith("person 0: no offsets from frames 0-39 (40 frames)")
 
 
 def test_a_person_who_was_never_estimated_has_no_offsets(offsets):

@@ -7,13 +7,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hmc.errors import InputError
 from hmc.landmarks import LANDMARKS
 from hmc.metrics.landmarks import mean_and_deviation
-from hmc.metrics.offsets import LEAST_FRAMES, OffsetErrors, constant_offsets
+from hmc.metrics.offsets import LEAST_FRAMES, TRUNK, OffsetErrors, constant_offsets
 from hmc.metrics.persons import frames_in_words
 from hmc.metrics.scores.poses import PersonErrors
 
 __all__ = ["OffsetEvaluation", "evaluate_offsets"]
+
+#: Which way of the trunk's left is outward: to the left for landmarks of the left side, and for those of no side.
+OUTWARD = np.array([-1.0 if name.startswith("r_") else 1.0 for name in LANDMARKS])
+#: Landmarks that have a counterpart on the other side.
+PAIRED = np.array([name.startswith(("l_", "r_")) for name in LANDMARKS])
 
 
 @dataclass(frozen=True)
@@ -24,10 +30,12 @@ class OffsetEvaluation:
     ----------
     rows : tuple of dict
         The table, a row a landmark and ``overall``, for all persons and for each. ``mean_mm`` is the error as estimated, over the frames
-        that are compared, ``mean_without_mm`` the same without the offset; ``forward_mm``, ``left_mm``, ``up_mm`` are the offset along the
-        true trunk and ``offset_mm`` is its length. Where a row is of several landmarks (``overall``) or persons (``all``), these four are
-        plain means of theirs, so that opposite offsets cancel in the first three and not in the length. ``frames``: how many the
-        figures are of, 0 where there is no offset.
+        that are compared, ``mean_without_mm`` the same without the offset; ``offset_mm`` is the offset's length, and ``forward_mm``,
+        ``outward_mm``, ``up_mm`` are its parts along the true trunk. Outward is to the left for landmarks of the left side and to the right
+        for those of the right side, so that what is mirrored has one sign; for pelvis, neck and head_top it is to the left. Where a row is
+        of several landmarks (``overall``) or persons (``all``), these four are plain means of theirs, of ``outward_mm`` overall of the
+        paired landmarks alone: opposite offsets cancel in the parts and not in the length. ``frames``: how many the figures are of, 0 where
+        there is no offset.
     summary : dict
         ``mean_mm``, ``mean_without_mm``, ``offset_mm`` and ``frames`` of all persons overall; ``constant_share``, the share of the mean
         error that goes with the offsets, in-sample, NaN where there is no error.
@@ -53,8 +61,19 @@ def evaluate_offsets(persons: Sequence[PersonErrors]) -> OffsetEvaluation:
     Returns
     -------
     OffsetEvaluation
+
+    Raises
+    ------
+    InputError
+        When the truth has no trunk in any frame with an estimate, hence no axes along which they could be measured.
     """
     found = {person.person: constant_offsets(person.estimate, person.truth) for person in persons}
+    without_trunk = any((own.missing | own.flat).any() for own in found.values())
+    if without_trunk and not any(own.compared.any() for own in found.values()):
+        raise InputError(
+            f"no offsets: in no frame with an estimate does the truth have a trunk ({', '.join(TRUNK)}, not all in a line) to measure "
+            "them along"
+        )
     columns = {str(name): _offset_columns(own) for name, own in found.items()}
     rows = _rows("all", list(found.values()), _mean(np.stack(list(columns.values()))))
     overall = rows[-1]
@@ -67,9 +86,12 @@ def evaluate_offsets(persons: Sequence[PersonErrors]) -> OffsetEvaluation:
 
 
 def _offset_columns(found: OffsetErrors) -> np.ndarray:
-    """Forward, left, up and length of every landmark's offset and of their mean, shape (16, 4), metres."""
-    table = np.column_stack([found.offsets, np.linalg.norm(found.offsets, axis=1)])
-    return np.vstack([table, _mean(table)])
+    """Length of every landmark's offset, and its parts forward, outward and up; then their mean, shape (16, 4), metres."""
+    forward, left, up = found.offsets.T
+    table = np.column_stack([np.linalg.norm(found.offsets, axis=1), forward, left * OUTWARD, up])
+    mean = _mean(table)
+    mean[2] = _mean(table[PAIRED, 2])
+    return np.vstack([table, mean])
 
 
 def _rows(label: str, parts: Sequence[OffsetErrors], offsets: np.ndarray) -> list[dict]:
@@ -77,8 +99,8 @@ def _rows(label: str, parts: Sequence[OffsetErrors], offsets: np.ndarray) -> lis
     known = np.isfinite(errors)
     columns = {
         "mean_mm": _means(errors),
-        **dict(zip(("forward_mm", "left_mm", "up_mm", "offset_mm"), offsets.T, strict=True)),
         "mean_without_mm": _means(np.concatenate([part.remaining for part in parts])),
+        **dict(zip(("offset_mm", "forward_mm", "outward_mm", "up_mm"), offsets.T, strict=True)),
     }
     frames = [*known.sum(axis=0), known.any(axis=1).sum()]
     return [
