@@ -102,6 +102,23 @@ def test_each_that_is_kept_has_its_own_share_and_who_adds_least_goes_first(place
     assert kept == chosen
 
 
+@pytest.mark.parametrize("apart", [0.42, 0.5, 0.6])
+def test_two_who_stand_back_to_back_are_two(apart):
+    places = [(-0.7 * apart / 2, 0.7 * apart / 2), (0.7 * apart / 2, -0.7 * apart / 2), (0.9, 0.8), (-0.8, -0.7)]
+    found = real(seen([body(*place, height=height) for place, height in zip(places, (1.85, 1.6, 1.75, 1.7), strict=True)])).centres
+    assert len(found) == 4
+    assert max(np.hypot(*(found - place).T).min() for place in places) < 0.2
+
+
+@pytest.mark.parametrize(("least_m", "columns"), [(1.2, 1), (0.0, 2)])
+def test_what_stands_beside_a_body_in_the_same_hull_is_a_column_only_if_it_has_a_trunk(least_m, columns):
+    x, y, z = np.moveaxis(GRID.centres(np.argwhere(np.ones(GRID.shape, bool))).reshape(*GRID.shape, 3), -1, 0)
+    person = (np.hypot(x, y) < 0.3) & (z < 1.7)
+    beside = (abs(y) < 0.15) & (x > 0) & (x < 0.7) & (z < 1.6) & (z > least_m)
+    assert len(find_columns(observe(GRID, person))) == 1
+    assert len(find_columns(observe(GRID, person | beside))) == columns
+
+
 @pytest.mark.parametrize("shape", ["full", "empty", "low"])
 def test_rooms_that_are_full_empty_or_hold_low_things_have_no_columns(shape):
     volume = np.zeros(GRID.shape, bool)

@@ -2,7 +2,7 @@
 
 A column is matched with the track that should be there. It keeps that track alive and holds its voxels together, whoever stands beside;
 one without a track is a newcomer. People who lie, crouch or are missed by a camera are left to the rules after this one. Shown by the
-recipes `close_white`, `close_table` and `close_queue`, and by `test_two_who_hold_each_other_from_the_first_frame_are_two`.
+recipes `close_white`, `close_table`, `close_queue` and `close_pale`, and by `test_two_who_hold_each_other_from_the_first_frame_are_two`.
 """
 
 from __future__ import annotations
