@@ -26,18 +26,24 @@ __all__ = [
 #: sole of 1 cm), and the ranges that rendered and captured people show (trunk, head). The spine is behind: a standing person's
 #: last neck vertebra is behind the hip centres (Mac-Thiong et al. 2010, Spine 35: E1193), while the chest and the skull are over or
 #: before them. From the line of hips and neck the chest's middle is `chest_forward` to the front, the crown `head_forward`. The crown is
-#: the skull's; silhouettes have its hair as well (`python -m hmc.experiments run body-bias`).
+#: the skull's; silhouettes have its hair as well. Joints are not in the middle of the flesh around them: with the arms stretched sideways
+#: that of the arms is lower and more to the front; that of waist and hips is to the front, of ankles and feet outward, by the lengths
+#: that are named so (`python -m hmc.experiments run body-bias`).
 DEFAULT_LENGTHS: dict[str, float] = {
     "trunk": 0.318, "head": 0.147, "shoulder_half_width": 0.104, "shoulder_drop": 0.060, "hip_half_width": 0.060,
     "upper_arm": 0.157, "forearm": 0.150, "hand": 0.085, "thigh": 0.245, "shank": 0.250, "ankle_height": 0.046, "foot": 0.105,
     "chest_forward": 0.010, "head_forward": 0.020, "hair": 0.010,
+    "shoulder_flesh_low": 0.0046, "elbow_flesh_low": 0.0034, "wrist_flesh_low": 0.0069, "arm_flesh_forward": 0.0023,
+    "waist_flesh_forward": 0.0046, "hip_flesh_forward": 0.0034, "ankle_flesh_outward": 0.0046,
 }  # fmt: skip
+#: What is 0 in a body that was stored before it was known, and in Canton's: joints in the middle of the flesh, which ends at the crown.
+_ONCE_UNKNOWN = ("hair", *(name for name in DEFAULT_LENGTHS if "_flesh_" in name))
 
 #: Table 6.1 of Canton (2009), which gives no widths (hips: ours; shoulders: so that the arms span about the height), no hand or foot.
 CANTON_LENGTHS: dict[str, float] = DEFAULT_LENGTHS | {
     "shoulder_half_width": 0.098,
     "trunk": 0.33, "head": 0.16, "upper_arm": 0.20, "forearm": 0.20, "hand": 0.0, "thigh": 0.26, "shank": 0.25,
-    "ankle_height": 0.0, "foot": 0.0, "chest_forward": 0.0, "head_forward": 0.0, "hair": 0.0,
+    "ankle_height": 0.0, "foot": 0.0, "chest_forward": 0.0, "head_forward": 0.0, **dict.fromkeys(_ONCE_UNKNOWN, 0.0),
 }  # fmt: skip
 
 #: The foot's axis at the heel, over the floor and over stature. Soles are round and cameras stand higher: the lowest 2 cm of feet are
@@ -69,8 +75,9 @@ def make_body(dimensions: dict[str, float], limits: JointLimits | None = None, s
     Parameters
     ----------
     dimensions : dict
-        ``height`` (metres), the lengths of `DEFAULT_LENGTHS` (metres) and ``girth_<group>`` for each of `GIRTHS` (factors). Without hair
-        the flesh ends at the crown, as in results that were made before it was known.
+        ``height`` (metres), the lengths of `DEFAULT_LENGTHS` (metres) and ``girth_<group>`` for each of `GIRTHS` (factors). Without
+        hair the flesh ends at the crown, and without lengths named ``_flesh_`` joints are in its middle, as in results that were made
+        before these were known.
     limits : JointLimits, optional
         `default_limits` unless given.
     sole : float
@@ -86,7 +93,7 @@ def make_body(dimensions: dict[str, float], limits: JointLimits | None = None, s
         When a dimension is missing, not finite or negative.
     """
     wanted = ["height", *DEFAULT_LENGTHS, *(f"girth_{group}" for group in GIRTHS)]
-    dimensions = {"hair": 0.0} | dimensions
+    dimensions = dict.fromkeys(_ONCE_UNKNOWN, 0.0) | dimensions
     for name in wanted:
         value = dimensions.get(name, np.nan)
         if not np.isfinite(value) or value < 0:
@@ -167,14 +174,18 @@ def _flesh(d: dict[str, float], sole: float) -> Cones:
 
     def cone(segment: str, ends, radii, across, girth: tuple[float, float]) -> None:
         start, end = np.array(ends, float)
-        if np.linalg.norm(end - start) >= 1e-3:
-            index = _SEGMENT_INDEX[segment]
-            rows.append((index, PART_OF_SEGMENT[index], start, end, h * np.array(radii) * np.array(girth), np.array(across, float)))
+        length = np.linalg.norm(end - start)
+        if length >= 1e-3:
+            index, axis = _SEGMENT_INDEX[segment], (end - start) / length
+            first = across - (across @ axis) * axis
+            first /= np.linalg.norm(first)
+            rows.append((index, PART_OF_SEGMENT[index], start, end, h * np.array(radii) * np.array(girth), first))
 
     wide, deep, trunk = d["girth_torso"], d["girth_torso"] * d["girth_depth"], d["trunk"]
-    y = (0, 1, 0)
+    x, y = np.eye(3)[:2]
     chest, ahead = d["chest_forward"], d["head_forward"]
-    waist = nape = 0.4 * chest
+    nape = 0.4 * chest
+    waist = nape + d["waist_flesh_forward"]
     # Radii over stature: [lateral, front to back] at both ends.
     cone("pelvis", ((0, 0, -0.035 * h), (waist, 0, 0.15 * trunk)), ((0.090, 0.062), (0.086, 0.060)), y, (wide, deep))
     cone("torso", ((waist, 0, 0.12 * trunk), (chest, 0, 0.48 * trunk)), ((0.084, 0.059), (0.082, 0.057)), y, (wide, deep))
@@ -185,20 +196,22 @@ def _flesh(d: dict[str, float], sole: float) -> Cones:
     cone("head", ((nape, 0, -0.02 * h), (0.004 * h + 0.4 * ahead, 0, 0.28 * head)), ((0.034, 0.034), (0.034, 0.040)), y, g)
     cone("head", ((0.006 * h + 0.4 * ahead, 0, 0.22 * head), (skull, 0, 0.65 * head)), ((0.036, 0.046), (0.045, 0.057)), y, g)
     cone("head", ((skull, 0, 0.65 * head), (skull - 0.002 * h, 0, head + d["hair"])), ((0.045, 0.057), (0.026, 0.032)), y, g)
-    x, arms = (1, 0, 0), (d["girth_arms"], d["girth_arms"])
+    arms = (d["girth_arms"],) * 2
     thighs, shanks = (d["girth_thighs"],) * 2, (d["girth_shanks"],) * 2
+    front = d["arm_flesh_forward"]
     for side, sign in (("r", -1.0), ("l", 1.0)):
         upper, fore, hand = (sign * d[name] for name in ("upper_arm", "forearm", "hand"))
-        cone(f"{side}_upper_arm", ((0, -sign * 0.01 * h, 0), (0, upper, 0)), ((0.034, 0.034), (0.025, 0.025)), x, arms)
-        cone(f"{side}_forearm", ((0, 0, 0), (0, fore, 0)), ((0.026, 0.026), (0.016, 0.016)), x, arms)
-        cone(f"{side}_forearm", ((0, fore, 0), (0, fore + hand, 0)), ((0.021, 0.015), (0.016, 0.010)), x, arms)
-        cone(f"{side}_thigh", ((0, 0, 0), (0, 0, -d["thigh"])), ((0.050, 0.050), (0.033, 0.033)), x, thighs)
+        armpit, elbow, wrist = (-d[f"{joint}_flesh_low"] for joint in ("shoulder", "elbow", "wrist"))
+        cone(f"{side}_upper_arm", ((front, -sign * 0.01 * h, armpit), (front, upper, elbow)), ((0.034, 0.034), (0.025, 0.025)), x, arms)
+        cone(f"{side}_forearm", ((front, 0, elbow), (front, fore, wrist)), ((0.026, 0.026), (0.016, 0.016)), x, arms)
+        cone(f"{side}_forearm", ((front, fore, wrist), (front, fore + hand, wrist)), ((0.021, 0.015), (0.016, 0.010)), x, arms)
+        cone(f"{side}_thigh", ((d["hip_flesh_forward"], 0, 0), (0, 0, -d["thigh"])), ((0.050, 0.050), (0.033, 0.033)), x, thighs)
         shank, ankle, foot = d["shank"], d["ankle_height"], d["foot"]
-        calf = (-0.004 * h, 0, -0.4 * shank)
+        calf, ankle_y = (-0.004 * h, 0, -0.4 * shank), sign * d["ankle_flesh_outward"]
         cone(f"{side}_shank", ((0, 0, 0), calf), ((0.030, 0.032), (0.031, 0.033)), y, shanks)
-        cone(f"{side}_shank", (calf, (0, 0, -shank - 0.3 * ankle)), ((0.031, 0.033), (0.020, 0.021)), y, shanks)
+        cone(f"{side}_shank", (calf, (0, ankle_y, -shank - 0.3 * ankle)), ((0.031, 0.033), (0.020, 0.021)), y, shanks)
         if foot > 0:
             low = -shank - ankle + sole * h
-            heel, toe = (-0.032 * h, 0, low), (-0.032 * h + 1.35 * foot, 0, low - 0.012 * h)
+            heel, toe = (-0.032 * h, ankle_y, low), (-0.032 * h + 1.35 * foot, ankle_y, low - 0.012 * h)
             cone(f"{side}_shank", (heel, toe), ((0.020, 0.024), (0.028, 0.012)), y, (1.0, 1.0))
     return Cones(*(np.array(column) for column in zip(*rows, strict=True)))

@@ -34,19 +34,21 @@ from hmc.pose.views.person_view import views_of
 from hmc.tracking.resumable import person_grid
 from hmc.voxels.hulls import stream_hulls
 
-__all__ = ["AS_IT_IS", "EXPERIMENT", "NEITHER", "VARIANTS"]
+__all__ = ["AS_IT_IS", "EXPERIMENT", "MIDDLE", "NEITHER", "VARIANTS"]
 
 CLIPS = ("crossing", "close_white", "jog", "pale", "dance", "close_queue", "throw_catch", "gesture")
 QUICK_CLIPS, QUICK_FRAMES = 3, 61
 #: The sole's axis at which the flesh of feet ends at the floor, over stature.
 FLOOR_SOLE = 0.024
-AS_IT_IS, NEITHER = "as it is", "neither"
-#: Whether the flesh has hair over the crown, and where its soles are.
-VARIANTS: dict[str, tuple[bool, float]] = {
-    AS_IT_IS: (True, SOLE),
-    "no hair": (False, SOLE),
-    "feet to the floor": (True, FLOOR_SOLE),
-    NEITHER: (False, FLOOR_SOLE),
+AS_IT_IS, NEITHER, MIDDLE = "as it is", "neither", "joints in the middle"
+_HAIR, _MIDDLE = ("hair",), tuple(name for name in DEFAULT_LENGTHS if "_flesh_" in name)
+#: Which of the body's lengths are 0, and where the soles of its flesh are.
+VARIANTS: dict[str, tuple[tuple[str, ...], float]] = {
+    AS_IT_IS: ((), SOLE),
+    "no hair": (_HAIR, SOLE),
+    "feet to the floor": ((), FLOOR_SOLE),
+    NEITHER: (_HAIR, FLOOR_SOLE),
+    MIDDLE: (_MIDDLE, SOLE),
 }
 #: A pose that our joints cannot take tells of them and not of the flesh: one that starts farther off is left out, metres.
 MOST_START_M = 0.06
@@ -106,7 +108,7 @@ def _true_masks(recording: Recording, frames: int) -> Iterator[MaskStep]:
             yield MaskStep(frame, nothing, masks, nothing)
 
 
-def _body(points: np.ndarray, hair: bool, sole: float) -> BodyModel:
+def _body(points: np.ndarray, without: tuple[str, ...], sole: float) -> BodyModel:
     """The body of the joint lengths that a person's landmarks (n, 15, 3) have; what they do not tell is as usual for the stature."""
 
     def apart(*pairs: tuple[str, str]) -> float:
@@ -129,7 +131,7 @@ def _body(points: np.ndarray, hair: bool, sole: float) -> BodyModel:
         "shank": both("knee", "ankle"),
     }
     dimensions = default_body(stature(DEFAULT_LENGTHS | lengths)).dimensions | lengths
-    return make_body(dimensions if hair else dimensions | {"hair": 0.0}, sole=sole)
+    return make_body(dimensions | dict.fromkeys(without, 0.0), sole=sole)
 
 
 def report(cells: Sequence[Cell], plan: Plan) -> Report:
@@ -171,21 +173,26 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
 
 
 def _claims(labels: Sequence[str], means: dict[str, np.ndarray], up: np.ndarray) -> tuple[Claim, ...]:
-    n, one_each = len(labels), np.ones(len(labels))
-    helped = int((means[AS_IT_IS] < means[NEITHER]).sum())
-    nearer = difference(labels, (means[NEITHER], one_each), (means[AS_IT_IS], one_each))
     worst = int(np.argmax(np.abs(up)))
     return (
+        _nearer("hair and soles together bring", labels, means, NEITHER),
+        _nearer("joints beside the middle of their flesh bring", labels, means, MIDDLE),
         Claim(
-            f"hair and soles together bring landmarks nearer: on {LEAST_HELPED:.0%} of the recordings or more, and on their mean",
-            helped >= LEAST_HELPED * n and nearer.above_zero,
-            f"on {helped} of {n}; on the mean by {nearer} mm",
-        ),
-        Claim(
-            f"with them bodies are lifted or lowered by less than {MOST_UP_MM:g} mm on each recording",
+            f"with hair and soles bodies are lifted or lowered by less than {MOST_UP_MM:g} mm on each recording",
             bool(abs(up[worst]) < MOST_UP_MM),
             f"most on {labels[worst].rpartition('@')[0]}, {up[worst]:+.1f} mm",
         ),
+    )
+
+
+def _nearer(what: str, labels: Sequence[str], means: dict[str, np.ndarray], without: str) -> Claim:
+    n, one_each = len(labels), np.ones(len(labels))
+    helped = int((means[AS_IT_IS] < means[without]).sum())
+    nearer = difference(labels, (means[without], one_each), (means[AS_IT_IS], one_each))
+    return Claim(
+        f"{what} landmarks nearer: on {LEAST_HELPED:.0%} of the recordings or more, and on their mean",
+        helped >= LEAST_HELPED * n and nearer.above_zero,
+        f"on {helped} of {n}; on the mean by {nearer} mm",
     )
 
 

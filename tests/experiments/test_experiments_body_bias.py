@@ -7,11 +7,11 @@ import pytest
 from numpy.testing import assert_allclose
 
 from hmc.body.kinematics import landmarks
-from hmc.body.model import neutral_state
+from hmc.body.model import PARTS, neutral_state
 from hmc.body.proportions import DEFAULT_LENGTHS, SOLE, default_body, make_body
 from hmc.errors import InputError
 from hmc.experiments import body_bias
-from hmc.experiments.body_bias import AS_IT_IS, NEITHER
+from hmc.experiments.body_bias import AS_IT_IS, MIDDLE, NEITHER
 from hmc.experiments.engine.experiment import Cell, Plan
 from hmc.experiments.engine.inputs import Inputs
 from hmc.experiments.engine.library import find_experiment
@@ -32,16 +32,21 @@ def test_the_body_has_the_joint_lengths_of_the_landmarks():
     told = ("trunk", "shoulder_half_width", "hip_half_width", "upper_arm", "forearm", "thigh", "shank")
     person = make_body(usual | {name: usual[name] * rng.uniform(0.9, 1.1) for name in told})
     states = neutral_state("down", person.limits) + np.r_[np.zeros(6), np.full(21, 0.2)] * rng.normal(size=(5, 27))
-    found = body_bias._body(landmarks(person, states), True, SOLE)
+    found = body_bias._body(landmarks(person, states), (), SOLE)
     assert_allclose([found.dimensions[name] for name in (*told, "head")], [person.dimensions[name] for name in (*told, "head")])
     upright = ("trunk", "head", "thigh", "shank")
     stature = sum(person.dimensions[name] for name in upright) / sum(DEFAULT_LENGTHS[name] for name in upright)
     assert found.dimensions["hair"] == pytest.approx(DEFAULT_LENGTHS["hair"] * stature)
 
 
-def test_variants_differ_in_hair_and_soles_alone():
+def test_variants_differ_in_hair_in_soles_and_in_where_joints_are_alone():
     points = landmarks(default_body(1.7), neutral_state("down"))[None]
     bodies = {name: body_bias._body(points, *variant) for name, variant in body_bias.VARIANTS.items()}
+    middle = bodies.pop(MIDDLE)
+    arms = middle.cones.part == PARTS.index("l_forearm")
+    assert_allclose(middle.cones.start[arms][:, [0, 2]], 0, atol=1e-9)  # on the axis from joint to joint
+    assert_allclose(middle.cones.radii, bodies[AS_IT_IS].cones.radii)
+    assert_allclose(landmarks(middle, neutral_state("down")), points[0], atol=1e-9)
     lower = {name: bodies[AS_IT_IS].cones.end[:, 2] - body.cones.end[:, 2] for name, body in bodies.items()}
     hair, sole = 1.7 * DEFAULT_LENGTHS["hair"], 1.7 * (SOLE - body_bias.FLOOR_SOLE)
     changed = {name: sorted(by[np.abs(by) > 1e-9]) for name, by in lower.items()}
@@ -92,15 +97,21 @@ def holding(off_m):
 
 
 def test_claims_follow_the_figures():
-    assert holding(lambda body, name: (0, 0, 0.008 if body == AS_IT_IS else 0.012)) == [True, True]
-    assert holding(lambda body, name: (0, 0, 0.008)) == [False, True]
+    def bare(body):
+        return body in (NEITHER, MIDDLE)
+
+    assert holding(lambda body, name: (0, 0, 0.012 if bare(body) else 0.008)) == [True, True, True]
+    assert holding(lambda body, name: (0, 0, 0.012 if body == MIDDLE else 0.008)) == [False, True, True]
+    assert holding(lambda body, name: (0, 0, 0.012 if body == NEITHER else 0.008)) == [True, False, True]
+    assert holding(lambda body, name: (0, 0, 0.008)) == [False, False, True]
     # On five of eight only, and on seven of eight with a harm on the last that outweighs them.
     some, last = body_bias.CLIPS[:5], body_bias.CLIPS[-1]
-    assert holding(lambda body, name: (0.02 if body == AS_IT_IS and name in some else 0.03, 0, 0)) == [False, True]
-    assert holding(lambda body, name: (0.03 if (body == AS_IT_IS) == (name != last) else 0.1 if name == last else 0.031, 0, 0)) == [
+    assert holding(lambda body, name: (0.03 if bare(body) or name not in some else 0.02, 0, 0)) == [False, False, True]
+    assert holding(lambda body, name: (0.03 if bare(body) == (name == last) else 0.1 if name == last else 0.031, 0, 0)) == [
+        False,
         False,
         True,
     ]
     for sign in (1, -1):
-        lifted = holding(lambda body, name, sign=sign: (0.02 * (body != AS_IT_IS), 0, sign * (0.012 if name == last else 0.005)))
-        assert lifted == [True, False]
+        lifted = holding(lambda body, name, sign=sign: (0.02 * bare(body), 0, sign * (0.012 if name == last else 0.005)))
+        assert lifted == [True, True, False]

@@ -49,7 +49,7 @@ def standing(lift: float = 0.95) -> np.ndarray:
 def hull_of(state: np.ndarray, keep: np.ndarray = ALL):
     """The hulls of a body of some parts: every voxel that its flesh touches."""
     body, _ = body_of()
-    flesh = flesh_points(body, 0.015)
+    flesh = flesh_points(body, 0.01)
     rows = keep[flesh.part]
     points = place_points(*segment_transforms(body, state), flesh.points[rows], flesh.segment[rows])
     voxels = np.unique(GRID.index_of(points), axis=0)
