@@ -51,6 +51,9 @@ CANTON_LENGTHS: dict[str, float] = DEFAULT_LENGTHS | {
 #: body-bias`).
 SOLE = 0.036
 
+#: What hulls do not show of a hand, over stature.
+FINGER_TIPS = 0.006
+
 #: Factors on the radii of the flesh, one a group of parts.
 GIRTHS: tuple[str, ...] = ("torso", "depth", "head", "arms", "thighs", "shanks")
 
@@ -200,11 +203,12 @@ def _flesh(d: dict[str, float], sole: float) -> Cones:
     thighs, shanks = (d["girth_thighs"],) * 2, (d["girth_shanks"],) * 2
     front = d["arm_flesh_forward"]
     for side, sign in (("r", -1.0), ("l", 1.0)):
-        upper, fore, hand = (sign * d[name] for name in ("upper_arm", "forearm", "hand"))
+        upper, fore = sign * d["upper_arm"], sign * d["forearm"]
         armpit, elbow, wrist = (-d[f"{joint}_flesh_low"] for joint in ("shoulder", "elbow", "wrist"))
         cone(f"{side}_upper_arm", ((front, -sign * 0.01 * h, armpit), (front, upper, elbow)), ((0.034, 0.034), (0.025, 0.025)), x, arms)
         cone(f"{side}_forearm", ((front, 0, elbow), (front, fore, wrist)), ((0.026, 0.026), (0.016, 0.016)), x, arms)
-        cone(f"{side}_forearm", ((front, fore, wrist), (front, fore + hand, wrist)), ((0.021, 0.015), (0.016, 0.010)), x, arms)
+        shown = fore + sign * max(d["hand"] - FINGER_TIPS * h, 0.0)
+        cone(f"{side}_forearm", ((front, fore, wrist), (front, shown, wrist)), ((0.021, 0.015), (0.016, 0.010)), x, arms)
         cone(f"{side}_thigh", ((d["hip_flesh_forward"], 0, 0), (0, 0, -d["thigh"])), ((0.050, 0.050), (0.033, 0.033)), x, thighs)
         shank, ankle, foot = d["shank"], d["ankle_height"], d["foot"]
         calf, ankle_y = (-0.004 * h, 0, -0.4 * shank), sign * d["ankle_flesh_outward"]

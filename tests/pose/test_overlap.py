@@ -82,7 +82,7 @@ def test_quick_estimate_is_the_shared_volume():
     body = default_body(1.75)
     flesh = flesh_points(body, 0.01)
     state = neutral_state("sideways", body.limits)
-    state[dof_index("l_shoulder_z", "l_elbow_z")] = np.radians([10, -150])
+    state[dof_index("l_shoulder_x", "l_shoulder_y", "l_shoulder_z", "l_elbow_z")] = np.radians([-80, -90, 30, -60])
     rotations, positions = segment_transforms(body, state[None])
     estimate = quick(body, flesh, state[None], test_points=250)[0]
     volume = np.bincount(flesh.part, minlength=len(PARTS)) * 0.01**3
