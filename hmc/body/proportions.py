@@ -27,14 +27,15 @@ __all__ = [
 #: last neck vertebra is behind the hip centres (Mac-Thiong et al. 2010, Spine 35: E1193), while the chest and the skull are over or
 #: before them. From the line of hips and neck the chest's middle is `chest_forward` to the front, the crown `head_forward`. The crown is
 #: the skull's; silhouettes have its hair as well. Joints are not in the middle of the flesh around them: with the arms stretched sideways
-#: that of the arms is lower and more to the front; that of waist and hips is to the front, of ankles and feet outward, by the lengths
-#: that are named so (`python -m hmc.experiments run body-bias`).
+#: that of the arms is lower and more to the front; that of waist and hips is to the front, of hips inward, of ankles and feet outward, by
+#: the lengths that are named so (`python -m hmc.experiments run body-bias`).
 DEFAULT_LENGTHS: dict[str, float] = {
     "trunk": 0.318, "head": 0.147, "shoulder_half_width": 0.104, "shoulder_drop": 0.060, "hip_half_width": 0.060,
     "upper_arm": 0.157, "forearm": 0.150, "hand": 0.085, "thigh": 0.245, "shank": 0.250, "ankle_height": 0.046, "foot": 0.105,
     "chest_forward": 0.010, "head_forward": 0.020, "hair": 0.010,
     "shoulder_flesh_low": 0.0046, "elbow_flesh_low": 0.0034, "wrist_flesh_low": 0.0069, "arm_flesh_forward": 0.0023,
-    "waist_flesh_forward": 0.0046, "hip_flesh_forward": 0.0034, "ankle_flesh_outward": 0.0046,
+    "waist_flesh_forward": 0.0046, "hip_flesh_forward": 0.0034, "hip_flesh_inward": 0.0040,
+    "ankle_flesh_outward": 0.0046,
 }  # fmt: skip
 #: What is 0 in a body that was stored before it was known, and in Canton's: joints in the middle of the flesh, which ends at the crown.
 _ONCE_UNKNOWN = ("hair", *(name for name in DEFAULT_LENGTHS if "_flesh_" in name))
@@ -209,7 +210,8 @@ def _flesh(d: dict[str, float], sole: float) -> Cones:
         cone(f"{side}_forearm", ((front, 0, elbow), (front, fore, wrist)), ((0.026, 0.026), (0.016, 0.016)), x, arms)
         shown = fore + sign * max(d["hand"] - FINGER_TIPS * h, 0.0)
         cone(f"{side}_forearm", ((front, fore, wrist), (front, shown, wrist)), ((0.021, 0.015), (0.016, 0.010)), x, arms)
-        cone(f"{side}_thigh", ((d["hip_flesh_forward"], 0, 0), (0, 0, -d["thigh"])), ((0.050, 0.050), (0.033, 0.033)), x, thighs)
+        hip = (d["hip_flesh_forward"], -sign * d["hip_flesh_inward"], 0)
+        cone(f"{side}_thigh", (hip, (0, 0, -d["thigh"])), ((0.050, 0.050), (0.033, 0.033)), x, thighs)
         shank, ankle, foot = d["shank"], d["ankle_height"], d["foot"]
         calf, ankle_y = (-0.004 * h, 0, -0.4 * shank), sign * d["ankle_flesh_outward"]
         cone(f"{side}_shank", ((0, 0, 0), calf), ((0.030, 0.032), (0.031, 0.033)), y, shanks)
