@@ -34,7 +34,7 @@ DEFAULT_LENGTHS: dict[str, float] = {
     "upper_arm": 0.157, "forearm": 0.150, "hand": 0.085, "thigh": 0.245, "shank": 0.250, "ankle_height": 0.046, "foot": 0.105,
     "chest_forward": 0.010, "head_forward": 0.020, "hair": 0.010,
     "shoulder_flesh_low": 0.0046, "elbow_flesh_low": 0.0034, "wrist_flesh_low": 0.0069, "arm_flesh_forward": 0.0023,
-    "waist_flesh_forward": 0.0046, "hip_flesh_forward": 0.0034, "hip_flesh_inward": 0.0040,
+    "waist_flesh_forward": 0.0046, "hip_flesh_forward": 0.0034, "hip_flesh_inward": 0.0020,
     "ankle_flesh_outward": 0.0046,
 }  # fmt: skip
 #: What is 0 in a body that was stored before it was known, and in Canton's: joints in the middle of the flesh, which ends at the crown.

@@ -133,9 +133,12 @@ def _examine(tables: CarvingTables, samples, hulls: Sequence[np.ndarray], place:
             cuts = [cut_body(image, mask, *one) for image, mask, one in zip(frame, masks, zip(figures, colors, strict=True), strict=True)]
             measured.append(_measure(tables, place, cuts, masks, figures))
         litres, lowest, top, x, y, *agree = np.median(np.array(measured), axis=0)
-        if not (LITRES[0] <= litres <= LITRES[1] and lowest <= LOWEST_M and top >= TOP_M and np.sort(agree)[1] >= AGREE):
+        if litres < LITRES[0]:
+            return None
+        if last and not (litres <= LITRES[1] and lowest <= LOWEST_M and top >= TOP_M and np.sort(agree)[1] >= AGREE):
             return None
         if not last:
+            # Places are tried a step apart: what is cut out beside the true one misses the feet.
             place = replace(place, x=float(x), y=float(y), stature_m=float(top))
     return StillPerson(place, figures, colors)
 

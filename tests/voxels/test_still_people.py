@@ -8,6 +8,7 @@ import pytest
 from hmc.camera.model import Rig
 from hmc.camera.standing import Standing
 from hmc.camera.standing_cut import figure
+from hmc.voxels import still_people
 from hmc.voxels.carving import make_tables
 from hmc.voxels.grid import VoxelGrid
 from hmc.voxels.still_people import cut_still_people, find_still_people
@@ -70,3 +71,12 @@ def test_who_is_known_already_is_not_found_once_more(ring):
 def test_too_few_samples_tell_nothing(ring):
     tables, samples, nobody = drawn(ring, 0.03)
     assert find_still_people(tables, samples[:4], nobody[:4]) == ((), ())
+
+
+@pytest.mark.parametrize("off", [(0.12, 0.0), (0.0, -0.12), (-0.12, 0.08), (0.12, -0.12)])
+def test_a_place_that_was_tried_beside_the_person_leads_to_the_person(ring, monkeypatch, off):
+    tables, samples, nobody = drawn(ring, 0.03)
+    beside = replace(PLACE, x=PLACE.x + off[0], y=PLACE.y + off[1], stature_m=1.4)
+    monkeypatch.setattr(still_people, "find_standing", lambda *_: [beside])
+    (person,), _ = find_still_people(tables, samples, nobody)
+    assert np.hypot(person.place.x - PLACE.x, person.place.y - PLACE.y) < np.hypot(*off) - 0.04
