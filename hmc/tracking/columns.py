@@ -87,38 +87,37 @@ def find_columns(observation: Observation, strict: bool = True) -> Columns:
     Columns
     """
     sure = np.flatnonzero(observation.certain) if strict else np.arange(len(observation.points))
-    columns, left = Columns(), sure
-    while True:
-        found = _columns_at(observation, sure, _maxima(observation, left))
-        rest = np.setdiff1d(left, np.concatenate([*found.voxels, left[:0]]))
-        if len(rest) == len(left):
-            return columns
-        if len(columns):
-            found = found.take(_trunk_volumes(observation, found) >= BESIDE_M3)
-        columns, left = Columns(np.concatenate([columns.centres, found.centres]), columns.voxels + found.voxels), rest
-
-
-def _columns_at(observation: Observation, sure: np.ndarray, centres: np.ndarray) -> Columns:
-    """Columns around some places, (m, 2), of the hull's voxels `sure`."""
+    whole = _from_above(observation, sure)
+    upper = _from_above(observation, sure[observation.points[sure, 2] >= UPPER_M])
+    size, first = observation.voxel_size_m, observation.grid.bounds[0, :2]
+    places = np.moveaxis(np.indices(whole.shape), 0, -1)[:, :, None] + 0.5
+    centres = np.zeros((0, 2))
+    while len(middles := _maxima(upper, size)):
+        away = np.hypot(*np.moveaxis(places - middles, -1, 0)) * size
+        held = (away <= BODY_M).any(axis=2)
+        if not upper[held].any():
+            break
+        if len(centres):
+            trunks = np.einsum("xyk,xy->k", away <= TRUNK_M, whole)
+            middles = middles[trunks >= BESIDE_M3]
+        centres = np.concatenate([centres, first + middles * size])
+        upper = np.where(held, np.float32(0), upper)
     across = observation.points[sure, None, :2] - centres
     near = np.einsum("nkc,nkc->nk", across, across) <= BODY_M**2
     return Columns(centres, tuple(sure[mine] for mine in near.T))
 
 
-def _trunk_volumes(observation: Observation, columns: Columns) -> np.ndarray:
-    """Cubic metres of each column from the floor to the head within `TRUNK_M` of its middle, shape (m,)."""
-    across = (observation.points[rows, :2] - centre for rows, centre in zip(columns.voxels, columns.centres, strict=True))
-    return np.array([(np.hypot(*one.T) <= TRUNK_M).sum() for one in across]) * observation.voxel_size_m**3
+def _from_above(observation: Observation, rows: np.ndarray) -> np.ndarray:
+    """Volume of some voxels over each place of the floor, (nx, ny), cubic metres."""
+    x, y = observation.indices[rows, :2].T
+    volume = np.zeros(observation.grid.shape[:2], np.float32)
+    np.add.at(volume, (x, y), observation.voxel_size_m**3)
+    return volume
 
 
-def _maxima(observation: Observation, rows: np.ndarray) -> np.ndarray:
-    """Places, shape (m, 2), where the volume of some voxels above `UPPER_M` is a local maximum, the fullest first."""
-    size, grid = observation.voxel_size_m, observation.grid
-    upper = rows[observation.points[rows, 2] >= UPPER_M]
-    x, y = observation.indices[upper, :2].T
-    heights = np.zeros(grid.shape[:2], np.float32)
-    np.add.at(heights, (x, y), size**3)
-    volume = cv2.filter2D(heights, -1, _disc(TRUNK_M / size).astype(np.float32), borderType=cv2.BORDER_CONSTANT)
+def _maxima(upper: np.ndarray, size: float) -> np.ndarray:
+    """Middles of local maxima of a volume that is summed up over heads and shoulders, shape (m, 2), in voxels; the fullest first."""
+    volume = cv2.filter2D(upper, -1, _disc(TRUNK_M / size).astype(np.float32), borderType=cv2.BORDER_CONSTANT)
     highest = cv2.dilate(volume, _disc(APART_M / size))
     peaks = np.argwhere((volume >= LEAST_M3) & (volume == highest))
     peaks = peaks[np.argsort(-volume[tuple(peaks.T)], kind="stable")]
@@ -130,7 +129,7 @@ def _maxima(observation: Observation, rows: np.ndarray) -> np.ndarray:
         if here.sum() * size**2 <= MOST_M2 and not any(here[top] for top in tops):
             tops.append(place)
             middles.append(np.argwhere(here).mean(axis=0))
-    return grid.bounds[0, :2] + (np.array(middles).reshape(-1, 2) + 0.5) * size
+    return np.array(middles).reshape(-1, 2) + 0.5
 
 
 def explaining(views: FrameViews, points: np.ndarray, columns: Columns, voxel_size_m: float, most: int | None = None) -> np.ndarray:

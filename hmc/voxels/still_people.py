@@ -135,11 +135,11 @@ def _examine(tables: CarvingTables, samples, hulls: Sequence[np.ndarray], place:
         litres, lowest, top, x, y, *agree = np.median(np.array(measured), axis=0)
         if litres < LITRES[0]:
             return None
-        if last and not (litres <= LITRES[1] and lowest <= LOWEST_M and top >= TOP_M and np.sort(agree)[1] >= AGREE):
-            return None
         if not last:
             # Places are tried a step apart: what is cut out beside the true one misses the feet.
             place = replace(place, x=float(x), y=float(y), stature_m=float(top))
+        elif not (litres <= LITRES[1] and lowest <= LOWEST_M and top >= TOP_M and np.sort(agree)[1] >= AGREE):
+            return None
     return StillPerson(place, figures, colors)
 
 
