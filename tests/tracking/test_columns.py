@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from hmc.camera.model import Rig, look_at, project
 from hmc.tracking.blobs import observe
-from hmc.tracking.columns import BODY_M, OWN_SHARE, OWN_VIEWS, explaining, find_columns
+from hmc.tracking.columns import BODY_M, OWN_SHARE, OWN_VIEWS, TRUNK_M, WHOLE_M3, WHOLE_SHARE, explaining, find_columns
 from hmc.tracking.following import init
 from hmc.tracking.rules.upright import match_columns
 from hmc.tracking.settings import FollowingSettings
@@ -93,10 +93,15 @@ def test_each_that_is_kept_has_its_own_share_and_who_adds_least_goes_first(place
     observation = seen([body(*place) for place in places])
     columns = find_columns(observation)
     kept = np.flatnonzero(explaining(observation.views, observation.points, columns, observation.voxel_size_m)).tolist()
+    trunks = [
+        sum(np.hypot(*(point[:2] - centre)) <= TRUNK_M for point in observation.points[voxels]) * GRID.voxel_size_m**3
+        for centre, voxels in zip(columns.centres, columns.voxels, strict=True)
+    ]
+    enough = [WHOLE_SHARE if trunk >= WHOLE_M3 else OWN_SHARE for trunk in trunks]
     chosen = list(range(len(columns)))
     while chosen:
-        shares = [own_share(observation, columns, chosen, j) for j in chosen]
-        if min(shares) >= OWN_SHARE:
+        shares = [own_share(observation, columns, chosen, j) / enough[j] for j in chosen]
+        if min(shares) >= 1:
             break
         chosen.remove(chosen[int(np.argmin(shares))])
     assert kept == chosen
