@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 import hmc
+from hmc.body.joints import N_DOF
 from hmc.body.kinematics import landmarks
 from hmc.body.model import PARTS, BodyModel
 from hmc.landmarks import landmark_index
@@ -53,7 +54,7 @@ class TopOfHead:
 
     def linearise(self, state, near=None):
         around = self.residual(state + STEP * np.vstack([np.eye(len(state)), -np.eye(len(state))]))
-        return HeightAt(self.residual(state[None]), (around[:27] - around[27:])[None] / (2 * STEP))
+        return HeightAt(self.residual(state[None]), (around[:N_DOF] - around[N_DOF:])[None] / (2 * STEP))
 
     def coarser(self, rng, n):
         return self

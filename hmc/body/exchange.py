@@ -34,12 +34,12 @@ def swapped_pose(body: BodyModel, state: np.ndarray, what: Literal["all", "legs"
     Parameters
     ----------
     body : BodyModel
-    state : ndarray, shape (27,)
+    state : ndarray, shape (33,)
     what : {"all", "legs", "arms"}
 
     Returns
     -------
-    ndarray, shape (27,)
+    ndarray, shape (33,)
         Within the joint limits, so it fits the hull as well as the body can that way round.
     """
     points = landmarks(body, state)
@@ -60,10 +60,10 @@ def swapped_poses(body: BodyModel, state: np.ndarray) -> np.ndarray:
     Parameters
     ----------
     body : BodyModel
-    state : ndarray, shape (27,)
+    state : ndarray, shape (33,)
 
     Returns
     -------
-    ndarray, shape (3, 27)
+    ndarray, shape (3, 33)
     """
     return np.array([swapped_pose(body, state, "all"), swapped_pose(body, state, "legs"), swapped_pose(body, state, "arms")])

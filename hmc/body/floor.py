@@ -27,8 +27,8 @@ def floor_gap(body: BodyModel, rotations: np.ndarray, positions: np.ndarray, flo
     Parameters
     ----------
     body : BodyModel
-    rotations : ndarray, shape (n, 11, 3, 3)
-    positions : ndarray, shape (n, 11, 3)
+    rotations : ndarray, shape (n, 14, 3, 3)
+    positions : ndarray, shape (n, 14, 3)
         As from `hmc.body.kinematics.segment_transforms`.
     floor_z : float
         Height of the floor, metres.

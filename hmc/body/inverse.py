@@ -42,7 +42,7 @@ class _Misses:
         return self.miss.ravel()
 
     def pulls(self) -> tuple[slice, np.ndarray]:
-        """All residuals, and how they change with the state, shape (3 k, 27)."""
+        """All residuals, and how they change with the state, shape (3 k, 33)."""
         # axis x (p - centre) for all points and angles, coordinate by coordinate: `numpy.cross` takes several times as long.
         (x, y, z), (u, v, w) = self.axes.T, (self.places[:, None] - self.centres).transpose(2, 0, 1)
         jacobian = np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=1)
@@ -61,7 +61,7 @@ def fit_landmarks(
     body : BodyModel
     points : ndarray, shape (15, 3)
         World, metres; NaN where a landmark is not known.
-    start : ndarray, shape (27,)
+    start : ndarray, shape (33,)
         Start; angles that the landmarks leave open stay near it.
     iterations : int
         Most steps tried.
@@ -70,7 +70,7 @@ def fit_landmarks(
 
     Returns
     -------
-    state : ndarray, shape (27,)
+    state : ndarray, shape (33,)
     error : float
         Root mean squared distance of the known landmarks, metres.
     """

@@ -1,8 +1,9 @@
-"""The 27 degrees of freedom of the body and how its rigid segments hang on one another.
+"""The degrees of freedom of the body and how its rigid segments hang on one another.
 
-Source: Canton (2009), section 6.3.4 and Table 6.1. The root (pelvis) has three translations and three rotations; the other
-21 angles turn about axes of the parent's frame, in the order of the table. Neutral pose: standing, arms stretched sideways
-along Y; X forward, Y to the person's left, Z up.
+The first 27 are those of Canton (2009), section 6.3.4 and Table 6.1: the root (pelvis) has three translations and three rotations; the
+other 21 angles turn about axes of the parent's frame, in the order of the table. Six more, of ours, come after them: the spine bends
+between waist and chest, and each shoulder girdle is raised and brought forward. The papers' bodies hold these at 0. Neutral pose:
+standing, arms stretched sideways along Y; X forward, Y to the person's left, Z up.
 """
 
 from __future__ import annotations
@@ -11,7 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["DOF_NAMES", "N_DOF", "SEGMENTS", "JointLimits", "Segment", "canton_limits", "default_limits", "dof_index", "mirror_state"]
+__all__ = [
+    "DOF_NAMES", "N_CANTON", "N_DOF", "SEGMENTS", "TRUNK_JOINTS", "JointLimits", "Segment", "canton_limits", "default_limits", "dof_index",
+    "mirror_state",
+]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -34,29 +38,43 @@ class Segment:
     joint: str
     axes: str
 
+    @property
+    def angles(self) -> tuple[str, ...]:
+        """Names of its angles."""
+        return tuple(f"{self.joint}_{axis if self.parent >= 0 else 'r' + axis}" for axis in self.axes)
+
 
 #: Parents come before children. The root's rotation is yaw, pitch, roll: ``R = R_z R_y R_x``.
 SEGMENTS: tuple[Segment, ...] = (
     Segment("pelvis", -1, "root", "zyx"),
     Segment("torso", 0, "torso", "xyz"),
-    Segment("head", 1, "neck", "xy"),
-    Segment("r_upper_arm", 1, "r_shoulder", "xyz"),
-    Segment("r_forearm", 3, "r_elbow", "z"),
-    Segment("l_upper_arm", 1, "l_shoulder", "xyz"),
-    Segment("l_forearm", 5, "l_elbow", "z"),
+    Segment("chest", 1, "spine", "xy"),
+    Segment("head", 2, "neck", "xy"),
+    Segment("r_clavicle", 2, "r_girdle", "xz"),
+    Segment("r_upper_arm", 4, "r_shoulder", "xyz"),
+    Segment("r_forearm", 5, "r_elbow", "z"),
+    Segment("l_clavicle", 2, "l_girdle", "xz"),
+    Segment("l_upper_arm", 7, "l_shoulder", "xyz"),
+    Segment("l_forearm", 8, "l_elbow", "z"),
     Segment("r_thigh", 0, "r_hip", "xyz"),
-    Segment("r_shank", 7, "r_knee", "y"),
+    Segment("r_shank", 10, "r_knee", "y"),
     Segment("l_thigh", 0, "l_hip", "xyz"),
-    Segment("l_shank", 9, "l_knee", "y"),
+    Segment("l_shank", 12, "l_knee", "y"),
 )
+
+#: Joints that Canton's body does not have; their angles come last in a state.
+TRUNK_JOINTS: tuple[str, ...] = ("spine", "r_girdle", "l_girdle")
 
 #: Names of the state's entries, in order: metres for the first three, radians for the others.
 DOF_NAMES: tuple[str, ...] = (
     "root_tx", "root_ty", "root_tz",
-    *(f"{segment.joint}_{axis if segment.parent >= 0 else 'r' + axis}" for segment in SEGMENTS for axis in segment.axes),
+    *(name for one in SEGMENTS if one.joint not in TRUNK_JOINTS for name in one.angles),
+    *(name for one in SEGMENTS if one.joint in TRUNK_JOINTS for name in one.angles),
 )  # fmt: skip
 
 N_DOF = len(DOF_NAMES)
+#: Of them, those of Canton's body, which are the first.
+N_CANTON = sum(not name.startswith(TRUNK_JOINTS) for name in DOF_NAMES)
 
 
 def dof_index(*names: str) -> np.ndarray:
@@ -75,7 +93,7 @@ def dof_index(*names: str) -> np.ndarray:
 
 @dataclass(frozen=True)
 class JointLimits:
-    """Smallest and largest value of every degree of freedom, each of shape (27,); infinite where there is none."""
+    """Smallest and largest value of every degree of freedom, each of shape (33,); infinite where there is none."""
 
     low: np.ndarray
     high: np.ndarray
@@ -99,16 +117,19 @@ _DEFAULT_DEG: dict[str, tuple[float, float]] = _CANTON_DEG | {
     "r_hip_x": (-80, 40), "r_hip_y": (-140, 50), "r_knee_y": (-8, 155),
     "l_hip_x": (-40, 80), "l_hip_y": (-140, 50), "l_knee_y": (-8, 155),
     "torso_x": (-40, 40), "torso_y": (-35, 90), "torso_z": (-45, 45),
+    "spine_x": (-25, 25), "spine_y": (-20, 45),
+    "r_girdle_x": (-35, 12), "r_girdle_z": (-20, 35), "l_girdle_x": (-12, 35), "l_girdle_z": (-35, 20),
 }  # fmt: skip
 
 
 def _limits(degrees: dict[str, tuple[float, float]]) -> JointLimits:
-    bounds = np.array([degrees.get(name, (-np.inf, np.inf)) for name in DOF_NAMES])
+    free, held = (-np.inf, np.inf), (0, 0)
+    bounds = np.array([degrees.get(name, held if name.startswith(TRUNK_JOINTS) else free) for name in DOF_NAMES])
     return JointLimits(np.radians(bounds[:, 0]), np.radians(bounds[:, 1]))
 
 
 def canton_limits() -> JointLimits:
-    """Angular ranges of Canton (2009), Table 6.1."""
+    """Angular ranges of Canton (2009), Table 6.1; the trunk's own joints are held at 0."""
     return _limits(_CANTON_DEG)
 
 
@@ -122,11 +143,11 @@ def mirror_state(states: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    states : ndarray, shape (..., 27)
+    states : ndarray, shape (..., 33)
 
     Returns
     -------
-    ndarray, shape (..., 27)
+    ndarray, shape (..., 33)
         Mirrored in the body's own XZ plane, save root and waist, which keep their angles.
     """
     states = np.asarray(states, float)

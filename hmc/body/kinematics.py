@@ -15,31 +15,25 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import DTypeLike
 
-from hmc.body.joints import N_DOF, SEGMENTS
+from hmc.body.joints import DOF_NAMES, N_DOF, SEGMENTS
 from hmc.body.model import BodyModel
 from hmc.body.proportions import landmark_segments
 
 __all__ = ["SEGMENT_DOFS", "dof_masks", "joint_twists", "landmark_masks", "landmarks", "place_segments", "segment_transforms"]
 
 _LANDMARK_SEGMENTS = landmark_segments()
-
-
-def _segment_dofs() -> tuple[tuple[int, ...], ...]:
-    out, place = [], 3
-    for segment in SEGMENTS:
-        out.append(tuple(range(place, place + len(segment.axes))))
-        place += len(segment.axes)
-    return tuple(out)
-
-
 #: Places in the state of each segment's angles.
-SEGMENT_DOFS = _segment_dofs()
+SEGMENT_DOFS: tuple[tuple[int, ...], ...] = tuple(tuple(DOF_NAMES.index(name) for name in one.angles) for one in SEGMENTS)
+#: The segment at whose joint each angle turns, shape (30,).
+_SEGMENT_OF_ANGLE = np.array([next(k for k, dofs in enumerate(SEGMENT_DOFS) if place in dofs) for place in range(3, N_DOF)])
 
 #: Segments by their depth in the tree; within a depth, those that turn about one axis stand side by side.
 _DEPTHS = (
     ("pelvis",),
     ("torso", "r_thigh", "l_thigh"),
-    ("r_upper_arm", "l_upper_arm", "head", "r_shank", "l_shank"),
+    ("chest", "r_shank", "l_shank"),
+    ("head", "r_clavicle", "l_clavicle"),
+    ("r_upper_arm", "l_upper_arm"),
     ("r_forearm", "l_forearm"),
 )
 _UNIT = np.eye(3)
@@ -99,20 +93,18 @@ def _plan() -> tuple[tuple[_Depth, ...], np.ndarray, np.ndarray]:
 
 _TREE, _ORDER, _TURN_DOFS = _plan()
 _SEGMENT_PLACES, _TURN_PLACES = np.argsort(_ORDER), np.argsort(_TURN_DOFS)
-#: The segment at whose joint each angle turns, shape (24,).
-_SEGMENT_OF_ANGLE = np.repeat(np.arange(len(SEGMENTS)), [len(segment.axes) for segment in SEGMENTS])
 
 
 def _place(body: BodyModel, states: np.ndarray, origin: np.ndarray | float, dtype: DTypeLike, axes: np.ndarray | None = None) -> np.ndarray:
-    """Frames of all segments, shape (11, 3, 4, n): rotation (world from segment) and position, from `origin`, side by side.
+    """Frames of all segments, shape (14, 3, 4, n): rotation (world from segment) and position, from `origin`, side by side.
 
     Parameters
     ----------
     body : BodyModel
-    states : ndarray, shape (n, 27)
+    states : ndarray, shape (n, 33)
     origin : ndarray, shape (3,), or 0
     dtype : data type
-    axes : ndarray, shape (24, 3, n), optional
+    axes : ndarray, shape (30, 3, n), optional
         Where the directions of the angles' axes go, world, in the order of the turns.
     """
     angles = states.T.take(_TURN_DOFS, axis=0).astype(dtype, copy=False)
@@ -146,14 +138,14 @@ def place_segments(body: BodyModel, states: np.ndarray, origin: np.ndarray) -> n
     Parameters
     ----------
     body : BodyModel
-    states : ndarray, shape (n, 27)
+    states : ndarray, shape (n, 33)
         Metres and radians.
     origin : ndarray, shape (3,)
         Somewhere near, world, metres: positions are counted from here, as single precision is coarse far from its zero.
 
     Returns
     -------
-    ndarray of float32, shape (11, 3, 4, n)
+    ndarray of float32, shape (14, 3, 4, n)
         Rotation (world from segment) and position side by side.
     """
     return _place(body, np.asarray(states, float), origin, np.float32)
@@ -165,14 +157,14 @@ def segment_transforms(body: BodyModel, states: np.ndarray) -> tuple[np.ndarray,
     Parameters
     ----------
     body : BodyModel
-    states : ndarray, shape (..., 27)
+    states : ndarray, shape (..., 33)
         Metres and radians, in the order of `hmc.body.joints.DOF_NAMES`.
 
     Returns
     -------
-    rotations : ndarray, shape (..., 11, 3, 3)
+    rotations : ndarray, shape (..., 14, 3, 3)
         World from segment.
-    positions : ndarray, shape (..., 11, 3)
+    positions : ndarray, shape (..., 14, 3)
         The segments' joints in the world, metres.
     """
     states = np.asarray(states, float)
@@ -186,7 +178,7 @@ def landmarks(body: BodyModel, states: np.ndarray) -> np.ndarray:
     Parameters
     ----------
     body : BodyModel
-    states : ndarray, shape (..., 27)
+    states : ndarray, shape (..., 33)
 
     Returns
     -------
@@ -206,13 +198,13 @@ def joint_twists(body: BodyModel, state: np.ndarray) -> tuple[np.ndarray, np.nda
     Parameters
     ----------
     body : BodyModel
-    state : ndarray, shape (27,)
+    state : ndarray, shape (33,)
 
     Returns
     -------
-    axes : ndarray, shape (27, 3)
+    axes : ndarray, shape (33, 3)
         Unit axes; for the three translations the direction of motion.
-    centres : ndarray, shape (27, 3)
+    centres : ndarray, shape (33, 3)
         A point of each axis, metres.
     rotations, positions : ndarray
         As from `segment_transforms`, for this one state.
@@ -229,7 +221,7 @@ def joint_twists(body: BodyModel, state: np.ndarray) -> tuple[np.ndarray, np.nda
 
 
 def dof_masks() -> np.ndarray:
-    """Which degrees of freedom move which segments, shape (11, 27), bool."""
+    """Which degrees of freedom move which segments, shape (14, 33), bool."""
     masks = np.zeros((len(SEGMENTS), N_DOF), bool)
     masks[:, :3] = True
     for index, segment in enumerate(SEGMENTS):
@@ -240,7 +232,7 @@ def dof_masks() -> np.ndarray:
 
 
 def landmark_masks(body: BodyModel) -> np.ndarray:
-    """Which degrees of freedom move which landmarks, shape (15, 27), bool: a knee is not moved by its own angle."""
+    """Which degrees of freedom move which landmarks, shape (15, 33), bool: a knee is not moved by its own angle."""
     masks, at_joint = dof_masks(), np.linalg.norm(body.tips, axis=1) < 1e-9
     carriers = [
         SEGMENTS[k].parent if still and SEGMENTS[k].parent >= 0 else k for k, still in zip(_LANDMARK_SEGMENTS, at_joint, strict=True)

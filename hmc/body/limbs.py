@@ -81,5 +81,5 @@ def _chain_of_part() -> np.ndarray:
 
 #: The kinematic chain of each part, shape (10,): 0 the trunk with the head, then the limbs in the table's order.
 CHAIN_OF_PART = _chain_of_part()
-#: The same of each degree of freedom, shape (27,).
+#: The same of each degree of freedom, shape (33,).
 CHAIN_OF_DOF = CHAIN_OF_PART[PART_OF_DOF]

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from hmc.body.joints import N_DOF, SEGMENTS, JointLimits, default_limits, dof_index
+from hmc.body.joints import DOF_NAMES, N_DOF, SEGMENTS, JointLimits, default_limits, dof_index
 from hmc.body.rest import HANGING_DEG
 
 __all__ = ["PARTS", "PART_OF_DOF", "PART_OF_SEGMENT", "BodyModel", "Cones", "neutral_state"]
@@ -18,10 +18,10 @@ PARTS: tuple[str, ...] = (
     "r_upper_arm", "r_forearm", "l_upper_arm", "l_forearm",
     "r_thigh", "r_shank", "l_thigh", "l_shank",
 )  # fmt: skip
-#: The part that each segment carries, shape (n_segments,); the pelvis is of the torso.
+#: The part that each segment carries, shape (n_segments,); pelvis, chest and clavicles are of the torso.
 PART_OF_SEGMENT = np.array([PARTS.index(segment.name) if segment.name in PARTS else 0 for segment in SEGMENTS])
-#: The part that each degree of freedom moves first, shape (27,). The root has three translations beside its angles.
-PART_OF_DOF = np.repeat(PART_OF_SEGMENT, [len(segment.axes) + 3 * (segment.parent < 0) for segment in SEGMENTS])
+#: The part that each degree of freedom moves first, shape (33,).
+PART_OF_DOF = np.array([PART_OF_SEGMENT[[name.startswith(one.joint) for one in SEGMENTS].index(True)] for name in DOF_NAMES])
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ class BodyModel:
     ----------
     height_m : float
         Stature.
-    offsets : ndarray, shape (11, 3)
+    offsets : ndarray, shape (14, 3)
         Each segment's joint in its parent's frame (row 0, the root, is zero).
     tips : ndarray, shape (15, 3)
         Each landmark in the frame of `landmark_segments`.
@@ -105,7 +105,7 @@ def neutral_state(arms: str = "down", limits: JointLimits | None = None) -> np.n
 
     Returns
     -------
-    ndarray, shape (27,)
+    ndarray, shape (33,)
     """
     if arms not in ("sideways", "down"):
         raise ValueError(f"`arms` must be 'sideways' or 'down'; got {arms!r}")

@@ -28,17 +28,19 @@ __all__ = [
 #: before them. From the line of hips and neck the chest's middle is `chest_forward` to the front, the crown `head_forward`. The crown is
 #: the skull's; silhouettes have its hair as well. Joints are not in the middle of the flesh around them: with the arms stretched sideways
 #: that of the arms is lower and more to the front; that of waist and hips is to the front, of hips inward, of ankles and feet outward, by
-#: the lengths that are named so (`python -m hmc.experiments run body-bias`).
+#: the lengths that are named so. The spine bends `lumbar` above the hips' middle, about at the lowest rib; each shoulder turns with its
+#: collar bone about a point `collar` inward (`python -m hmc.experiments run body-bias`).
 DEFAULT_LENGTHS: dict[str, float] = {
     "trunk": 0.318, "head": 0.147, "shoulder_half_width": 0.104, "shoulder_drop": 0.060, "hip_half_width": 0.060,
     "upper_arm": 0.157, "forearm": 0.150, "hand": 0.085, "thigh": 0.245, "shank": 0.250, "ankle_height": 0.046, "foot": 0.105,
     "chest_forward": 0.010, "head_forward": 0.020, "hair": 0.010,
     "shoulder_flesh_low": 0.0046, "elbow_flesh_low": 0.0034, "wrist_flesh_low": 0.0069, "arm_flesh_forward": 0.0023,
     "waist_flesh_forward": 0.0046, "hip_flesh_forward": 0.0034, "hip_flesh_inward": 0.0020,
-    "ankle_flesh_outward": 0.0046,
+    "ankle_flesh_outward": 0.0046, "lumbar": 0.143, "collar": 0.083,
 }  # fmt: skip
-#: What is 0 in a body that was stored before it was known, and in Canton's: joints in the middle of the flesh, which ends at the crown.
-_ONCE_UNKNOWN = ("hair", *(name for name in DEFAULT_LENGTHS if "_flesh_" in name))
+#: What is 0 in a body that was stored before it was known, and in Canton's: joints in the middle of the flesh, which ends at the crown, and
+#: a trunk of one piece.
+_ONCE_UNKNOWN = ("hair", "lumbar", "collar", *(name for name in DEFAULT_LENGTHS if "_flesh_" in name))
 
 #: Table 6.1 of Canton (2009), which gives no widths (hips: ours; shoulders: so that the arms span about the height), no hand or foot.
 CANTON_LENGTHS: dict[str, float] = DEFAULT_LENGTHS | {
@@ -80,8 +82,8 @@ def make_body(dimensions: dict[str, float], limits: JointLimits | None = None, s
     ----------
     dimensions : dict
         ``height`` (metres), the lengths of `DEFAULT_LENGTHS` (metres) and ``girth_<group>`` for each of `GIRTHS` (factors). Without
-        hair the flesh ends at the crown, and without lengths named ``_flesh_`` joints are in its middle, as in results that were made
-        before these were known.
+        hair the flesh ends at the crown, without lengths named ``_flesh_`` joints are in its middle, and without `lumbar` and `collar` the
+        trunk is of one piece, as in results that were made before these were known.
     limits : JointLimits, optional
         `default_limits` unless given.
     sole : float
@@ -109,9 +111,12 @@ def make_body(dimensions: dict[str, float], limits: JointLimits | None = None, s
     def put(name: str, offset) -> None:
         offsets[_SEGMENT_INDEX[name]] = offset
 
-    put("head", (0, 0, d["trunk"]))
+    lumbar = d["lumbar"]
+    put("chest", (0, 0, lumbar))
+    put("head", (0, 0, d["trunk"] - lumbar))
     for side, sign in (("l", 1.0), ("r", -1.0)):
-        put(f"{side}_upper_arm", (0, sign * d["shoulder_half_width"], d["trunk"] - d["shoulder_drop"]))
+        put(f"{side}_clavicle", (0, sign * (d["shoulder_half_width"] - d["collar"]), d["trunk"] - d["shoulder_drop"] - lumbar))
+        put(f"{side}_upper_arm", (0, sign * d["collar"], 0))
         put(f"{side}_forearm", (0, sign * d["upper_arm"], 0))
         put(f"{side}_thigh", (0, sign * d["hip_half_width"], 0))
         put(f"{side}_shank", (0, 0, -d["thigh"]))
@@ -172,7 +177,10 @@ def _scaled(height_m: float, lengths: dict[str, float]) -> dict[str, float]:
 
 
 def _flesh(d: dict[str, float], sole: float) -> Cones:
-    """Truncated cones around the segments. Radii are fractions of the stature for an average adult, times the girth factors."""
+    """Truncated cones around the segments. Radii are fractions of the stature for an average adult, times the girth factors.
+
+    A trunk that does not bend is of one piece.
+    """
     h = d["height"]
     rows: list[tuple] = []
 
@@ -193,8 +201,10 @@ def _flesh(d: dict[str, float], sole: float) -> Cones:
     # Radii over stature: [lateral, front to back] at both ends.
     cone("pelvis", ((0, 0, -0.035 * h), (waist, 0, 0.15 * trunk)), ((0.090, 0.062), (0.086, 0.060)), y, (wide, deep))
     cone("torso", ((waist, 0, 0.12 * trunk), (chest, 0, 0.48 * trunk)), ((0.084, 0.059), (0.082, 0.057)), y, (wide, deep))
-    cone("torso", ((chest, 0, 0.48 * trunk), (chest, 0, 0.82 * trunk)), ((0.084, 0.058), (0.096, 0.058)), y, (wide, deep))
-    cone("torso", ((chest, 0, 0.82 * trunk), (nape, 0, trunk)), ((0.096, 0.056), (0.042, 0.036)), y, (wide, deep))
+    low = d["lumbar"]
+    upper = "chest" if low > 0 else "torso"
+    cone(upper, ((chest, 0, 0.48 * trunk - low), (chest, 0, 0.82 * trunk - low)), ((0.084, 0.058), (0.096, 0.058)), y, (wide, deep))
+    cone(upper, ((chest, 0, 0.82 * trunk - low), (nape, 0, trunk - low)), ((0.096, 0.056), (0.042, 0.036)), y, (wide, deep))
     head, g = d["head"], (d["girth_head"], d["girth_head"])
     skull = 0.01 * h + 0.6 * ahead
     cone("head", ((nape, 0, -0.02 * h), (0.004 * h + 0.4 * ahead, 0, 0.28 * head)), ((0.034, 0.034), (0.034, 0.040)), y, g)
@@ -204,9 +214,12 @@ def _flesh(d: dict[str, float], sole: float) -> Cones:
     thighs, shanks = (d["girth_thighs"],) * 2, (d["girth_shanks"],) * 2
     front = d["arm_flesh_forward"]
     for side, sign in (("r", -1.0), ("l", 1.0)):
-        upper, fore = sign * d["upper_arm"], sign * d["forearm"]
+        arm, fore = sign * d["upper_arm"], sign * d["forearm"]
         armpit, elbow, wrist = (-d[f"{joint}_flesh_low"] for joint in ("shoulder", "elbow", "wrist"))
-        cone(f"{side}_upper_arm", ((front, -sign * 0.01 * h, armpit), (front, upper, elbow)), ((0.034, 0.034), (0.025, 0.025)), x, arms)
+        if d["collar"] > 0:
+            collar = ((0, 0, -0.01 * h), (0, sign * d["collar"], -0.005 * h))
+            cone(f"{side}_clavicle", collar, ((0.030, 0.030), (0.034, 0.034)), x, (wide, wide))
+        cone(f"{side}_upper_arm", ((front, -sign * 0.01 * h, armpit), (front, arm, elbow)), ((0.034, 0.034), (0.025, 0.025)), x, arms)
         cone(f"{side}_forearm", ((front, 0, elbow), (front, fore, wrist)), ((0.026, 0.026), (0.016, 0.016)), x, arms)
         shown = fore + sign * max(d["hand"] - FINGER_TIPS * h, 0.0)
         cone(f"{side}_forearm", ((front, fore, wrist), (front, shown, wrist)), ((0.021, 0.015), (0.016, 0.010)), x, arms)

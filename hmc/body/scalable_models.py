@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
 
@@ -107,7 +107,7 @@ class Inclusive:
 
     @cached_property
     def group(self) -> np.ndarray:
-        """The first model (from 0) that has each degree of freedom, shape (27,); the number of models where none has it."""
+        """The first model (from 0) that has each degree of freedom, shape (33,); the number of models where none has it."""
         group = np.full(len(DOF_NAMES), len(self.models))
         for level in range(len(self.models) - 1, -1, -1):
             group[self.models[level].dofs] = level
@@ -247,7 +247,9 @@ def _united(name: str, members: Sequence[Model]) -> Model:
 
 
 _ROOT = ("root_tx", "root_ty", "root_tz", "root_rz", "root_ry", "root_rx")
-_TRUNK = ("torso_x", "torso_y", "torso_z")
+_WAIST = ("torso_x", "torso_y", "torso_z", "spine_x", "spine_y")
+_GIRDLES = tuple(name for name in DOF_NAMES if "girdle" in name)
+_TRUNK = (*_WAIST, *_GIRDLES)
 _SECOND = (
     "neck_x", "neck_y", "r_shoulder_x", "r_shoulder_z", "l_shoulder_x", "l_shoulder_z", "r_hip_x", "r_hip_y", "l_hip_x", "l_hip_y",
 )  # fmt: skip
@@ -301,11 +303,14 @@ def _angles(side: str, joint: str) -> tuple[str, ...]:
 
 
 def _unitive(name: str, with_forearms: bool) -> Unitive:
-    trunk = Model("trunk", (*_ROOT, *_TRUNK, "neck_x", "neck_y"), ("torso", "head"))
+    # A shoulder girdle shows by its arm: where arms are of pieces, it is missing and found with the upper one.
+    trunk = Model("trunk", (*_ROOT, *_WAIST, "neck_x", "neck_y", *(() if with_forearms else _GIRDLES)), ("torso", "head"))
     leaves, unions, needs = [trunk], [], []
 
     def limb(side: str, name: str, upper: tuple[str, str], lower: tuple[str, str], pieces: bool) -> str:
         members = [Model(f"{side}_{part}", _angles(side, joint), (f"{side}_{part}",)) for part, joint in (upper, lower)]
+        if pieces and name == "arm":
+            members[0] = replace(members[0], angles=(*members[0].angles, *_angles(side, "girdle")))
         whole = _united(f"{side}_{name}", members)
         if not pieces:
             leaves.append(whole)

@@ -11,15 +11,15 @@ from functools import cached_property
 
 import numpy as np
 
-from hmc.body.joints import DOF_NAMES, SEGMENTS, dof_index
+from hmc.body.joints import DOF_NAMES, SEGMENTS, TRUNK_JOINTS, dof_index
 from hmc.body.limbs import CHAIN_OF_PART, LIMBS
 from hmc.body.model import PART_OF_SEGMENT, BodyModel
 from hmc.body.superellipsoids import Superellipsoids
 
 __all__ = ["CHAINS", "FREE", "FREE_NAMES", "GROUPS", "SolidBody", "solid_body", "to_world"]
 
-#: The 24 degrees of freedom, as places in a state of 27.
-FREE: np.ndarray = np.array([k for k, name in enumerate(DOF_NAMES) if not name.startswith("torso_")])
+#: The 24 degrees of freedom, as places in a state.
+FREE: np.ndarray = np.array([k for k, name in enumerate(DOF_NAMES) if not name.startswith(("torso", *TRUNK_JOINTS))])
 FREE_NAMES: tuple[str, ...] = tuple(DOF_NAMES[k] for k in FREE)
 #: What samples are shared out among: the trunk and the five chains that hang on it.
 GROUPS: tuple[str, ...] = ("trunk", "head", *LIMBS)
@@ -76,7 +76,7 @@ def to_world(body: SolidBody, rotations: np.ndarray, positions: np.ndarray) -> t
     Parameters
     ----------
     body : SolidBody
-    rotations, positions : ndarray, shapes (11, 3, 3) and (11, 3)
+    rotations, positions : ndarray, shapes (14, 3, 3) and (14, 3)
         Of the segments, from `hmc.body.kinematics.joint_twists`.
 
     Returns

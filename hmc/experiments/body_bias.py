@@ -34,13 +34,13 @@ from hmc.pose.views.person_view import views_of
 from hmc.tracking.resumable import person_grid
 from hmc.voxels.hulls import stream_hulls
 
-__all__ = ["AS_IT_IS", "EXPERIMENT", "MIDDLE", "NEITHER", "VARIANTS"]
+__all__ = ["AS_IT_IS", "EXPERIMENT", "MIDDLE", "NEITHER", "STIFF", "VARIANTS"]
 
 CLIPS = ("crossing", "close_white", "jog", "pale", "dance", "close_queue", "throw_catch", "gesture")
 QUICK_CLIPS, QUICK_FRAMES = 3, 61
 #: The sole's axis at which the flesh of feet ends at the floor, over stature.
 FLOOR_SOLE = 0.024
-AS_IT_IS, NEITHER, MIDDLE = "as it is", "neither", "joints in the middle"
+AS_IT_IS, NEITHER, MIDDLE, STIFF = "as it is", "neither", "joints in the middle", "a stiff trunk"
 _HAIR, _MIDDLE = ("hair",), tuple(name for name in DEFAULT_LENGTHS if "_flesh_" in name)
 #: Which of the body's lengths are 0, and where the soles of its flesh are.
 VARIANTS: dict[str, tuple[tuple[str, ...], float]] = {
@@ -49,6 +49,7 @@ VARIANTS: dict[str, tuple[tuple[str, ...], float]] = {
     "feet to the floor": ((), FLOOR_SOLE),
     NEITHER: (_HAIR, FLOOR_SOLE),
     MIDDLE: (_MIDDLE, SOLE),
+    STIFF: (("lumbar", "collar"), SOLE),
 }
 #: A pose that our joints cannot take tells of them and not of the flesh: one that starts farther off is left out, metres.
 MOST_START_M = 0.06
@@ -177,6 +178,7 @@ def _claims(labels: Sequence[str], means: dict[str, np.ndarray], up: np.ndarray)
     return (
         _nearer("hair and soles together bring", labels, means, NEITHER),
         _nearer("joints beside the middle of their flesh bring", labels, means, MIDDLE),
+        _nearer("a spine that bends and shoulder girdles bring", labels, means, STIFF),
         Claim(
             f"with hair and soles bodies are lifted or lowered by less than {MOST_UP_MM:g} mm on each recording",
             bool(abs(up[worst]) < MOST_UP_MM),

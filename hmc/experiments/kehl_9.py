@@ -14,7 +14,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from hmc.body.inverse import fit_landmarks
-from hmc.body.joints import dof_index
+from hmc.body.joints import N_DOF, dof_index
 from hmc.body.kinematics import landmarks
 from hmc.body.proportions import default_body
 from hmc.body.solids import CHAINS, FREE, FREE_NAMES, GROUPS
@@ -93,7 +93,7 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
 
 
 def _ends(skeleton, parameters: np.ndarray) -> np.ndarray:
-    state = np.zeros(27)
+    state = np.zeros(N_DOF)
     state[FREE] = parameters
     return landmarks(skeleton, state)[ENDS]
 

@@ -79,7 +79,7 @@ class PosedPeople:
 
     @property
     def angles(self) -> np.ndarray:
-        """Angles of the joints and of the root, radians, shape (n, 24), in the order of `angle_names`."""
+        """Angles of the joints and of the root, radians, shape (n, 30), in the order of `angle_names`."""
         return self.states.states[:, 3:]
 
     @property
@@ -115,7 +115,7 @@ class FollowOptions:
         Stature of every person; estimated for each where left out.
     detections : DetectionTable or None
         For methods that need them; one person's.
-    drift : ndarray, shape (27,), or None
+    drift : ndarray, shape (33,), or None
         P0 of filters, as in `hmc.pose.method.Capture`.
     """
 

@@ -56,11 +56,11 @@ def mixed_poses(one: np.ndarray, other: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    one, other : ndarray, shape (..., 27)
+    one, other : ndarray, shape (..., 33)
 
     Returns
     -------
-    ndarray, shape (..., 32, 27)
+    ndarray, shape (..., 32, 33)
         The first is `one`, the last `other`.
     """
     return mixture(one[..., None, :], other[..., None, :], np.arange(N_MIXTURES))
@@ -71,12 +71,12 @@ def mixture(one: np.ndarray, other: np.ndarray, picks: np.ndarray) -> np.ndarray
 
     Parameters
     ----------
-    one, other : ndarray, shape (..., 27)
+    one, other : ndarray, shape (..., 33)
     picks : ndarray of int, shape (...)
 
     Returns
     -------
-    ndarray, shape (..., 27)
+    ndarray, shape (..., 33)
     """
     return np.where(_TAKEN[picks][..., _COLUMN], other, one)
 
@@ -91,7 +91,7 @@ def choose_path(
     body : BodyModel
     frames : ndarray of int, shape (n,)
         Rising.
-    one, other : ndarray, shape (n, 27)
+    one, other : ndarray, shape (n, 33)
     costs : ndarray, shape (n, 32)
         Of their `mixed_poses`, square metres.
     fps : float

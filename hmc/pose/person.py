@@ -98,7 +98,7 @@ class DecidedFrames:
     ----------
     person : int
     frames : tuple of int
-    states : ndarray, shape (n, 27)
+    states : ndarray, shape (n, 33)
         NaN where there was nothing to start from.
     infos : tuple of StepInfo
         One a frame; of the journal's rows only what it keeps.
@@ -130,7 +130,7 @@ class PersonState:
         The window that is not over. The only views that are kept.
     followed : tuple of FollowedFrame
         Frames that are not decided.
-    context : tuple of (int, ndarray of shape (27,))
+    context : tuple of (int, ndarray of shape (33,))
         The last decided frames, with their poses.
     done_to : int
         The last decided frame; -1: none is.
@@ -242,7 +242,8 @@ def _picks(task: PoseTask, state: PersonState) -> np.ndarray:
     given = [no_alternatives(known, n) for _, known in state.context] + given
     frames = np.array([frame for frame, _ in state.context] + [row.frame for row in rows])
     costs, points = np.array([one.costs for one in given]), np.array([limb_points(state.subject.body, one.states, legs) for one in given])
-    return choose_legs(frames, costs, points, task.capture.fps, legs)[len(state.context) :]
+    picks = choose_legs(frames, costs, points, task.capture.fps, legs)[len(state.context) :]
+    return np.where([len(row.alternatives.costs) == n for row in rows], picks, 0)
 
 
 def _context(task: PoseTask, context: tuple[tuple[int, np.ndarray], ...], decided: DecidedFrames) -> tuple[tuple[int, np.ndarray], ...]:

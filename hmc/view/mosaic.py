@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from hmc.body.joints import DOF_NAMES
+from hmc.body.joints import DOF_NAMES, N_CANTON, N_DOF
 from hmc.body.model import BodyModel
 from hmc.body.proportions import make_bodies
 from hmc.camera.model import Camera
@@ -96,7 +96,10 @@ def read_result(directory: str | Path) -> Result:
         raise InputError(f"{directory}: neither joints.csv nor tracks.csv; give the folder that `hmc pose` or `hmc track` wrote")
     states = read_pose(directory / "pose.npz") if (directory / "pose.npz").exists() else None
     result = Result(poses, tracks)
-    return result if states is None or states.dof_names != tuple(DOF_NAMES) else with_bodies(result, states)
+    if states is not None and states.dof_names == DOF_NAMES[:N_CANTON]:
+        # Of before the trunk bent: its joints, which come last, are at 0.
+        states = replace(states, dof_names=DOF_NAMES, states=np.pad(states.states, ((0, 0), (0, N_DOF - N_CANTON))))
+    return result if states is None or states.dof_names != DOF_NAMES else with_bodies(result, states)
 
 
 def with_bodies(result: Result, states: PoseStates) -> Result:

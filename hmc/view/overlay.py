@@ -84,7 +84,7 @@ def draw_outline(image: np.ndarray, camera: Camera, body: BodyModel, state: np.n
     image, camera, person, width
         As for `draw_sticks`.
     body : BodyModel
-    state : ndarray, shape (27,)
+    state : ndarray, shape (33,)
     """
     uv, valid = project(camera, cone_rings(body, state))
     mask = np.zeros(image.shape[:2], np.uint8)

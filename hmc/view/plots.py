@@ -159,7 +159,7 @@ def draw_body(body: BodyModel, state: np.ndarray, ax: Axes3D | None = None, pers
     Parameters
     ----------
     body : BodyModel
-    state : ndarray, shape (27,)
+    state : ndarray, shape (33,)
         Metres and radians.
     ax : Axes (3-D), optional
     person : int

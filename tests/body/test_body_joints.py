@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from hmc.body.flesh import flesh_points
-from hmc.body.joints import DOF_NAMES, N_DOF, SEGMENTS, canton_limits, default_limits, dof_index, mirror_state
+from hmc.body.joints import DOF_NAMES, N_CANTON, N_DOF, SEGMENTS, canton_limits, default_limits, dof_index, mirror_state
 from hmc.body.kinematics import landmarks, segment_transforms
 from hmc.body.model import PARTS, neutral_state
 from hmc.body.proportions import DEFAULT_LENGTHS, SOLE, canton_body, default_body, make_body
@@ -33,7 +33,8 @@ def swapped(name: str) -> str:
 
 def test_limits_are_the_printed_ones():
     limits = canton_limits()
-    assert len(TABLE_6_1) == 21 == N_DOF - 6
+    assert len(TABLE_6_1) == 21 == N_CANTON - 6
+    assert not limits.low[N_CANTON:].any() and not limits.high[N_CANTON:].any()
     for joint, axis, low, high in TABLE_6_1:
         k = DOF_NAMES.index(f"{joint}_{axis}")
         assert limits.low[k] == pytest.approx(low) and limits.high[k] == pytest.approx(high)
@@ -73,7 +74,7 @@ def test_a_mirrored_state_gives_mirrored_landmarks(seed):
     low, high = np.where(np.isfinite(body.limits.low), body.limits.low, 0), np.where(np.isfinite(body.limits.high), body.limits.high, 0)
     state = np.random.default_rng(seed).uniform(low, high)
     state[:6] = 0
-    state[dof_index("torso_x", "torso_z", "neck_x")] = 0  # what the mirror does not touch has to be symmetric
+    state[dof_index("torso_x", "torso_z", "spine_x", "neck_x")] = 0  # what the mirror does not touch has to be symmetric
     there = landmarks(body, state) * [1, -1, 1]
     expected = np.array([there[landmark_index(swapped(name) if name in SIDES else name)] for name in LANDMARKS])
     assert_allclose(landmarks(body, mirror_state(state)), expected, atol=1e-12)
@@ -92,7 +93,7 @@ def test_a_body_of_twice_the_dimensions_is_twice_as_large():
     small = default_body(0.9)
     large = make_body({name: value * (1 if name.startswith("girth") else 2) for name, value in small.dimensions.items()})
     state = neutral_state("down", small.limits)
-    state[3:] += np.random.default_rng(0).normal(0, 0.2, 24)
+    state[3:] += np.random.default_rng(0).normal(0, 0.2, N_DOF - 3)
     assert_allclose(landmarks(large, state), 2 * landmarks(small, state))
     for name in ("start", "end", "radii"):
         assert_allclose(getattr(large.cones, name), 2 * getattr(small.cones, name))

@@ -7,6 +7,7 @@ from posed import body_of
 
 from hmc.body.cone_maps import cone_maps, cones_near, spread
 from hmc.body.cones import cone_distance
+from hmc.body.joints import N_DOF
 from hmc.body.kinematics import place_segments, segment_transforms
 from hmc.body.model import neutral_state
 from hmc.pose.objectives.symmetric import body_distance
@@ -15,7 +16,7 @@ BODY, _ = body_of()
 
 
 def states_around_standing(deviation: float, n: int = 12) -> np.ndarray:
-    return neutral_state("down") + np.random.default_rng(0).normal(0, deviation, (n, 27))
+    return neutral_state("down") + np.random.default_rng(0).normal(0, deviation, (n, N_DOF))
 
 
 def test_maps_lead_to_the_coordinates_of_the_cones():
@@ -88,7 +89,7 @@ def test_of_one_pose_with_slack_nothing_is_lost():
     points = rng.normal(0, 0.4, (300, 3))
     near = cones_near(cones, cone_maps(cones, place_segments(BODY, state[None], np.zeros(3))), points, 0.06, slack=0.05)[0]
     for _ in range(20):
-        maps = cone_maps(cones, place_segments(BODY, state[None] + rng.normal(0, 0.03, 27), np.zeros(3)))
+        maps = cone_maps(cones, place_segments(BODY, state[None] + rng.normal(0, 0.03, N_DOF), np.zeros(3)))
         ends = maps.start + maps.axis * cones.lengths[:, None, None]
         before = cone_maps(cones, place_segments(BODY, state[None], np.zeros(3)))
         moved = [

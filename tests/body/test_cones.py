@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from hmc.body.cones import cone_depth, cone_distance, cone_shapes, squared_distance, way_out
-from hmc.body.joints import SEGMENTS
+from hmc.body.joints import N_DOF, SEGMENTS
 from hmc.body.model import Cones
 from hmc.body.nearest_cone import part_distances
 from hmc.body.proportions import default_body
@@ -118,7 +118,7 @@ def test_a_point_of_a_cone_without_thickness_is_as_far_as_it_is():
 
 def test_parts_are_as_far_as_their_nearest_cone():
     body, points = default_body(1.7), np.random.default_rng(0).normal(0, 0.5, (30, 3))
-    found = part_distances(body, np.zeros(27), points)
+    found = part_distances(body, np.zeros(N_DOF), points)
     for part in range(10):
         expected = np.full(30, np.inf)
         for c in np.flatnonzero(body.cones.part == part):

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from hmc.body.inverse import fit_landmarks
-from hmc.body.joints import dof_index
+from hmc.body.joints import N_DOF, dof_index
 from hmc.body.kinematics import landmarks
 from hmc.body.model import neutral_state
 from hmc.body.proportions import canton_body, default_body
@@ -19,9 +19,9 @@ BODY = default_body(1.75)
 def displaced(seed: int, spread: float, body=BODY) -> tuple[np.ndarray, np.ndarray]:
     """A state and another one near it, both within the limits."""
     rng = np.random.default_rng(seed)
-    state = neutral_state("down", body.limits) + rng.normal(0, 0.3, 27)
+    state = neutral_state("down", body.limits) + rng.normal(0, 0.3, N_DOF)
     state = np.clip(state, body.limits.low, body.limits.high)
-    return state, np.clip(state + rng.normal(0, spread, 27), body.limits.low, body.limits.high)
+    return state, np.clip(state + rng.normal(0, spread, N_DOF), body.limits.low, body.limits.high)
 
 
 @settings(max_examples=25)
@@ -85,6 +85,6 @@ def test_what_the_limits_forbid_is_met_as_well_as_they_allow():
 
 def test_a_start_outside_the_limits_is_no_harm():
     state, _ = displaced(8, 0)
-    found, error = fit_landmarks(BODY, landmarks(BODY, state), state + np.r_[np.zeros(6), np.full(21, 9.0)], iterations=200)
+    found, error = fit_landmarks(BODY, landmarks(BODY, state), state + np.r_[np.zeros(6), np.full(N_DOF - 6, 9.0)], iterations=200)
     assert np.all((found >= BODY.limits.low) & (found <= BODY.limits.high))
     assert np.isfinite(error)

@@ -13,7 +13,7 @@ from hmc.body.proportions import default_body
 from hmc.body.reach import limb_joint, limb_lengths, reach
 from hmc.body.twists import rotations_about
 
-LOWER = {"r_arm": 4, "l_arm": 6, "r_leg": 8, "l_leg": 10}
+LOWER = {name: limb.segments[1] for name, limb in LIMBS.items()}
 
 
 def ends(body, limb, states):

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from hmc.body.inverse import fit_landmarks
-from hmc.body.joints import N_DOF, dof_index
+from hmc.body.joints import N_CANTON, N_DOF, dof_index
 from hmc.body.kinematics import landmarks
 from hmc.body.model import neutral_state
 from hmc.body.proportions import default_body
@@ -106,11 +106,11 @@ def test_the_thesis_s_body_is_straight_and_has_the_printed_ranges():
     places = dof_index(*ANGLES)
     assert_array_equal(body.limits.low[places], low)
     assert_array_equal(body.limits.high[places], high)
-    for k in (*WAIST, *TURNS):
+    for k in (*WAIST, *TURNS, *range(N_CANTON, N_DOF)):
         assert body.limits.low[k] == body.limits.high[k] == 0
-    rest = np.setdiff1d(np.arange(N_DOF), [*places, *WAIST, *TURNS])
+    rest = np.setdiff1d(np.arange(N_DOF), [*places, *WAIST, *TURNS, *range(N_CANTON, N_DOF)])
     assert np.isinf(body.limits.low[rest]).all() and set(rest) == set(range(6))
     points = landmarks(body, np.zeros(N_DOF))
     assert points[3, 2] == pytest.approx(points[1, 2])  # shoulders as high as the neck
-    straight = {"shoulder_drop", "chest_forward", "head_forward"}  # the rest is an average person's
+    straight = {"shoulder_drop", "chest_forward", "head_forward", "lumbar", "collar"}  # the rest is an average person's
     assert {name for name, value in default_body(1.7).dimensions.items() if body.dimensions[name] != value} == straight

@@ -26,7 +26,7 @@ def random_state(rng):
     limits = default_limits()
     state = neutral_state("down")
     low, high = np.maximum(limits.low, -3), np.minimum(limits.high, 3)
-    state[3:] = low[3:] + rng.random(24) * (high - low)[3:]
+    state[3:] = low[3:] + rng.random(len(state) - 3) * (high - low)[3:]
     state[6:9] = 0
     return state
 

@@ -6,19 +6,22 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from hmc.body.joints import N_CANTON, N_DOF, dof_index
 from hmc.body.kinematics import landmarks
 from hmc.body.model import PARTS, neutral_state
 from hmc.body.proportions import DEFAULT_LENGTHS, SOLE, default_body, make_body
 from hmc.errors import InputError
 from hmc.experiments import body_bias
-from hmc.experiments.body_bias import AS_IT_IS, MIDDLE, NEITHER
+from hmc.experiments.body_bias import AS_IT_IS, MIDDLE, NEITHER, STIFF
 from hmc.experiments.engine.experiment import Cell, Plan
 from hmc.experiments.engine.inputs import Inputs
 from hmc.experiments.engine.library import find_experiment
-from hmc.landmarks import LANDMARKS
+from hmc.landmarks import LANDMARKS, landmark_index
 
 TINY = Path(__file__).parents[2] / "data" / "synthetic" / "tiny"
 LABEL = "tiny@0"
+#: The joints of the limbs and the waist: a spine that bends is shorter from end to end.
+MOVED = np.r_[np.zeros(6), np.full(N_CANTON - 6, 0.2), np.zeros(N_DOF - N_CANTON)]
 
 
 def cell(body, recording=TINY, frames=6):
@@ -31,7 +34,7 @@ def test_the_body_has_the_joint_lengths_of_the_landmarks():
     usual = default_body(1.7).dimensions
     told = ("trunk", "shoulder_half_width", "hip_half_width", "upper_arm", "forearm", "thigh", "shank")
     person = make_body(usual | {name: usual[name] * rng.uniform(0.9, 1.1) for name in told})
-    states = neutral_state("down", person.limits) + np.r_[np.zeros(6), np.full(21, 0.2)] * rng.normal(size=(5, 27))
+    states = neutral_state("down", person.limits) + rng.normal(size=(5, N_DOF)) * MOVED
     found = body_bias._body(landmarks(person, states), (), SOLE)
     assert_allclose([found.dimensions[name] for name in (*told, "head")], [person.dimensions[name] for name in (*told, "head")])
     upright = ("trunk", "head", "thigh", "shank")
@@ -42,7 +45,14 @@ def test_the_body_has_the_joint_lengths_of_the_landmarks():
 def test_variants_differ_in_hair_in_soles_and_in_where_joints_are_alone():
     points = landmarks(default_body(1.7), neutral_state("down"))[None]
     bodies = {name: body_bias._body(points, *variant) for name, variant in body_bias.VARIANTS.items()}
-    middle = bodies.pop(MIDDLE)
+    middle, stiff = bodies.pop(MIDDLE), bodies.pop(STIFF)
+    assert_allclose(landmarks(stiff, neutral_state("down")), points[0], atol=1e-9)
+    shrugging = neutral_state("down")
+    shrugging[dof_index("l_girdle_x", "r_girdle_x")] = 0.4, -0.4
+    shoulders = [landmark_index("l_shoulder"), landmark_index("r_shoulder")]
+    still, raised = (landmarks(body, shrugging)[shoulders, 2] for body in (stiff, bodies[AS_IT_IS]))
+    assert_allclose(still, points[0, shoulders, 2])
+    assert np.all(raised - still > 0.05)
     arms = middle.cones.part == PARTS.index("l_forearm")
     assert_allclose(middle.cones.start[arms][:, [0, 2]], 0, atol=1e-9)  # on the axis from joint to joint
     assert_allclose(middle.cones.radii, bodies[AS_IT_IS].cones.radii)
@@ -98,20 +108,22 @@ def holding(off_m):
 
 def test_claims_follow_the_figures():
     def bare(body):
-        return body in (NEITHER, MIDDLE)
+        return body in (NEITHER, MIDDLE, STIFF)
 
-    assert holding(lambda body, name: (0, 0, 0.012 if bare(body) else 0.008)) == [True, True, True]
-    assert holding(lambda body, name: (0, 0, 0.012 if body == MIDDLE else 0.008)) == [False, True, True]
-    assert holding(lambda body, name: (0, 0, 0.012 if body == NEITHER else 0.008)) == [True, False, True]
-    assert holding(lambda body, name: (0, 0, 0.008)) == [False, False, True]
+    assert holding(lambda body, name: (0, 0, 0.012 if bare(body) else 0.008)) == [True, True, True, True]
+    assert holding(lambda body, name: (0, 0, 0.012 if body == MIDDLE else 0.008)) == [False, True, False, True]
+    assert holding(lambda body, name: (0, 0, 0.012 if body == NEITHER else 0.008)) == [True, False, False, True]
+    assert holding(lambda body, name: (0, 0, 0.012 if body == STIFF else 0.008)) == [False, False, True, True]
+    assert holding(lambda body, name: (0, 0, 0.008)) == [False, False, False, True]
     # On five of eight only, and on seven of eight with a harm on the last that outweighs them.
     some, last = body_bias.CLIPS[:5], body_bias.CLIPS[-1]
-    assert holding(lambda body, name: (0.03 if bare(body) or name not in some else 0.02, 0, 0)) == [False, False, True]
+    assert holding(lambda body, name: (0.03 if bare(body) or name not in some else 0.02, 0, 0)) == [False, False, False, True]
     assert holding(lambda body, name: (0.03 if bare(body) == (name == last) else 0.1 if name == last else 0.031, 0, 0)) == [
+        False,
         False,
         False,
         True,
     ]
     for sign in (1, -1):
         lifted = holding(lambda body, name, sign=sign: (0.02 * bare(body), 0, sign * (0.012 if name == last else 0.005)))
-        assert lifted == [True, True, False]
+        assert lifted == [True, True, True, False]

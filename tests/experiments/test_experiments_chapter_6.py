@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hmc.body.inverse import fit_landmarks
-from hmc.body.joints import dof_index
+from hmc.body.joints import N_DOF, dof_index
 from hmc.body.kinematics import landmarks
 from hmc.body.model import neutral_state
 from hmc.body.proportions import canton_body, default_body
@@ -33,7 +33,7 @@ def walking(height_m=1.75):
     """A body that moves all its joints, (n, 15, 3)."""
     states = np.tile(neutral_state("down"), (N, 1))
     states[:, 2] = 0.95
-    states[:, 3:] += 0.3 * np.sin(np.arange(N)[:, None] / 6 + np.arange(24))
+    states[:, 3:] += 0.3 * np.sin(np.arange(N)[:, None] / 6 + np.arange(N_DOF - 3))
     return landmarks(default_body(height_m), states)
 
 
@@ -222,7 +222,7 @@ def test_what_an_action_varies_by_is_told_by_its_poses():
     drift = exploratory.largest_variation(body, landmarks(body, states))
     assert drift[0] == pytest.approx(0.05, abs=2e-3) and drift[3] == pytest.approx(0.03, abs=0.01)
     assert drift[dof_index("r_elbow_z")[0]] == pytest.approx(0.05, abs=0.01)
-    still = [k for k in range(27) if k not in (0, 3, 6, 7, 8, *dof_index("r_elbow_z", "r_shoulder_y"))]
+    still = [k for k in range(N_DOF) if k not in (0, 3, 6, 7, 8, *dof_index("r_elbow_z", "r_shoulder_y"))]
     np.testing.assert_allclose(drift[still], 0.5 * exploratory.LEAST_VARIATION[still], atol=0.02)
     np.testing.assert_allclose(exploratory.largest_variation(body, landmarks(body, states[:1])), 0.5 * exploratory.LEAST_VARIATION)
 

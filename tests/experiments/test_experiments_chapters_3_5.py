@@ -4,6 +4,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
+from hmc.body.joints import N_CANTON
 from hmc.body.kinematics import landmarks
 from hmc.body.model import neutral_state
 from hmc.body.proportions import canton_body, default_body
@@ -60,7 +61,7 @@ def pose_cells():
     rng, n = np.random.default_rng(0), 30
     states = np.tile(neutral_state("down"), (n, 1))
     states[:, 2] = 0.95
-    states[:, 3:] += 0.3 * np.sin(np.arange(n)[:, None] / 6 + np.arange(24))
+    states[:, 3:N_CANTON] += 0.3 * np.sin(np.arange(n)[:, None] / 6 + np.arange(N_CANTON - 3))  # both bodies take it
     truth = landmarks(default_body(1.75), states)
     cells = []
     for clip in ("one@0", "other@0"):

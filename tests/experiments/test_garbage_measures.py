@@ -4,6 +4,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
+from hmc.body.joints import N_DOF
 from hmc.body.kinematics import landmarks
 from hmc.body.model import neutral_state
 from hmc.body.proportions import default_body
@@ -24,7 +25,7 @@ def moving(rng):
     """True landmarks of a person who moves all joints, some seconds long."""
     states = np.tile(neutral_state("down"), (N, 1))
     states[:, 2] = 0.95
-    states[:, 6:] += 0.5 * np.sin(np.arange(N)[:, None] / 3 + rng.uniform(0, 6, 21))
+    states[:, 6:] += 0.5 * np.sin(np.arange(N)[:, None] / 3 + rng.uniform(0, 6, N_DOF - 6))
     return landmarks(BODY, states)
 
 
@@ -41,7 +42,7 @@ def shuffled(rng, truth):
 def random_poses(rng, truth):
     """Any pose at all, at the true pelvis."""
     low, high = (np.where(np.isfinite(one), one, 3.0 * sign) for one, sign in ((BODY.limits.low, -1), (BODY.limits.high, 1)))
-    states = rng.uniform(low, high, (N, 27))
+    states = rng.uniform(low, high, (N, N_DOF))
     states[:, :3] = truth[:, 0]
     return landmarks(BODY, states)
 
@@ -133,7 +134,7 @@ def any_layers(rng, parameters):
     """The filter's layers and variables in any order."""
     group = rng.permutation(np.repeat([0, 1, 2], 9))
     drift = rng.permutation(np.r_[1.0, 0.5, 0.2, 0.1, 0.04, 0.02, 0, 0, 1, 0.5, 0.2, 0.1, 0, 0, 0, 0, 1, 0.5]).reshape(6, 3)
-    return {"evaluations": rng.integers(100, 900, 6), "drift": rng.random((6, 27)), "drift_of_model": drift, "group": group}
+    return {"evaluations": rng.integers(100, 900, 6), "drift": rng.random((6, N_DOF)), "drift_of_model": drift, "group": group}
 
 
 def any_area(rng, parameters):

@@ -10,6 +10,7 @@ from posed import COST, body_of, mean_error, true_state
 
 from hmc.body.dimensions import FitBodySettings
 from hmc.body.flesh import surface_coordinates
+from hmc.body.joints import N_DOF
 from hmc.body.kinematics import landmarks
 from hmc.body.proportions import default_body
 from hmc.pose.objectives.symmetric import Symmetric, body_points
@@ -114,5 +115,5 @@ def test_one_frame_is_enough_to_run(walking):
     objectives, states = walking
     body = objectives[0].body
     fitted, poses, info = fit_body(objectives[:1], states[:1], surface_coordinates(body, 150), FitBodySettings())
-    assert poses.shape == (1, 27) and np.isfinite(poses).all()
+    assert poses.shape == (1, N_DOF) and np.isfinite(poses).all()
     assert 1.4 < fitted.height_m < 2.2 and info.cost_after <= info.cost_before

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hmc.body.exchange import swapped_pose
-from hmc.body.joints import dof_index
+from hmc.body.joints import N_DOF, dof_index
 from hmc.body.kinematics import landmarks
 from hmc.body.marker_places import fit_tips, place_tips, with_skin_markers
 from hmc.body.model import neutral_state
@@ -352,7 +352,7 @@ def test_limbs_are_told_apart_over_the_whole_motion():
 
 
 def test_without_markers_the_pose_stays():
-    step, start = on_markers(MARKER_PRESETS["canton2009"]), begin_tracking(SUBJECT, standing(), np.ones(27), {TIPS: BODY.tips})
+    step, start = on_markers(MARKER_PRESETS["canton2009"]), begin_tracking(SUBJECT, standing(), np.ones(N_DOF), {TIPS: BODY.tips})
     nothing = PersonView(0, markers=observe_markers(VIEWS, [np.zeros((0, 2))] * 5, GATE))
     for view, why in ((nothing, "fewer than two views"), (PersonView(0), "no detections in this frame")):
         tracked, info = step(np.random.default_rng(0), start, view)

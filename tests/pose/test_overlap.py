@@ -7,7 +7,7 @@ import pytest
 
 from hmc.body.cones import cone_distance
 from hmc.body.flesh import flesh_points, place_points
-from hmc.body.joints import dof_index
+from hmc.body.joints import N_DOF, dof_index
 from hmc.body.kinematics import place_segments, segment_transforms
 from hmc.body.model import PARTS, neutral_state
 from hmc.body.proportions import canton_body, default_body
@@ -15,12 +15,12 @@ from hmc.pose.objectives.overlap import make_overlap_table, quick_overlap
 from hmc.pose.objectives.overlap_exact import exact_overlap
 
 # A first layer's spread: metres, then the root's angles, then the joints'.
-SPREAD = np.r_[[0.05] * 3, [0.1] * 3, [0.2] * 21]
+SPREAD = np.r_[[0.05] * 3, [0.1] * 3, [0.2] * (N_DOF - 6)]
 
 
 def particles(body, n, seed=0):
     pose = neutral_state("down", body.limits)
-    states = pose + np.random.default_rng(seed).normal(0, 1, (n, 27)) * SPREAD
+    states = pose + np.random.default_rng(seed).normal(0, 1, (n, N_DOF)) * SPREAD
     return np.clip(states, body.limits.low, body.limits.high)
 
 
@@ -119,7 +119,7 @@ def test_a_body_far_from_the_origin_overlaps_the_same():
     body = default_body(1.75)
     flesh = flesh_points(body, 0.03)
     states = particles(body, 20)
-    far = quick(body, flesh, states + np.r_[400.0, -300.0, 2.0, np.zeros(24)])
+    far = quick(body, flesh, states + np.r_[400.0, -300.0, 2.0, np.zeros(N_DOF - 3)])
     np.testing.assert_allclose(far, quick(body, flesh, states), atol=0.01)
 
 

@@ -12,7 +12,7 @@ from posed import body_of, true_state
 from scipy.optimize import minimize_scalar
 
 from hmc.body.cones import slide_to_axis
-from hmc.body.joints import dof_index
+from hmc.body.joints import N_DOF, dof_index
 from hmc.body.model import neutral_state
 from hmc.camera.model import project
 from hmc.pose.objectives.symmetric import body_distance
@@ -49,7 +49,7 @@ def test_what_has_no_direction_stays_and_a_ray_along_the_axis_is_no_trouble():
 def test_a_ray_is_as_far_from_the_body_as_its_nearest_point():
     body, _ = body_of()
     rng = np.random.default_rng(1)
-    states = neutral_state("down") + rng.normal(0, 0.2, (3, 27))
+    states = neutral_state("down") + rng.normal(0, 0.2, (3, N_DOF))
     places, directions = rng.normal([0, 0, 0], 0.5, (60, 3)), rng.normal(size=(60, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     directions[::5] = 0

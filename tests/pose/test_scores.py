@@ -5,6 +5,7 @@ import pytest
 from scipy import ndimage
 
 from hmc.body.flesh import flesh_points, place_points
+from hmc.body.joints import N_DOF
 from hmc.body.kinematics import segment_transforms
 from hmc.body.model import PARTS, neutral_state
 from hmc.body.proportions import canton_body, default_body
@@ -34,7 +35,7 @@ def scene(request):
     occupied = np.zeros(grid.shape, bool)
     occupied[tuple(index[np.all((index >= 0) & (index < grid.shape), axis=1)].T)] = True
     rng = np.random.default_rng(7)
-    states = pose + rng.normal(0, 0.25, (9, 27))
+    states = pose + rng.normal(0, 0.25, (9, N_DOF))
     states[0] = pose
     states[7, 0] += 4.0  # out of the room, and of the maps
     states[8, 2] -= 0.7  # through the floor

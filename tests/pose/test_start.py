@@ -8,6 +8,7 @@ from acted import act
 from numpy.testing import assert_allclose, assert_array_equal
 from posed import COST, capture_of, mean_error, subject_of, true_state, view_of, views_of_act
 
+from hmc.body.joints import N_DOF
 from hmc.body.kinematics import landmarks
 from hmc.body.model import BodyModel
 from hmc.pose.method import Capture, StartPose, StepInfo, begin_tracking
@@ -200,7 +201,7 @@ def test_following_visits_every_frame_once_from_the_anchor_outwards():
 
     def step(rng, tracked, view):
         visited.append(view.frame)
-        return replace(tracked, state=tracked.state + 0.1, velocity=np.full(27, 0.1)), StepInfo(cost=view.frame)
+        return replace(tracked, state=tracked.state + 0.1, velocity=np.full(N_DOF, 0.1)), StepInfo(cost=view.frame)
 
     start = true_state(subject.body, acted, 3)
     path = walk(rng_of(0), step, subject, start, 3, views)
@@ -215,9 +216,9 @@ def test_both_ways_from_the_anchor_begin_at_rest_and_with_what_it_remembers():
     def step(rng, tracked, view):
         given[view.frame] = tracked
         memory = {"visited": np.append(tracked.memory["visited"], view.frame)}
-        return replace(tracked, velocity=np.ones(27), memory=memory), StepInfo()
+        return replace(tracked, velocity=np.ones(N_DOF), memory=memory), StepInfo()
 
-    start = begin_tracking(subject, np.zeros(27), np.ones(27), {"visited": np.array([-1])})
+    start = begin_tracking(subject, np.zeros(N_DOF), np.ones(N_DOF), {"visited": np.array([-1])})
     walk(rng_of(0), step, subject, start, 1, [view_of(None, frame=k) for k in range(4)])
     assert given[1].velocity.all() and given[3].velocity.all()
     assert not given[0].velocity.any() and not given[2].velocity.any()

@@ -194,7 +194,7 @@ def test_distance_to_cylinders_in_closed_form():
 
 def test_outside_distance_equals_a_loop(balls):
     body, points = body_of()
-    states = random_states(5, 3) + np.r_[0, 2.8, np.zeros(25)]
+    states = random_states(5, 3) + np.r_[0, 2.8, np.zeros(N_DOF - 2)]
     found = outside_distance(body, points.surface, states, balls)
     for n, state in enumerate(states):
         rotations, positions = segment_transforms(body, state)
@@ -260,7 +260,7 @@ def test_the_true_pose_of_a_rendered_person_costs_least():
     rng = np.random.default_rng(0)
     for frame in (0, 4):
         true = true_state(body, acted, frame)
-        spread = np.r_[np.full(3, 0.15), np.full(24, 0.35)]
+        spread = np.r_[np.full(3, 0.15), np.full(N_DOF - 3, 0.35)]
         others = np.clip(true + rng.normal(0, 1, (60, N_DOF)) * spread, body.limits.low, body.limits.high)
         target = acted.targets[frame]
         costs = Symmetric(body, points, target, target.surface[::4], COST).cost(np.stack([true, *others]))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+
 import cv2
 import numpy as np
 import pytest
@@ -9,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hmc.body.flesh import flesh_points, place_points
-from hmc.body.joints import DOF_NAMES
+from hmc.body.joints import DOF_NAMES, SEGMENTS
 from hmc.body.kinematics import landmarks, segment_transforms
 from hmc.body.model import neutral_state
 from hmc.body.proportions import default_body
@@ -17,7 +19,7 @@ from hmc.camera.model import look_at
 from hmc.cli import main
 from hmc.io.calibration import write_calibration
 from hmc.io.recording import open_recording
-from hmc.io.results import PoseStates, PoseTable, TrackTable, write_joints, write_pose, write_run, write_tracks
+from hmc.io.results import PoseStates, PoseTable, TrackTable, read_pose, write_joints, write_pose, write_run, write_tracks
 from hmc.landmarks import landmark_index
 from hmc.view.mosaic import make_layout, people_in, read_result, stream_mosaics
 from hmc.view.overlay import LEFT, RIGHT, draw_outline, draw_paths, draw_sticks, draw_track, person_color
@@ -71,6 +73,17 @@ def result(tmp_path_factory):
     write_tracks(folder / "tracks.csv", TrackTable(frames, persons, np.tile([0, 0, 0.95], (FRAMES, 1))))
     write_pose(folder / "pose.npz", PoseStates(frames, persons, np.tile(state, (FRAMES, 1)), DOF_NAMES, {0: body.dimensions}))
     return folder
+
+
+def test_bodies_from_before_the_trunk_bent_are_drawn_as_they_were(result, tmp_path):
+    shutil.copytree(result, tmp_path / "old")
+    now, then = read_pose(result / "pose.npz"), {"lumbar": 0.0, "collar": 0.0}
+    lengths = {name: value for name, value in now.bodies[0].items() if name not in then}
+    write_pose(tmp_path / "old" / "pose.npz", PoseStates(now.frames, now.persons, now.states[:, :27], DOF_NAMES[:27], {0: lengths}))
+    old = read_result(tmp_path / "old")
+    assert old.states is not None and old.bodies[0].dimensions == old.bodies[0].dimensions | then
+    assert {SEGMENTS[k].name for k in old.bodies[0].cones.segment}.isdisjoint({"chest", "l_clavicle", "r_clavicle"})
+    np.testing.assert_allclose(landmarks(old.bodies[0], old.states.states[0]), standing()[2], atol=1e-9)
 
 
 @pytest.mark.parametrize("number", range(5))

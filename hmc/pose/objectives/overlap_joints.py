@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hmc.body.joints import SEGMENTS
 from hmc.body.model import BodyModel
 from hmc.pose.objectives.overlap_pieces import Pieces, basis, shared_volume, spread_points
 
@@ -61,12 +62,21 @@ def make_joint_table(body: BodyModel, pieces: Pieces) -> JointTable:
         turn = pieces.frame[j, :3, :3]  # to the holding piece's frame
         one = np.empty((3, 4, len(directions)), np.float32)
         one[:, :3] = basis(directions, turn @ pieces.frame[i, 0, :3]).transpose(2, 1, 0)
-        joint = turn @ (body.offsets[pieces.segment[i]] - pieces.frame[j, 3, :3])
+        joint = turn @ (_joint(body, pieces.segment[i], pieces.segment[j]) - pieces.frame[j, 3, :3])
         one[:, 3] = joint[:, None] + np.einsum("xrn,r->xn", one[:, :3], pieces.frame[i, :3, :3] @ pieces.frame[i, 3, :3])
         other = np.broadcast_to(np.eye(3, 4, dtype=np.float32)[:, :, None], one.shape)
         first, second = (np.full(len(directions), piece) for piece in (i, j))
         volumes[row] = between @ shared_volume(pieces, dense, first, second, one, other).reshape(2, NODES, NODES) @ between.T
     return JointTable(hanging, holding, volumes)
+
+
+def _joint(body: BodyModel, segment: int, holder: int) -> np.ndarray:
+    """A segment's joint in the frame of one that carries it, (3,), metres; what is between, and has no flesh, is at rest."""
+    joint = np.zeros(3)
+    while segment != holder:
+        joint += body.offsets[segment]
+        segment = SEGMENTS[segment].parent
+    return joint
 
 
 def joint_volumes(table: JointTable, frames: np.ndarray) -> np.ndarray:

@@ -141,11 +141,18 @@ def _runs(cones: Cones) -> list[np.ndarray]:
     return np.split(np.arange(len(cones.part)), np.flatnonzero(~follows) + 1)
 
 
+def _carrier(segment: int, with_flesh: np.ndarray) -> int:
+    """The first segment from this one to the root that has flesh; -1 for none."""
+    while segment >= 0 and segment not in with_flesh:
+        segment = SEGMENTS[segment].parent
+    return segment
+
+
 def _hangs_on(part: np.ndarray, segment: np.ndarray) -> np.ndarray:
     """For the first piece of each segment, the piece of another part that the parent segment carries; else -1."""
     out = np.full(len(part), -1)
     for piece in range(len(part)):
-        holders = np.flatnonzero((segment == SEGMENTS[segment[piece]].parent) & (part != part[piece]))
+        holders = np.flatnonzero((segment == _carrier(SEGMENTS[segment[piece]].parent, segment)) & (part != part[piece]))
         if holders.size and (piece == 0 or segment[piece] != segment[piece - 1]):
             out[piece] = holders[0]
     return out
@@ -201,7 +208,7 @@ def place_pieces(pieces: Pieces, placed: np.ndarray) -> np.ndarray:
     Parameters
     ----------
     pieces : Pieces
-    placed : ndarray of float32, shape (11, 3, 4, n)
+    placed : ndarray of float32, shape (14, 3, 4, n)
         From `hmc.body.kinematics.place_segments`.
 
     Returns

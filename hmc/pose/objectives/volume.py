@@ -64,7 +64,7 @@ def volume_error(model: SkeletonModel, starts: np.ndarray, ends: np.ndarray, vol
 
 
 def _fleshed(starts: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Segments (n, 10, 3) with two for the torso, one a side, (n, 11, 3)."""
+    """Segments (n, 10, 3) with two for the torso, one a side, (n, 14, 3)."""
     pelvis, neck = starts[:, :1], ends[:, :1]
     hips, shoulders = starts[:, [6, 8]], starts[:, [2, 4]]
     low, high = pelvis + _HIP_SHARE * (hips - pelvis), neck + _SHOULDER_SHARE * (shoulders - neck)

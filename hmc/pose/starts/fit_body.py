@@ -44,9 +44,9 @@ class _Prior:
 
     Parameters
     ----------
-    anchors : ndarray, shape (n_frames, 27)
+    anchors : ndarray, shape (n_frames, 33)
         Poses near which those of the frames stay.
-    hold : ndarray, shape (27,)
+    hold : ndarray, shape (33,)
         Cost of a squared unit away from them.
     precision : ndarray, shape (n_fitted,)
         Cost a frame of a squared change of each dimension's logarithm.
@@ -71,7 +71,7 @@ def fit_body(
     ----------
     objectives : sequence of Symmetric
         One a frame, all of one body: the start and the centre of the prior.
-    states : ndarray, shape (n_frames, 27)
+    states : ndarray, shape (n_frames, 33)
         Poses to start from.
     coordinates : tuple of ndarray
         Where the surface is sampled (`hmc.body.flesh.surface_coordinates`).
@@ -80,7 +80,7 @@ def fit_body(
     Returns
     -------
     body : BodyModel
-    states : ndarray, shape (n_frames, 27)
+    states : ndarray, shape (n_frames, 33)
     info : FitBodyInfo
     """
     body = objectives[0].body

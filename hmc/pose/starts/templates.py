@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hmc.body.joints import dof_index
+from hmc.body.joints import N_CANTON, N_DOF, dof_index
 from hmc.body.kinematics import landmarks
 from hmc.body.model import BodyModel, neutral_state
 from hmc.pose.method import Subject
@@ -63,7 +63,7 @@ def template_states(body: BodyModel, xy: np.ndarray, floor_z: float, headings: n
 
     Returns
     -------
-    ndarray, shape (n, n_templates, 27)
+    ndarray, shape (n, n_templates, 33)
     """
     states = []
     for angles, pelvis in TEMPLATES.values():
@@ -100,7 +100,7 @@ def first_poses(
 
     Returns
     -------
-    states : ndarray, shape (keep, 27)
+    states : ndarray, shape (keep, 33)
     costs : ndarray, shape (keep,)
         Square metres.
     """
@@ -110,7 +110,7 @@ def first_poses(
     states = template_states(body, middle[:2], floor_z, headings)
     n_templates = states.shape[1]
     states = np.repeat(states[:, :, None], variants, axis=2)
-    spread = np.r_[0.06, 0.06, 0.05, 0.12, 0.08, 0.08, np.full(21, 0.2)]
+    spread = np.r_[0.06, 0.06, 0.05, 0.12, 0.08, 0.08, np.full(N_CANTON - 6, 0.2), np.zeros(N_DOF - N_CANTON)]
     noise = rng.standard_normal(states.shape) * spread
     noise[:, :, 0] = 0.0  # the template itself takes part
     states = np.clip(states + noise, body.limits.low, body.limits.high).reshape(n_headings, n_templates * variants, -1)

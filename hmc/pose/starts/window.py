@@ -229,7 +229,7 @@ def walk(
     step : callable
         `PoseStep`.
     subject : Subject
-    state : ndarray, shape (27,), or Tracked
+    state : ndarray, shape (33,), or Tracked
         Pose in the frame `anchor`.
     anchor : int
     views : sequence of PersonView
@@ -331,7 +331,7 @@ def search_all(rng: np.random.Generator, objective: Objective, state: np.ndarray
     ----------
     rng : numpy.random.Generator
     objective : Objective
-    state : ndarray, shape (27,)
+    state : ndarray, shape (33,)
     settings : PolishSettings
     """
     cost = cost_at(objective, state)

@@ -28,7 +28,8 @@ HEADINGS = 12
 #: The search from each: the first layer's deviations (metres, radians), and its layers.
 SEARCH = AnnealedSettings(layers=14, particles=2000, survival_rate=0.05, spread=0.8)
 SEARCH_SD = {
-    "root_t": 0.15, "root_rz": 0.3, "root_r": 0.15, "torso": 0.2, "neck": 0.2, "shoulder": 0.8, "elbow": 0.8, "hip": 0.4, "knee": 0.5,
+    "root_t": 0.15, "root_rz": 0.3, "root_r": 0.15,
+    "torso": 0.2, "spine": 0.0, "girdle": 0.0, "neck": 0.2, "shoulder": 0.8, "elbow": 0.8, "hip": 0.4, "knee": 0.5,
 }  # fmt: skip
 #: The search near a pose, with so many times those deviations.
 NEAR_SEARCH = AnnealedSettings(layers=8, particles=1000, survival_rate=0.05, spread=0.7)
@@ -59,7 +60,7 @@ def start_poses(rng: np.random.Generator, body: BodyModel, points: np.ndarray, v
     Returns
     -------
     list of (state, cost)
-        States, shape (27,), no two alike, and a cost, square metres: the mean over markers of the squared distance to the nearest point,
+        States, shape (33,), no two alike, and a cost, square metres: the mean over markers of the squared distance to the nearest point,
         with what its views leave in doubt, and of the trusted points to the nearest marker. Empty where there are too few points.
     """
     if len(points) < LEAST_POINTS:
@@ -94,11 +95,11 @@ def search_near(
     body : BodyModel
     points : ndarray, shape (n, 3)
     views : ndarray of int, shape (n,)
-    state : ndarray, shape (27,)
+    state : ndarray, shape (33,)
 
     Returns
     -------
-    state : ndarray, shape (27,)
+    state : ndarray, shape (33,)
     better : bool
         Whether it fits them better, at the cost of `start_poses`.
     """
@@ -128,7 +129,7 @@ def left_over(body: BodyModel, state: np.ndarray, points: np.ndarray, views: np.
     ----------
     body : BodyModel
         With its markers as tips.
-    state : ndarray, shape (27,)
+    state : ndarray, shape (33,)
     points : ndarray, shape (n, 3)
     views : ndarray of int, shape (n,)
     gate_m : float
@@ -145,7 +146,7 @@ def _trust(views: np.ndarray) -> np.ndarray:
 
 
 def point_cost(body: BodyModel, points: np.ndarray, views: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
-    """How badly states, shape (n, 27), fit points: the cost of `start_poses`, shape (n,), square metres.
+    """How badly states, shape (n, 33), fit points: the cost of `start_poses`, shape (n,), square metres.
 
     Parameters
     ----------
@@ -182,7 +183,7 @@ def lay_body(
         With its markers as tips.
     points : ndarray, shape (n, 3)
         World, metres.
-    state : ndarray, shape (27,)
+    state : ndarray, shape (33,)
         Start.
     gates_m : tuple of float
         How far a marker may be from the point that it takes, round by round, metres.
@@ -191,7 +192,7 @@ def lay_body(
 
     Returns
     -------
-    state : ndarray, shape (27,)
+    state : ndarray, shape (33,)
     cost : float
         Mean squared distance of the markers to their points, square metres; that of the last gate for a marker without one. Infinite where
         too few markers found a point.

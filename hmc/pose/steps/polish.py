@@ -62,14 +62,14 @@ def polish(
     ----------
     rng : numpy.random.Generator
     objective : Objective
-    starts : sequence of ndarray, shape (27,)
-    anchor : ndarray, shape (27,)
+    starts : sequence of ndarray, shape (33,)
+    anchor : ndarray, shape (33,)
         Pose on which what no data speaks of is held.
     settings : PolishSettings
 
     Returns
     -------
-    state : ndarray, shape (27,)
+    state : ndarray, shape (33,)
     cost : float
         Square metres.
     evaluations : int

@@ -71,9 +71,9 @@ def suited(hierarchies: Sequence[Inclusive], state: np.ndarray, there: np.ndarra
     ----------
     hierarchies : sequence of Inclusive
         One, or two.
-    state : ndarray, shape (27,)
+    state : ndarray, shape (33,)
         The last pose.
-    there : ndarray of bool, shape (27,)
+    there : ndarray of bool, shape (33,)
         Angles of limbs that are there: others say nothing.
     """
     hinges = HINGES[there[HINGES]]

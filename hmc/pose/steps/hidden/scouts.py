@@ -34,7 +34,7 @@ class ScoutReport:
 
     Parameters
     ----------
-    state : ndarray, shape (27,)
+    state : ndarray, shape (33,)
         The body with the limb at the scouts' mean.
     spread_deg : float
         Median spread of the limb's own angles, degrees.
@@ -78,7 +78,7 @@ def scout(
     ----------
     rng : numpy.random.Generator
     looked : FleshInHulls
-    state : ndarray, shape (27,)
+    state : ndarray, shape (33,)
         Estimate of the tracked limbs.
     limb : int
         Place in the tree's `limbs`; what it hangs on must be there.

@@ -27,7 +27,7 @@ INSIDE_M = 0.02
 #: A limb of which more than this share is inside of others lies folded against them.
 FOLDED = 0.3
 #: Share of an upper arm or thigh that is in the trunk anyway, more than of a forearm or shank in others: where they are joined.
-JOINED = 0.3
+JOINED = 0.4
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ def place_flesh(looked: FleshInHulls, state: np.ndarray, parts: Collection[str])
     Parameters
     ----------
     looked : FleshInHulls
-    state : ndarray, shape (27,)
+    state : ndarray, shape (33,)
     parts : collection of str
     """
     table, maps = looked.table, looked.maps

@@ -24,7 +24,7 @@ __all__ = ["with_hidden_limbs"]
 
 @dataclass(frozen=True)
 class _There:
-    """What of the body is there: parts, shape (n_parts,), and angles, shape (27,)."""
+    """What of the body is there: parts, shape (n_parts,), and angles, shape (33,)."""
 
     parts: np.ndarray
     dofs: np.ndarray
