@@ -34,6 +34,7 @@ from hmc.pose.method import SURFACE_POINTS, Capture, PoseMethod, Subject, make_s
 from hmc.pose.mixtures import N_MIXTURES, BackwardSettings, choose_path, mixed_poses, mixture
 from hmc.pose.objectives.symmetric import Symmetric, body_distance
 from hmc.pose.occluders import HiddenPlaces, learn_hidden_places, unseen_voxels
+from hmc.pose.records import with_angles
 from hmc.pose.starts.fit_body import with_known_stature
 from hmc.pose.starts.own_body import choose_frames, own_body
 from hmc.pose.steps.polish import PolishSettings, fine_objective, polish
@@ -112,7 +113,7 @@ def backward(
     places = learn_hidden_places(recording.rig, person_grid(recording, options.voxel_size_m), run, people.states)
     first_bodies = make_bodies(people.states.bodies, method.limits)
     pass_ = _Pass(recording, tracks, settings, options, run, capture, people.states, first_bodies, places)
-    records = open_journal(run.journal, run.key)
+    records = open_journal(run.journal, with_angles(run.key))
     if records:
         bodies = make_bodies({int(person): body for person, body in records[0]["bodies"].items()}, method.limits)
     else:

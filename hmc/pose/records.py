@@ -16,7 +16,7 @@ from hmc.io.journal import append_journal, open_journal
 from hmc.pose.method import StepInfo, Tracked, begin_tracking
 from hmc.pose.person import DecidedFrames, PoseTask
 
-__all__ = ["from_record", "keep_decided", "kept_decided", "to_record"]
+__all__ = ["from_record", "keep_decided", "kept_decided", "to_record", "with_angles"]
 
 #: Before the names of the memory's arrays in a file.
 _MEMORY = "memory_"
@@ -40,6 +40,11 @@ def keep_decided(journal: str | Path | None, decided: DecidedFrames, before: int
     append_journal(journal, to_record(decided))
 
 
+def with_angles(key: str) -> str:
+    """What a journal of poses depends on: the run's key, and which angles its states have."""
+    return f"{key}\n{' '.join(DOF_NAMES)}"
+
+
 def kept_decided(journal: str | Path | None, key: str, task: PoseTask) -> Iterator[DecidedFrames]:
     """The rows that a stopped run left, in order; the last ones of each person with what the method goes on from.
 
@@ -50,7 +55,7 @@ def kept_decided(journal: str | Path | None, key: str, task: PoseTask) -> Iterat
     task : PoseTask
         As they were kept with.
     """
-    records = open_journal(journal, key)
+    records = open_journal(journal, with_angles(key))
     last = {record["person"]: k for k, record in enumerate(records)}
     for k, record in enumerate(records):
         decided = from_record(record, task)

@@ -12,7 +12,7 @@ from hmc.body.proportions import default_body
 from hmc.io.journal import append_journal, open_journal
 from hmc.pose.method import Capture, StepInfo, Tracked, begin_tracking, make_subject
 from hmc.pose.person import DecidedFrames, PoseTask
-from hmc.pose.records import from_record, keep_decided, kept_decided, to_record
+from hmc.pose.records import from_record, keep_decided, kept_decided, to_record, with_angles
 from hmc.pose.registry import pose_method
 
 TASK = PoseTask(pose_method("apf"), Capture())
@@ -80,7 +80,7 @@ def check(found: Tracked, value: float) -> None:
 
 def test_a_run_goes_on_from_the_last_row_of_each_person(tmp_path):
     journal = tmp_path / "journal"
-    open_journal(journal, "run")
+    open_journal(journal, with_angles("run"))
     before = -1
     for frame in (3, 4, 6, 7):
         keep_decided(journal, rows_of(frame, frame), before)
@@ -97,7 +97,7 @@ def test_a_run_goes_on_from_the_last_row_of_each_person(tmp_path):
 def test_memory_of_the_last_record_outlives_the_next_one_until_that_is_recorded(tmp_path, monkeypatch):
     """The run dies after the memory was written, before its record: it goes on from the record before."""
     journal = tmp_path / "journal"
-    open_journal(journal, "run")
+    open_journal(journal, with_angles("run"))
     keep_decided(journal, rows_of(6, 6), -1)
     keep_decided(journal, rows_of(7, 7), 6)
 
@@ -115,6 +115,13 @@ def test_memory_of_the_last_record_outlives_the_next_one_until_that_is_recorded(
     assert len(list(tmp_path.iterdir())) == 3
 
 
+def test_states_of_other_angles_are_not_taken_up(tmp_path):
+    journal = tmp_path / "journal"
+    open_journal(journal, with_angles("run").replace(" spine_x", ""))
+    keep_decided(journal, replace(rows_of(3, 3), states=np.zeros((1, N_DOF - 1))), -1)
+    assert list(kept_decided(journal, "run", TASK)) == []
+
+
 def test_memory_of_an_earlier_run_is_not_taken_for_this_one_s(tmp_path):
     journal = tmp_path / "journal"
     open_journal(journal, "another run")
@@ -130,7 +137,7 @@ def test_memory_of_an_earlier_run_is_not_taken_for_this_one_s(tmp_path):
 
 def test_without_a_memory_there_is_no_file_beside_the_journal_and_without_a_journal_none_at_all(tmp_path):
     journal = tmp_path / "journal"
-    open_journal(journal, "run")
+    open_journal(journal, with_angles("run"))
     rows = rows_of(1, 1)
     rows = replace(rows, tracked=replace(rows.tracked, memory={}))
     keep_decided(journal, rows, -1)
