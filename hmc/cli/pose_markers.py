@@ -84,6 +84,8 @@ class Markers:
         else:
             table = _detect(args, self.recording, self.used, MarkerColorSettings(), args.out / MARKERS_JOURNAL, key, problems)
             write_detections(args.out / "detections.csv", table)
+            # What was written is what is used, so that with --detections the file leads to the same poses.
+            table = _read(args.out / "detections.csv", self.recording)
         if not len(table.frames):
             raise InputError(f"{self.used}: no marker in these frames; check the labelled points or the detections")
         return table
