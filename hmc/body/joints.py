@@ -14,7 +14,7 @@ import numpy as np
 
 __all__ = [
     "DOF_NAMES", "N_CANTON", "N_DOF", "SEGMENTS", "TRUNK_JOINTS", "JointLimits", "Segment", "canton_limits", "default_limits", "dof_index",
-    "mirror_state",
+    "mirror_state", "stiff_limits",
 ]  # fmt: skip
 
 
@@ -136,6 +136,11 @@ def canton_limits() -> JointLimits:
 def default_limits() -> JointLimits:
     """Angular ranges for joint centres: elbows and knees may stretch a little past straight, the waist may twist further."""
     return _limits(_DEFAULT_DEG)
+
+
+def stiff_limits() -> JointLimits:
+    """Those of `default_limits`, but for the trunk's own joints, which are held at 0."""
+    return _limits({name: bounds for name, bounds in _DEFAULT_DEG.items() if not name.startswith(TRUNK_JOINTS)})
 
 
 def mirror_state(states: np.ndarray) -> np.ndarray:

@@ -11,14 +11,14 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from hmc.body.joints import SEGMENTS, JointLimits, canton_limits, default_limits
+from hmc.body.joints import SEGMENTS, JointLimits, canton_limits, default_limits, stiff_limits
 from hmc.body.model import PART_OF_SEGMENT, BodyModel, Cones
 from hmc.errors import InputError
 from hmc.landmarks import LANDMARKS
 
 __all__ = [
     "CANTON_LENGTHS", "DEFAULT_LENGTHS", "GIRTHS", "SOLE", "canton_body", "default_body", "landmark_segments", "make_bodies", "make_body",
-    "stature",
+    "stature", "stiff_body",
 ]  # fmt: skip
 
 #: Joint-centre lengths over stature. Trunk: hip centres' middle to the base of the neck. Sources: Winter (2009), figure 4.1
@@ -141,6 +141,17 @@ def default_body(height_m: float) -> BodyModel:
         Stature, metres.
     """
     return make_body(_scaled(height_m, DEFAULT_LENGTHS), default_limits())
+
+
+def stiff_body(height_m: float) -> BodyModel:
+    """The body of `default_body` with a trunk that does not bend.
+
+    Parameters
+    ----------
+    height_m : float
+        Stature, metres.
+    """
+    return make_body(_scaled(height_m, DEFAULT_LENGTHS), stiff_limits())
 
 
 def canton_body(height_m: float) -> BodyModel:

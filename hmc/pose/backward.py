@@ -110,7 +110,8 @@ def backward(
     if run.masks is None or kept_frames(run.masks, run.key, range(first, end)) is None:
         return replace(people, notes=(*people.notes, "silhouettes were not kept on disk: poses are those of one pass, forward in time"))
     capture = Capture(recording.fps, options.voxel_size_m, recording.room, recording.rig)
-    places = learn_hidden_places(recording.rig, person_grid(recording, options.voxel_size_m), run, people.states)
+    grid = person_grid(recording, options.voxel_size_m)
+    places = learn_hidden_places(recording.rig, grid, run, people.states) if settings.hidden_places else None
     first_bodies = make_bodies(people.states.bodies, method.limits)
     pass_ = _Pass(recording, tracks, settings, options, run, capture, people.states, first_bodies, places)
     records = open_journal(run.journal, with_angles(run.key))
@@ -150,6 +151,9 @@ class _Pass:
         for hull in stream_hulls(self.recording, grid, self.run.frontend, masks=masks):
             unseen = None if self.places is None else unseen_voxels(self.places, hull.masks)
             views = views_of(self.recording, grid, self.tracks, hull, unseen=unseen)
+            if not self.settings.own_rays:
+                yield hull.index, views
+                continue
             rows = np.flatnonzero((self.states.frames == hull.index) & np.isfinite(self.states.states).all(axis=1))
             poses = {
                 person: (self.bodies[person], self.states.states[row])
@@ -250,7 +254,10 @@ def _joined(people: PosedPeople, persons: Mapping[int, _Person], fps: float, set
     positions, states, costs = people.positions.copy(), people.states.states.copy(), people.costs.copy()
     for person in persons.values():
         frames, body = people.frames[person.rows], person.subject.body
-        picks = choose_path(body, frames, person.own, person.back, person.costs, fps, settings.path)
+        if settings.best_way:
+            picks = choose_path(body, frames, person.own, person.back, person.costs, fps, settings.path)
+        else:
+            picks = np.full(len(frames), N_MIXTURES - 1)
         states[person.rows] = mixture(person.own, person.back, picks)
         told = person.costs.any(axis=1)
         costs[person.rows[told]] = person.costs[np.arange(len(picks)), picks][told]

@@ -17,8 +17,8 @@ from hmc.body.joints import DOF_NAMES
 from hmc.body.kinematics import landmark_masks, landmarks
 from hmc.errors import InputError
 from hmc.io.detections import DetectionTable
-from hmc.io.masks import MaskStep, keep_masks, kept_masks
-from hmc.io.recording import Recording, iterate_frames
+from hmc.io.masks import keep_masks
+from hmc.io.recording import Recording
 from hmc.io.results import PoseStates, PoseTable, TrackTable, write_joints, write_pose
 from hmc.landmarks import LANDMARKS
 from hmc.pose.method import Capture, PoseMethod
@@ -26,7 +26,7 @@ from hmc.pose.person import DecidedFrames, PersonState, PersonTrack, PoseTask, p
 from hmc.pose.records import keep_decided, kept_decided
 from hmc.pose.views.markers import marker_views, seen_in_frame
 from hmc.pose.views.person_view import IMAGES_FOR, PersonView, check_needs, views_of
-from hmc.tracking.resumable import WARM_UP_FRAMES, person_grid
+from hmc.tracking.resumable import WARM_UP_FRAMES, kept_silhouettes, person_grid
 from hmc.tracking.tracks import velocities
 from hmc.voxels.grid import VoxelGrid
 from hmc.voxels.hulls import HullStep, stream_hulls
@@ -198,11 +198,7 @@ def _views_from(
 
 def _hulls_from(recording: Recording, grid: VoxelGrid, run: RunOptions, first: int, images: bool) -> Iterator[HullStep]:
     """Hulls from a frame on, of the silhouettes that were kept, where they were; otherwise these are kept now."""
-    end = recording.start + recording.n_frames
-    kept: Iterable[MaskStep] | None = None if run.masks is None else kept_masks(run.masks, run.key, first, end)
-    if kept is not None and images:
-        frames = iterate_frames(recording, first, end, run.on_problem)
-        kept = (replace(step, images=frame.images) for step, frame in zip(kept, frames, strict=True))
+    kept = kept_silhouettes(recording, run, first, images)
     stream = stream_hulls(recording, grid, run.frontend, first=first, warm_up=WARM_UP_FRAMES, masks=kept, on_problem=run.on_problem)
     return stream if kept is not None or run.masks is None else keep_masks(run.masks, run.key, first, stream, run.on_problem)
 

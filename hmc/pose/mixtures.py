@@ -43,12 +43,18 @@ class BackwardSettings:
         Frames to which it is fitted, at most.
     path : LegSettings
         What a jump of the limbs' velocities costs.
+    hidden_places, own_rays, best_way : bool
+        False, to see what each is for: nothing is learnt of what furniture hides; rays that another's pose covers ask all the same; the
+        backward pass's poses stay as they are, and none of the first pass's are taken.
     """
 
     polish: PolishSettings
     fit_body: FitBodySettings | None = field(default_factory=FitBodySettings)
     body_frames: int = 20
     path: LegSettings = field(default_factory=lambda: LegSettings(jump_weight=6e-5, arms_too=True))
+    hidden_places: bool = True
+    own_rays: bool = True
+    best_way: bool = True
 
 
 def mixed_poses(one: np.ndarray, other: np.ndarray) -> np.ndarray:

@@ -17,8 +17,8 @@ from typing import Any
 
 from hmc.errors import InputError
 from hmc.io.journal import append_journal, open_journal
-from hmc.io.masks import keep_masks
-from hmc.io.recording import Recording
+from hmc.io.masks import MaskStep, keep_masks, kept_masks
+from hmc.io.recording import Recording, iterate_frames
 from hmc.io.results import TrackTable
 from hmc.tracking.account import Account, account_of, remarks
 from hmc.tracking.blobs import Observation, observe
@@ -32,7 +32,7 @@ from hmc.voxels.grid import VoxelGrid
 from hmc.voxels.hulls import HullStep, stream_hulls
 from hmc.voxels.run_options import RunOptions
 
-__all__ = ["WARM_UP_FRAMES", "Timing", "observe_step", "person_grid", "track_recording"]
+__all__ = ["WARM_UP_FRAMES", "Timing", "kept_silhouettes", "observe_step", "person_grid", "track_recording"]
 
 CHECKPOINT_FRAMES = 25
 WARM_UP_FRAMES = 300
@@ -88,9 +88,10 @@ def track_recording(
     if len(recording.rig) < 2:
         run.on_problem("one camera does not tell how far away people are; two at least are needed to find them, better four")
     end = recording.start + recording.n_frames
-    stream = stream_hulls(recording, grid, run.frontend, first=done.next_frame, warm_up=WARM_UP_FRAMES, on_problem=note)
-    if run.masks is not None:
-        stream = keep_masks(run.masks, run.key, done.next_frame, stream, note)
+    first, kept = done.next_frame, kept_silhouettes(recording, run, done.next_frame, tracker.color)
+    stream = stream_hulls(recording, grid, run.frontend, first=first, warm_up=WARM_UP_FRAMES, masks=kept, on_problem=note)
+    if run.masks is not None and kept is None:
+        stream = keep_masks(run.masks, run.key, first, stream, note)
     hulls: Iterable[HullStep] = stream if done.next_frame < end else ()
     timing, account, before = done.timing, done.account, perf_counter()
     for hull in run.progress(hulls, end - done.next_frame) if run.progress else hulls:
@@ -115,6 +116,26 @@ def track_recording(
     for line in remarks(account, table, recording.fps, recording.persons):
         run.on_problem(line)
     return table
+
+
+def kept_silhouettes(recording: Recording, run: RunOptions, first: int, images: bool = False) -> Iterable[MaskStep] | None:
+    """The silhouettes from a frame to the end of the selection that were kept; None where not all of them were.
+
+    Parameters
+    ----------
+    recording : Recording
+    run : RunOptions
+    first : int
+        Absolute frame number.
+    images : bool
+        Whether the images are wanted besides; they are read again.
+    """
+    end = recording.start + recording.n_frames
+    kept = None if run.masks is None else kept_masks(run.masks, run.key, first, end)
+    if kept is None or not images:
+        return kept
+    frames = iterate_frames(recording, first, end, run.on_problem)
+    return (replace(step, images=frame.images) for step, frame in zip(kept, frames, strict=True))
 
 
 def person_grid(recording: Recording, voxel_size_m: float) -> VoxelGrid:

@@ -22,8 +22,8 @@ class RunOptions:
     journal : path, optional
         File in which the run is kept, and from which it goes on.
     masks : path, optional
-        File of silhouettes (`hmc.io.masks`): a tracker keeps all of them there; poses use those that were kept under the same key, and
-        make what is lacking again.
+        File of silhouettes (`hmc.io.masks`): those that were kept there under the same key are used, where they are all that are wanted;
+        else they are made, and kept.
     key : str
         Says what the run depends on. A journal with another key is begun anew.
     on_problem : callable, optional

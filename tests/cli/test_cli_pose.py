@@ -163,7 +163,7 @@ def test_the_recording_is_segmented_once(tmp_path, monkeypatch):
     stream = frontend.stream_masks
     monkeypatch.setattr(frontend, "stream_masks", lambda *args, **options: calls.append(args) or stream(*args, **options))
     assert quick(tmp_path / "kept") == 0 and len(calls) == 1
-    monkeypatch.setattr(follow, "kept_masks", lambda *args: None)
+    monkeypatch.setattr(follow, "kept_silhouettes", lambda *args: None)
     assert quick(tmp_path / "again") == 0 and len(calls) == 3
     assert (tmp_path / "kept" / "joints.csv").read_bytes() == (tmp_path / "again" / "joints.csv").read_bytes()
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from hmc.body.joints import canton_limits, default_limits
+from hmc.body.joints import canton_limits, default_limits, stiff_limits
 from hmc.pose.legs import LegSettings, TellLegs
 from hmc.pose.method import PoseMethod
 from hmc.pose.mixtures import BackwardSettings
@@ -56,6 +56,6 @@ def annealed_method(preset: PosePreset, name: str = "apf") -> PoseMethod:
         alternatives=TellLegs(preset.polish) if refines else None,
         legs=LegSettings() if refines else None,
         back=BackwardSettings(preset.polish, preset.fit_body) if refines and preset.limbs is None else None,
-        limits=canton_limits() if preset.body == "canton" else default_limits(),
+        limits={"default": default_limits, "stiff": stiff_limits, "canton": canton_limits}[preset.body](),
         settings=preset,
     )

@@ -17,7 +17,7 @@ from hmc.body.exchange import swapped_poses
 from hmc.body.kinematics import landmarks
 from hmc.body.limbs import LIMBS
 from hmc.body.model import BodyModel, neutral_state
-from hmc.body.proportions import canton_body, default_body
+from hmc.body.proportions import canton_body, default_body, stiff_body
 from hmc.pose.method import Capture, FrameRng, PoseStep, StartPose, StepInfo, Subject, Tracked, begin_tracking
 from hmc.pose.objectives.objective import Objective, cost_at
 from hmc.pose.starts.fit_body import with_known_stature
@@ -170,7 +170,8 @@ class WindowStart:
         """The subject with the person's body, a frame and the pose in it, and the candidates' costs."""
         preset, capture = self.preset, window.capture
         heights = (height_m,) if height_m else possible_heights([view.target for view in window.views], capture.floor_z)
-        bodies = [canton_body(height) if preset.body == "canton" else default_body(height) for height in heights]
+        make = {"default": default_body, "stiff": stiff_body, "canton": canton_body}[preset.body]
+        bodies = [make(height) for height in heights]
         subjects = [annealed_subject(body, capture, preset) for body in bodies]
         if preset.start == "neutral":
             started = StartPose(subjects[0], window.usable[0], _neutral_start(bodies[0], window))

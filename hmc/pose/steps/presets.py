@@ -64,8 +64,8 @@ class PosePreset:
     name : str
     source : str
         Where the numbers come from.
-    body : {"default", "canton"}
-        Proportions and joint limits (`hmc.body.proportions`).
+    body : {"default", "stiff", "canton"}
+        Proportions and joint limits (`hmc.body.proportions`); stiff: the default with a trunk that does not bend.
     likelihood : {"symmetric", "factorised", "global"}
         The symmetric cost, or the four scores of Canton (2009), section 6.5.
     annealed : AnnealedSettings
@@ -107,7 +107,7 @@ class PosePreset:
 
     name: str
     source: str
-    body: Literal["default", "canton"] = "default"
+    body: Literal["default", "stiff", "canton"] = "default"
     likelihood: Literal["symmetric", "factorised", "global"] = "symmetric"
     annealed: AnnealedSettings = field(default_factory=AnnealedSettings)
     drift_scale: float = 1.0
