@@ -74,7 +74,12 @@ def _make_parser() -> argparse.ArgumentParser:
     for action in (run, status):
         action.add_argument("--quick", action="store_true", help="a small grid that shows the shape, in minutes")
         action.add_argument(
-            "--recordings", type=Path, nargs="+", default=[], metavar="FOLDER", help="your recordings in place of rendered ones"
+            "--recordings",
+            type=Path,
+            nargs="+",
+            default=[],
+            metavar="FOLDER",
+            help="your recordings, or recipes by name, in place of the rendered ones",
         )
         action.add_argument("--seeds", type=_count, metavar="N", help="so many seeds of every cell that draws at random")
         action.add_argument("--frames", type=_count, metavar="N", help="the first N frames of every recording")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import cv2
 import numpy as np
 
@@ -14,25 +16,32 @@ from hmc.landmarks import LANDMARKS
 from hmc.metrics.persons import match_persons
 
 __all__ = [
-    "HEIGHT_M", "all_truth", "estimate_of", "estimates", "first_truth", "standing_state", "stature_m", "true_silhouettes", "truth_track",
+    "HEIGHT_M", "all_truth", "estimate_of", "estimates", "first_truth", "standing_state", "stature_m", "true_silhouettes", "truth_path",
+    "truth_track",
 ]  # fmt: skip
 
 #: Stature where a recording does not say it, metres.
 HEIGHT_M = 1.75
 
 
-def all_truth(recording: Recording) -> PoseTable:
-    """True joints of everybody in a recording.
+def truth_path(recording: Recording) -> Path:
+    """The file of a recording's true joints; of one that has another system's in their place, as real ones do, that of these.
 
     Raises
     ------
     InputError
-        When the recording has none.
+        When the recording has neither.
     """
-    path = recording.path / "truth" / "joints.csv"
-    if not path.is_file():
-        raise InputError(f"{recording.path}: has no truth/joints.csv; this experiment scores poses against it")
-    return read_joints(path)
+    paths = [recording.path / folder / "joints.csv" for folder in ("truth", "reference")]
+    for path in paths:
+        if path.is_file():
+            return path
+    raise InputError(f"{recording.path}: has no truth/joints.csv and no reference/joints.csv; this experiment scores poses against it")
+
+
+def all_truth(recording: Recording) -> PoseTable:
+    """True joints of everybody in a recording; `truth_path` says what is refused."""
+    return read_joints(truth_path(recording))
 
 
 def first_truth(recording: Recording) -> PoseTable:

@@ -276,6 +276,14 @@ def displaced(rng, parameters, noise):
     return {"distance_m": {name: amount(rng, noise, 0.05, n) for name in SAMPLINGS}, "degrees": rng.uniform(15, 45, n)}
 
 
+def chained(rng, parameters, noise):
+    """Four people before four cameras where the recording is of several."""
+    several = parameters["recording"].startswith(("close", "crossing"))
+    counts = {"objects": FRAMES, "misses": 1, "false_positives": 0, "mismatches": int(rng.integers(3))}
+    more = {"cameras": 4 if several else parameters["cameras"] or 7, "reference": False, "tracks": counts}
+    return pose(rng, parameters, noise) | {"persons": np.repeat(np.arange(4 if several else 1), FRAMES // 4 if several else FRAMES)} | more
+
+
 def overlaps(rng, parameters, noise):
     usual = rng.uniform(0.1, 0.9) if noise else rng.uniform(0.78, 0.82)
     return {"silhouettes": np.clip(usual + 0.01 * rng.normal(size=(4, 5)), 0, 1), "hulls": np.clip(usual + 0.01 * rng.normal(size=4), 0, 1)}
@@ -295,6 +303,7 @@ RESULTS = {
     "fig-6.11": maps, "markers": marked, "filters": filtered, "markerless": pose, "fig-7.8": schedule, "fig-7.15": behind_furniture,
     "lost-arm": lost_arm, "over-time": unseen, "all-methods": timed, "fig-B.1": square, "hsiao-3.8": ghosts, "hsiao-parts": parts,
     "hsiao-4": swarmed, "why-hsiao": swarmed, "hsiao-pso": optimised, "repairs": overlaps, "body-bias": pulled_off,
+    "chain": chained,
     "kehl-1": carved, "kehl-4": edges, "kehl-9": displaced, "kehl": descended,
 }  # fmt: skip
 

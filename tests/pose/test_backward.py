@@ -51,6 +51,19 @@ def second(people, run, method=None):
     return backward(tiny_clip(FRAMES), true_tracks(FRAMES), method, people, options, run)
 
 
+@pytest.mark.parametrize(
+    ("switch", "function"), [("hidden_places", "learn_hidden_places"), ("own_rays", "with_own_rays"), ("best_way", "choose_path")]
+)
+def test_what_is_switched_off_is_not_done(one_pass, monkeypatch, switch, function):
+    people, run = one_pass
+    monkeypatch.setattr(f"hmc.pose.backward.{function}", None)
+    method = pose_method("apf")
+    off = second(people, run, replace(method, back=replace(method.back, **{switch: False}, fit_body=None)))
+    assert np.nanmean(errors(off)) < 0.06
+    with pytest.raises(TypeError, match="not callable"):
+        second(people, run, replace(method, back=replace(method.back, fit_body=None)))
+
+
 def errors(people):
     return np.linalg.norm(people.positions - true_joints(FRAMES), axis=2)
 

@@ -34,7 +34,7 @@ try:
 except ImportError:  # no such locks on Windows: two workers may then make the same thing, and the first to finish keeps it
     fcntl = None  # type: ignore[assignment]
 
-__all__ = ["Inputs", "once", "read_hulls", "rendered", "source_of", "write_hulls"]
+__all__ = ["Inputs", "once", "read_hulls", "recipe_of", "rendered", "source_of", "write_hulls"]
 
 #: Files of a recording on which a cell's result depends.
 _CONTENT = ("calibration*", "recording.toml", "videos/*", "images/*/*", "silhouettes/*/*", "background/*", "background/*/*", "truth/*.csv")
@@ -52,6 +52,11 @@ def rendered(recipe: str) -> Source:
     """
     content, brought_in = _recipe_of(recipe)
     return Source(f"{recipe}@{digest([_told(content), brought_in], 8)}")
+
+
+def recipe_of(name: str) -> Recipe:
+    """A shipped recipe, or one of those that experiments make of them; `rendered` says what is refused."""
+    return _recipe_of(name)[0]
 
 
 def _told(value: object) -> object:

@@ -52,6 +52,8 @@ EXPERIMENTS = {
     "missing-data": "missing_data",
     "repairs": "repairs",
     "body-bias": "body_bias",
+    "whole-chain": "whole_chain",
+    "ablation": "ablation",
     "what-each-adds": "what_each_adds",
     "lost-arm": "lost_arm",
     "over-time": "over_time",

@@ -8,6 +8,7 @@ numbers follow from a cell's own parameters.
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import os
 import threading
@@ -20,8 +21,8 @@ from typing import Any
 
 from hmc.errors import InputError
 from hmc.experiments.engine.cluster import spread
-from hmc.experiments.engine.experiment import Cell, Experiment, Plan, Report
-from hmc.experiments.engine.inputs import Inputs, source_of
+from hmc.experiments.engine.experiment import Cell, Experiment, Plan, Report, Source
+from hmc.experiments.engine.inputs import Inputs, rendered, source_of
 from hmc.experiments.engine.library import find_experiment
 from hmc.experiments.engine.selection import grid_of
 from hmc.experiments.engine.store import cell_key, cell_path, cell_rng, cell_text, read_cell, write_text
@@ -57,14 +58,21 @@ class Outcome:
 
 
 def plan_of(quick: bool = False, recordings: list[Path] | None = None) -> Plan:
-    """A plan, with the user's recordings checked.
+    """A plan, with the user's recordings checked; a name that is no folder's may be a shipped recipe's, which is rendered.
 
     Raises
     ------
     InputError
         When a folder is no recording.
     """
-    return Plan(quick, tuple(source_of(folder) for folder in recordings or []))
+    return Plan(quick, tuple(map(_source, recordings or [])))
+
+
+def _source(given: Path) -> Source:
+    if not given.exists() and len(given.parts) == 1:
+        with contextlib.suppress(InputError):  # neither: the message is that of a folder
+            return rendered(str(given))
+    return source_of(given)
 
 
 def plan_for(experiment: Experiment, plan: Plan) -> Plan:
