@@ -159,7 +159,7 @@ def _draw(costs: Mapping[str, _Cost]) -> plt.Figure:
         axes.plot(list(cost.by_clip.values()), np.full(len(cost.by_clip), place), "o", color=COLORS["sparse"], markersize=2.5)
     axes.axvline(0, color=COLORS["paper"], linewidth=0.8)
     axes.set_yticks(places, list(costs))
-    axes.set(xlabel="mean error without it, more than with it (mm); points: recordings")
+    axes.set(xlabel="added mean error without it (mm); points: recordings")
     axes.invert_yaxis()
     return figure
 
