@@ -93,7 +93,7 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
                 continue
             # The same rays and points of the hull for all variants, which the cell's own generator would draw anew.
             drawn = np.random.default_rng([person, hull.index])
-            end, _ = refine(fine_objective(drawn, subject, target, _POLISH), start, _POLISH.refine)
+            end, _ = refine(fine_objective(drawn, subject, views[person], _POLISH), start, _POLISH.refine)
             before.append(off)
             after.append(landmarks(subject.body, end) - points)
     if not after:

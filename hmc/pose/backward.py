@@ -30,9 +30,11 @@ from hmc.io.masks import kept_frames
 from hmc.io.recording import Recording
 from hmc.io.results import PoseStates, TrackTable
 from hmc.pose.follow import FollowOptions, PosedPeople
+from hmc.pose.keypoint_cues import beside_body, learn_beside, spread_frames, with_keypoints
 from hmc.pose.method import SURFACE_POINTS, Capture, PoseMethod, Subject, make_subject
 from hmc.pose.mixtures import N_MIXTURES, BackwardSettings, choose_path, mixed_poses, mixture
-from hmc.pose.objectives.symmetric import Symmetric, body_distance
+from hmc.pose.objectives.objective import Objective
+from hmc.pose.objectives.symmetric import body_distance
 from hmc.pose.occluders import HiddenPlaces, learn_hidden_places, unseen_voxels
 from hmc.pose.records import with_angles
 from hmc.pose.starts.fit_body import with_known_stature
@@ -40,7 +42,7 @@ from hmc.pose.starts.own_body import choose_frames, own_body
 from hmc.pose.steps.polish import PolishSettings, fine_objective, polish
 from hmc.pose.steps.proposal import shows_enough
 from hmc.pose.steps.refine import refine
-from hmc.pose.views.hull_target import HullTarget
+from hmc.pose.views.keypoint_pose import keypoint_pose
 from hmc.pose.views.person_view import PersonView, views_of
 from hmc.tracking.resumable import person_grid
 from hmc.voxels.hulls import stream_hulls
@@ -50,6 +52,8 @@ __all__ = ["backward", "with_own_rays"]
 
 #: Of the random numbers of a frame: those of the backward pass.
 BACKWARD = 3
+#: Frames from which it is learnt where a detector's keypoints lie, at most, well spread.
+BESIDE_FRAMES = 40
 #: A ray that passes another's body as near as this may be of that one, metres: as wide as clothes are.
 OTHERS_M = 0.03
 
@@ -121,6 +125,7 @@ def backward(
         bodies = _bodies(pass_, people, fitted)
         if run.journal is not None:
             append_journal(run.journal, {"bodies": {person: body.dimensions for person, body in bodies.items()}})
+    pass_ = _with_beside(pass_, people, fitted, bodies)
     persons = {person: _begun(people, fitted, person, make_subject(body, pass_.capture)) for person, body in bodies.items()}
     for record in records[1:]:
         for person, own, back, costs in record["rows"]:
@@ -151,6 +156,7 @@ class _Pass:
         for hull in stream_hulls(self.recording, grid, self.run.frontend, masks=masks):
             unseen = None if self.places is None else unseen_voxels(self.places, hull.masks)
             views = views_of(self.recording, grid, self.tracks, hull, unseen=unseen)
+            views = with_keypoints(views, self.recording.rig, self.tracks, self.options.keypoints)
             if not self.settings.own_rays:
                 yield hull.index, views
                 continue
@@ -177,6 +183,22 @@ def with_own_rays(view: PersonView, person: int, poses: Mapping[int, tuple[BodyM
     return replace(view, target=replace(view.target, rays=rays))
 
 
+def _with_beside(pass_: _Pass, people: PosedPeople, fitted: np.ndarray, bodies: Mapping[int, BodyModel]) -> _Pass:
+    """The same with what is learnt of where the detector's keypoints lie, by poses that the hulls alone refine."""
+    if pass_.options.keypoints is None:
+        return pass_
+    persons = {number: _begun(people, fitted, number, make_subject(body, pass_.capture)) for number, body in bodies.items()}
+    found = []
+    for frame, views in pass_.views(spread_frames(np.unique(people.frames[fitted]), BESIDE_FRAMES)):
+        for number, person in persons.items():
+            view = views.get(number)
+            if frame in person.row_of and view is not None and view.keypoints is not None and shows_enough(view.target):
+                hulls = fine_objective(pass_.rng(number, frame), person.subject, replace(view, keypoints=None), pass_.settings.polish)
+                state, _ = refine(hulls, person.own[person.row_of[frame]], pass_.settings.polish.refine)
+                found.append(beside_body(person.subject.body, state, view.keypoints))
+    return replace(pass_, capture=replace(pass_.capture, beside=learn_beside(found)))
+
+
 def _bodies(pass_: _Pass, people: PosedPeople, fitted: np.ndarray) -> dict[int, BodyModel]:
     """Every person's body, fitted to frames of the whole run where others bear it out."""
     settings, bodies = pass_.settings, dict(pass_.bodies)
@@ -185,13 +207,14 @@ def _bodies(pass_: _Pass, people: PosedPeople, fitted: np.ndarray) -> dict[int, 
         return bodies
     chosen = {number: choose_frames(people.costs[person.rows], settings.body_frames) for number, person in persons.items()}
     wanted = {number: {int(people.frames[persons[number].rows[k]]) for part in parts for k in part} for number, parts in chosen.items()}
-    poses: dict[int, dict[int, tuple[Symmetric, np.ndarray]]] = {number: {} for number in persons}
+    poses: dict[int, dict[int, tuple[Objective, np.ndarray]]] = {number: {} for number in persons}
     for frame, views in pass_.views(sorted(set().union(*wanted.values()))):
         for number, person in persons.items():
-            target = views[number].target if frame in wanted[number] and number in views else None
-            if target is not None and shows_enough(target):
+            view = views[number] if frame in wanted[number] and number in views else None
+            if view is not None and shows_enough(view.target):
                 k = person.row_of[frame]
-                objective = fine_objective(pass_.rng(number, frame), person.subject, target, settings.polish)
+                # Where a detector's keypoints lie on this body is not known yet.
+                objective = fine_objective(pass_.rng(number, frame), person.subject, replace(view, keypoints=None), settings.polish)
                 poses[number][k] = objective, refine(objective, person.own[k], settings.polish.refine)[0]
     for number, person in persons.items():
         picks, held_out = ([k for k in part if k in poses[number]] for part in chosen[number])
@@ -232,7 +255,7 @@ def _sweep(pass_: _Pass, persons: Mapping[int, _Person], first: int, end: int) -
             if k is None or view is None or view.target is None or not shows_enough(view.target):
                 continue
             after = person.back[k + 1] if k + 1 < len(person.rows) else person.own[k]
-            found = _both(pass_.rng(number, frame), person.subject, person.own[k], after, view.target, pass_.settings.polish)
+            found = _both(pass_.rng(number, frame), person.subject, person.own[k], after, view, pass_.settings.polish)
             _put(person, frame, *found)
             rows.append((number, *found))
         if pass_.run.journal is not None:
@@ -240,12 +263,12 @@ def _sweep(pass_: _Pass, persons: Mapping[int, _Person], first: int, end: int) -
 
 
 def _both(
-    rng: np.random.Generator, subject: Subject, own: np.ndarray, after: np.ndarray, target: HullTarget, settings: PolishSettings
+    rng: np.random.Generator, subject: Subject, own: np.ndarray, after: np.ndarray, view: PersonView, settings: PolishSettings
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """A frame's first pose, refined; the better of that and the next frame's, with lost limbs looked for; and what their mixtures cost."""
-    objective = fine_objective(rng, subject, target, settings)
+    objective = fine_objective(rng, subject, view, settings)
     refined, _ = refine(objective, own, settings.refine)
-    back, _, _ = polish(rng, objective, [refined, after], after, settings)
+    back, _, _ = polish(rng, objective, [refined, after, *keypoint_pose(subject.body, view.keypoints, refined)], after, settings)
     return refined, back, objective.cost(mixed_poses(refined, back))
 
 

@@ -21,6 +21,7 @@ from hmc.io.masks import keep_masks
 from hmc.io.recording import Recording
 from hmc.io.results import PoseStates, PoseTable, TrackTable, write_joints, write_pose
 from hmc.landmarks import LANDMARKS
+from hmc.pose.keypoint_cues import KeypointCues, with_keypoints
 from hmc.pose.method import Capture, PoseMethod
 from hmc.pose.person import DecidedFrames, PersonState, PersonTrack, PoseTask, person_step, resumed
 from hmc.pose.records import keep_decided, kept_decided
@@ -117,6 +118,8 @@ class FollowOptions:
         For methods that need them; one person's.
     drift : ndarray, shape (33,), or None
         P0 of filters, as in `hmc.pose.method.Capture`.
+    keypoints : KeypointCues or None
+        What a detector of 2-D keypoints saw.
     """
 
     voxel_size_m: float = 0.03
@@ -124,6 +127,7 @@ class FollowOptions:
     height_m: float | None = None
     detections: DetectionTable | None = None
     drift: np.ndarray | None = None
+    keypoints: KeypointCues | None = None
 
 
 def follow(
@@ -193,7 +197,8 @@ def _views_from(
     grid = person_grid(recording, options.voxel_size_m)
     hulls: Iterable = _hulls_from(recording, grid, run, first, bool(method.needs & IMAGES_FOR))
     for hull in run.progress(hulls, end - first) if run.progress else hulls:
-        yield _with_markers(views_of(recording, grid, tracks, hull, method.needs), recording, method, options)
+        views = with_keypoints(views_of(recording, grid, tracks, hull, method.needs), recording.rig, tracks, options.keypoints)
+        yield _with_markers(views, recording, method, options)
 
 
 def _hulls_from(recording: Recording, grid: VoxelGrid, run: RunOptions, first: int, images: bool) -> Iterator[HullStep]:

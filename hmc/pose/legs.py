@@ -87,7 +87,7 @@ def leg_alternatives(
     """
     if view.target is None:
         return no_alternatives(state)
-    objective = fine_objective(rng, subject, view.target, polish)
+    objective = fine_objective(rng, subject, view, polish)
     start = swapped_pose(subject.body, state, "legs")
     exchanged, info = refine(objective, start, replace(polish.refine, tolerance=TOLERANCE))
     return Alternatives(np.stack([state, exchanged]), np.array([cost_at(objective, state), info.cost]))

@@ -18,6 +18,7 @@ from hmc.body.joints import N_DOF, JointLimits, default_limits
 from hmc.body.model import PARTS, BodyModel
 from hmc.camera.model import Rig
 from hmc.pose.objectives.four_scores import ScoreTable
+from hmc.pose.objectives.keypoints import Beside
 from hmc.pose.objectives.symmetric import BodyPoints, body_points
 from hmc.pose.views.person_view import PersonView
 from hmc.search.filters import AnnealedInfo, ParticleState
@@ -67,6 +68,8 @@ class Capture:
     drift : ndarray, shape (33,), or None
         P0 of filters: half of the largest variation expected in one frame, metres and radians (Canton 2009, section 3.2.2); None: that of
         everyday motion (`hmc.pose.steps.presets.drift`).
+    beside : Beside
+        Where a detector's keypoints lie beside the body's.
     """
 
     fps: float = 30.0
@@ -74,6 +77,7 @@ class Capture:
     room: np.ndarray | None = None
     rig: Rig | None = None
     drift: np.ndarray | None = None
+    beside: Beside = field(default_factory=Beside)
 
     @property
     def floor_z(self) -> float:

@@ -23,7 +23,6 @@ from hmc.pose.starts.window import StartSettings, candidates, search_all, walk_f
 from hmc.pose.steps.polish import fine_objective
 from hmc.pose.steps.presets import PosePreset
 from hmc.pose.steps.refine import refine
-from hmc.pose.views.hull_target import HullTarget
 from hmc.pose.views.person_view import PersonView
 
 __all__ = ["LossSettings", "LossState", "Recovery", "loss_init", "recalled"]
@@ -163,7 +162,7 @@ class Recovery:
             state = replace(state, bad_s=state.bad_s + dt)
             if state.bad_s < state.wait_s - dt / 2:
                 return tracked, info, state
-            found = self._fresh_start(rng, tracked, view.target)
+            found = self._fresh_start(rng, tracked, view)
             if found is None:
                 return tracked, info, replace(state, bad_s=0.0, wait_s=2 * state.wait_s)
             return (*_placed(tracked, info, *found), replace(state, bad_s=0.0, wait_s=settings.patience_s, turned=0.0))
@@ -171,7 +170,7 @@ class Recovery:
         state = replace(state, usual=usual, bad_s=0.0, wait_s=settings.patience_s)
         if state.since_turn_s < (settings.suspicion_s if state.turned else settings.turn_every_s) - dt / 2:
             return tracked, info, state
-        (as_it_is, cost), (turned, turned_cost) = self._both_ways(rng, tracked, view.target)
+        (as_it_is, cost), (turned, turned_cost) = self._both_ways(rng, tracked, view)
         factors = walk_factor(np.array([as_it_is[3], turned[3]]), view.velocity, self.start)
         evidence = np.log(cost * factors[0]) - np.log(turned_cost * factors[1]) - settings.turn_drift
         state = replace(state, since_turn_s=0.0, turned=max(0.0, state.turned + float(evidence)))
@@ -179,22 +178,22 @@ class Recovery:
             return tracked, info, state
         return (*_placed(tracked, info, turned, turned_cost), replace(state, turned=0.0))
 
-    def _fresh_start(self, rng: np.random.Generator, tracked: Tracked, target: HullTarget) -> tuple[np.ndarray, float] | None:
+    def _fresh_start(self, rng: np.random.Generator, tracked: Tracked, view: PersonView) -> tuple[np.ndarray, float] | None:
         """The best pose that a start from this frame's hulls finds, and its cost, if that is far below the present one's."""
         polish = self.preset.polish
-        states, _ = candidates(rng, tracked.subject, target, self.preset)
-        objective = fine_objective(rng, tracked.subject, target, polish)
+        states, _ = candidates(rng, tracked.subject, view, self.preset)
+        objective = fine_objective(rng, tracked.subject, view, polish)
         trials = [refine(objective, one, polish.refine) for one in states]
         best, cost = min(((one, info.cost_after) for one, info in trials), key=lambda pair: pair[1])
         return (best, cost) if cost < self.settings.gain * cost_at(objective, tracked.state) else None
 
-    def _both_ways(self, rng: np.random.Generator, tracked: Tracked, target: HullTarget) -> list[tuple[np.ndarray, float]]:
+    def _both_ways(self, rng: np.random.Generator, tracked: Tracked, view: PersonView) -> list[tuple[np.ndarray, float]]:
         """The pose and the one turned about, both refined to the same points, with their costs.
 
         Arms and legs of a body that has been followed the wrong way round have gone astray too: those of the turned one are looked for.
         """
         polish, now = self.preset.polish, tracked.state
-        objective = fine_objective(rng, tracked.subject, target, polish)
+        objective = fine_objective(rng, tracked.subject, view, polish)
         as_it_is, _ = refine(objective, now, polish.refine)
         turned, _ = refine(objective, swapped_pose(tracked.subject.body, now, "all"), polish.refine)
         return [(as_it_is, cost_at(objective, as_it_is)), search_all(rng, objective, turned, polish)]

@@ -41,7 +41,7 @@ HOUSE = PRESETS["default"]
 def step(rng, tracked, view):
     if view.target is None:
         return unseen(tracked)
-    objective, limits = fine_objective(rng, tracked.subject, view.target, HOUSE.polish), tracked.subject.body.limits
+    objective, limits = fine_objective(rng, tracked.subject, view, HOUSE.polish), tracked.subject.body.limits
     state = tracked.state
     for width in (0.2, 0.1, 0.1, 0.05):
         moved = rng.standard_normal((60, len(state))) * (rng.random((60, len(state))) < 0.1)

@@ -29,7 +29,7 @@ STEPS = METHOD | {"pose.steps"}
 STARTS = STEPS | {"pose.starts"}
 PERSON = STARTS | {"pose.legs", "pose.person"}
 MIXTURES = STEPS | {"pose.legs", "pose.mixtures"}
-FOLLOWING = PERSON | {"pose.records", "pose.follow"}
+FOLLOWING = PERSON | {"pose.records", "pose.follow", "pose.keypoint_cues"}
 METHODS = STARTS | MIXTURES | {"pose.recovery", "pose.methods"}
 POSE = METHODS | FOLLOWING | {"pose.backward", "pose.clear_views", "pose.occluders", "pose.smoothing", "pose.registry"}
 METRICS = IO | {"metrics"}
@@ -55,6 +55,7 @@ MAY_IMPORT = {
     "pose.person": PERSON,
     "pose.records": PERSON | {"pose.records"},
     "pose.follow": FOLLOWING,
+    "pose.keypoint_cues": OBJECTIVES,
     "pose.mixtures": MIXTURES,
     "pose.occluders": VIEWS,
     "pose.backward": FOLLOWING | MIXTURES | {"pose.backward", "pose.occluders"},

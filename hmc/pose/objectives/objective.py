@@ -79,6 +79,9 @@ class Objective(Protocol):
     def coarser(self, rng: np.random.Generator, n: int) -> Objective:
         """The objective on about `n` of the data's points."""
 
+    def of_body(self, body: BodyModel, points: Any) -> Objective:
+        """The same of another body, with the points of its surface (`hmc.pose.objectives.symmetric.BodyPoints`)."""
+
 
 @dataclass(frozen=True)
 class _SummedAt:
@@ -146,6 +149,10 @@ class Sum:
     def coarser(self, rng: np.random.Generator, n: int) -> Sum:
         """Each on about `n` points."""
         return Sum([one.coarser(rng, n) for one in self.parts])
+
+    def of_body(self, body: BodyModel, points: Any) -> Sum:
+        """Each of another body."""
+        return Sum([one.of_body(body, points) for one in self.parts])
 
 
 def cost_at(objective: Objective, state: np.ndarray) -> float:

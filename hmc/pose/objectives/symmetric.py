@@ -286,6 +286,10 @@ class Symmetric:
         """The objective with about `n` of the points to be covered."""
         return replace(self, asked=sample_points(rng, self.asked, n), asked_part=None)
 
+    def of_body(self, body: BodyModel, points: BodyPoints) -> Symmetric:
+        """The same of another body and the points of its surface."""
+        return replace(self, body=body, points=points)
+
     def _terms(self, states: np.ndarray) -> tuple[np.ndarray, ...]:
         """What the cost is made of.
 

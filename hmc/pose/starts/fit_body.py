@@ -16,8 +16,9 @@ import numpy as np
 from hmc.body.dimensions import FITTED, GIRTHS, LENGTHS, FitBodySettings, reshaped
 from hmc.body.joints import N_DOF, JointLimits
 from hmc.body.model import BodyModel
+from hmc.pose.objectives.objective import Objective
 from hmc.pose.objectives.residuals import residual_rows
-from hmc.pose.objectives.symmetric import Symmetric, body_points
+from hmc.pose.objectives.symmetric import body_points
 from hmc.search.gauss_newton import damped, movable
 
 __all__ = ["WORTH_IT", "FitBodyInfo", "fit_body", "with_known_stature"]
@@ -63,13 +64,13 @@ def with_known_stature(settings: FitBodySettings, known: bool) -> FitBodySetting
 
 
 def fit_body(
-    objectives: Sequence[Symmetric], states: np.ndarray, coordinates: Coordinates, settings: FitBodySettings
+    objectives: Sequence[Objective], states: np.ndarray, coordinates: Coordinates, settings: FitBodySettings
 ) -> tuple[BodyModel, np.ndarray, FitBodyInfo]:
     """One person's body with dimensions fitted to several frames.
 
     Parameters
     ----------
-    objectives : sequence of Symmetric
+    objectives : sequence of Objective
         One a frame, all of one body: the start and the centre of the prior.
     states : ndarray, shape (n_frames, 33)
         Poses to start from.
@@ -92,10 +93,10 @@ def fit_body(
     prior = _Prior(states, hold, precision)
     shape = np.zeros(len(FITTED))
 
-    def with_shape(shape: np.ndarray) -> list[Symmetric]:
+    def with_shape(shape: np.ndarray) -> list[Objective]:
         other = reshaped(body, shape)
         samples = body_points(other, coordinates)
-        return [replace(one, body=other, points=samples) for one in objectives]
+        return [one.of_body(other, samples) for one in objectives]
 
     def rows(shape, states):
         step = 0.01

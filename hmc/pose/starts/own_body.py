@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 
 import numpy as np
 
@@ -11,7 +10,7 @@ from hmc.body.dimensions import FitBodySettings
 from hmc.body.flesh import surface_coordinates
 from hmc.body.model import BodyModel
 from hmc.pose.method import Subject
-from hmc.pose.objectives.symmetric import Symmetric
+from hmc.pose.objectives.objective import Objective
 from hmc.pose.starts.fit_body import WORTH_IT, fit_body
 from hmc.pose.steps.refine import RefineSettings, refine
 
@@ -50,7 +49,7 @@ def choose_frames(costs: np.ndarray, n: int) -> tuple[list[int], list[int]]:
 
 def own_body(
     subject: Subject,
-    poses: Mapping[int, tuple[Symmetric, np.ndarray]],
+    poses: Mapping[int, tuple[Objective, np.ndarray]],
     chosen: tuple[list[int], list[int]],
     settings: FitBodySettings,
     refinement: RefineSettings,
@@ -63,7 +62,7 @@ def own_body(
     ----------
     subject : Subject
         From whose body the fit starts, and to which a prior holds it.
-    poses : mapping of int to (Symmetric, ndarray of shape (33,))
+    poses : mapping of int to (Objective, ndarray of shape (33,))
         Of the frames: the objective, with the subject's body, and the pose.
     chosen : (list of int, list of int)
         As from `choose_frames`.
@@ -83,7 +82,7 @@ def own_body(
     fitted = equip(body)
     tried = [poses[k] for k in held_out]
     before, after = (
-        [refine(replace(objective, body=one.body, points=one.points), state, refinement)[1].cost_after for objective, state in tried]
+        [refine(objective.of_body(one.body, one.points), state, refinement)[1].cost_after for objective, state in tried]
         for one in (subject, fitted)
     )
     # Of frames that it was not fitted to.

@@ -15,6 +15,7 @@ from hmc.pose.steps.descent.tracker import SmdPreset, SmdTracker, TrackState, ma
 from hmc.pose.steps.polish import fine_objective
 from hmc.pose.steps.presets import PRESETS
 from hmc.pose.views.hull_target import HullTarget
+from hmc.pose.views.person_view import PersonView
 from hmc.pose.views.skin import Skin
 
 __all__ = ["FirstPose", "begin", "fitted_body"]
@@ -102,7 +103,7 @@ def fitted_body(
     if preset.fit_body is None:
         return None
     picks = np.unique(np.linspace(0, len(states) - 1, FIT_FRAMES).round().astype(int))
-    objectives = [fine_objective(rng, subject, targets[k], preset.polish) for k in picks]
+    objectives = [fine_objective(rng, subject, PersonView(target=targets[k]), preset.polish) for k in picks]
     settings = with_known_stature(preset.fit_body, height_known)
     coordinates = surface_coordinates(body, preset.surface_samples)
     found, _, info = fit_body(objectives, np.array([states[k] for k in picks]), coordinates, settings)

@@ -31,6 +31,7 @@ from hmc.pose.steps.presets import PosePreset
 from hmc.pose.steps.proposal import as_proposed
 from hmc.pose.steps.refine import refine
 from hmc.pose.views.hull_target import HullTarget
+from hmc.pose.views.keypoint_pose import keypoint_pose
 from hmc.pose.views.person_view import PersonView
 from hmc.search.filters import AnnealedSettings
 
@@ -268,18 +269,30 @@ def _neutral_start(body: BodyModel, window: _Window) -> np.ndarray:
     return state
 
 
-def candidates(rng: np.random.Generator, subject: Subject, target: HullTarget, preset: PosePreset) -> tuple[np.ndarray, np.ndarray]:
+def candidates(rng: np.random.Generator, subject: Subject, view: PersonView, preset: PosePreset) -> tuple[np.ndarray, np.ndarray]:
     """Candidate poses of one frame, best first, and their costs: from typical poses, or from the skeleton in the voxels too.
+
+    Where a detector's keypoints are seen, what they show is one of them, and they have a say in the order.
 
     Parameters
     ----------
     rng : numpy.random.Generator
     subject : Subject
-    target : HullTarget
+    view : PersonView
+        With hulls.
     preset : PosePreset
     """
     find = spectral_poses if preset.start == "spectral" else first_poses
-    return find(rng, subject, target, preset.symmetric, subject.capture.floor_z)
+    if view.target is None:
+        raise ValueError("the frame has no hulls of this person")
+    states, costs = find(rng, subject, view.target, preset.symmetric, subject.capture.floor_z)
+    if view.keypoints is None:
+        return states, costs
+    objective = fine_objective(rng, subject, view, preset.polish)
+    trials = [*states, *keypoint_pose(subject.body, view.keypoints, states[0])]
+    refined = [refine(objective, trial, preset.polish.refine) for trial in trials]
+    refined.sort(key=lambda pair: pair[1].cost_after)
+    return np.array([state for state, _ in refined]), np.array([info.cost_after for _, info in refined])
 
 
 def _best_hypothesis(subject: Subject, window: _Window, preset: PosePreset, settings: StartSettings) -> StartPose:
@@ -288,13 +301,13 @@ def _best_hypothesis(subject: Subject, window: _Window, preset: PosePreset, sett
     anchors = sorted({usable[round(q * (len(usable) - 1))] for q in np.linspace(0.1, 0.9, settings.anchors)})
     pool = []
     for anchor in anchors:
-        states, costs = candidates(window.frame_rng(anchor), subject, window.target(anchor), preset)
+        states, costs = candidates(window.frame_rng(anchor), subject, window.views[anchor], preset)
         costs = costs * walk_factor(states[:, 3], velocities[anchor], settings)
         pool += [(cost, anchor, state) for cost, state in zip(costs, states, strict=True)]
     pool.sort(key=lambda entry: entry[0])
     # All candidates are compared in the frame that was easiest to fit.
     anchor = pool[0][1]
-    objective = fine_objective(window.frame_rng(anchor), subject, window.target(anchor), preset.polish)
+    objective = fine_objective(window.frame_rng(anchor), subject, window.views[anchor], preset.polish)
     here = [state for _, where, state in pool if where == anchor]
     trials = [*here, *swapped_poses(body, here[0]), *swapped_poses(body, here[min(1, len(here) - 1)])]
     refined = [refine(objective, trial, preset.polish.refine) for trial in trials]
@@ -369,7 +382,8 @@ def _fit(subject: Subject, window: _Window, path: Sequence[tuple[Tracked, StepIn
         return subject
     chosen = choose_frames(np.array([info.cost for _, info in path]), settings.body_frames)
     poses = {
-        k: (fine_objective(window.frame_rng(k), subject, window.target(k), preset.polish), path[k][0].state)
+        # By the hulls alone: a detector's hips and shoulders are not the body's, and would become its lengths.
+        k: (fine_objective(window.frame_rng(k), subject, replace(window.views[k], keypoints=None), preset.polish), path[k][0].state)
         for part in chosen
         for k in part
     }

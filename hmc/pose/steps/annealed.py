@@ -93,7 +93,8 @@ def frame_data(
         return ScoreData(score_maps(target, subject.capture.room, preset.hull), preset.likelihood == "global")
     points = points_to_cover(rng, target, preset.hull_points, preset.symmetric.ray_share)
     part = nearest_part(subject.body, tracked.state, points) if by_part else None
-    return SymmetricData(target, points, preset.symmetric, part)
+    keypoints = None if view.keypoints is None else (view.keypoints, preset.keypoints)
+    return SymmetricData(target, points, preset.symmetric, part, keypoints)
 
 
 def starting_particles(tracked: Tracked, preset: PosePreset) -> ParticleState:

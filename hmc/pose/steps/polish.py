@@ -11,12 +11,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hmc.pose.method import PoseStep, StepInfo, Subject, Tracked, unseen
-from hmc.pose.objectives.objective import Objective
+from hmc.pose.objectives.keypoints import KeypointCost, KeypointSettings
+from hmc.pose.objectives.objective import Objective, Sum
 from hmc.pose.objectives.symmetric import Symmetric, SymmetricSettings
 from hmc.pose.steps.limb_search import SearchSettings, lost_limbs, search_limbs
 from hmc.pose.steps.proposal import Propose, shows_enough
 from hmc.pose.steps.refine import RefineSettings, refine_all
-from hmc.pose.views.hull_target import HullTarget
+from hmc.pose.views.keypoint_pose import keypoint_pose
 from hmc.pose.views.person_view import PersonView
 from hmc.pose.views.rays import points_to_cover
 
@@ -35,18 +36,33 @@ class PolishSettings:
     refine : RefineSettings
     search : SearchSettings or None
         Search for a limb that got lost; None: there is none.
+    keypoints : KeypointSettings
+        What a detector's keypoints weigh, where there are any.
     """
 
     symmetric: SymmetricSettings = field(default_factory=SymmetricSettings)
     hull_points: int = 600
     refine: RefineSettings = field(default_factory=RefineSettings)
     search: SearchSettings | None = field(default_factory=SearchSettings)
+    keypoints: KeypointSettings = field(default_factory=KeypointSettings)
 
 
-def fine_objective(rng: np.random.Generator, subject: Subject, target: HullTarget, settings: PolishSettings) -> Symmetric:
-    """The symmetric cost of a person in a frame, at as many points as a refinement takes."""
-    asked = points_to_cover(rng, target, settings.hull_points, settings.symmetric.ray_share)
-    return Symmetric(subject.body, subject.points, target, asked, settings.symmetric)
+def fine_objective(rng: np.random.Generator, subject: Subject, view: PersonView, settings: PolishSettings) -> Objective:
+    """What a frame asks of a person's pose: the symmetric cost at as many points as a refinement takes, and the keypoints' where there are
+    any.
+
+    Raises
+    ------
+    ValueError
+        When the frame has no hulls of the person.
+    """
+    if view.target is None:
+        raise ValueError("the frame has no hulls of this person")
+    asked = points_to_cover(rng, view.target, settings.hull_points, settings.symmetric.ray_share)
+    by_hulls = Symmetric(subject.body, subject.points, view.target, asked, settings.symmetric)
+    if view.keypoints is None:
+        return by_hulls
+    return Sum([by_hulls, KeypointCost(subject.body, view.keypoints, subject.capture.beside, settings.keypoints)])
 
 
 #: What a refinement minimises: ``make(rng, subject, view)``.
@@ -103,8 +119,9 @@ def polished(propose: Propose, settings: PolishSettings, make_objective: MakeObj
             return unseen(tracked)
         found = propose(rng, tracked, view)
         starts = [found.best, tracked.state] if found.status == "fitted" else [tracked.state]
+        starts += keypoint_pose(tracked.subject.body, view.keypoints, tracked.state)
         if make_objective is None:
-            objective: Objective = fine_objective(rng, tracked.subject, view.target, settings)
+            objective: Objective = fine_objective(rng, tracked.subject, view, settings)
         else:
             objective = make_objective(rng, tracked.subject, view)
         estimate, cost, more = polish(rng, objective, starts, tracked.state, settings)

@@ -12,6 +12,7 @@ from hmc.body.joints import DOF_NAMES
 from hmc.body.scalable_models import MODEL_1, MODEL_2, PRINTED_1, PRINTED_2, UNITIVE_PIECES, Inclusive
 from hmc.errors import InputError
 from hmc.pose.method import Capture
+from hmc.pose.objectives.keypoints import KeypointSettings
 from hmc.pose.objectives.symmetric import SymmetricSettings
 from hmc.pose.steps.hidden.limbs import LimbSettings
 from hmc.pose.steps.limb_search import SearchSettings
@@ -87,6 +88,8 @@ class PosePreset:
         Local refinement of each frame's estimate.
     search : SearchSettings or None
         Search for a limb that got lost.
+    keypoints : KeypointSettings
+        What a detector's keypoints weigh, where there are any.
     fit_body : FitBodySettings or None
         Fit the person's dimensions over the first frames.
     start : {"hypotheses", "spectral", "neutral"}
@@ -121,6 +124,7 @@ class PosePreset:
     symmetric: SymmetricSettings = field(default_factory=SymmetricSettings)
     refine: RefineSettings | None = None
     search: SearchSettings | None = None
+    keypoints: KeypointSettings = field(default_factory=KeypointSettings)
     fit_body: FitBodySettings | None = None
     start: Literal["hypotheses", "spectral", "neutral"] = "neutral"
     models: tuple[Inclusive, ...] = ()
@@ -140,7 +144,7 @@ class PosePreset:
     @property
     def polish(self) -> PolishSettings:
         """How its estimates are refined."""
-        return PolishSettings(self.symmetric, self.fine_hull_points, self.refine or RefineSettings(), self.search)
+        return PolishSettings(self.symmetric, self.fine_hull_points, self.refine or RefineSettings(), self.search, self.keypoints)
 
 
 #: Strong annealing leaves particles close together whatever the data: the spread says nothing of a tracked limb.

@@ -12,6 +12,7 @@ from typing import Literal
 import numpy as np
 
 from hmc.body.flesh import SurfaceSamples
+from hmc.body.keypoint_places import KEYPOINT_PART
 from hmc.body.limbs import CHAIN_OF_PART
 from hmc.body.model import PART_OF_SEGMENT, PARTS, BodyModel, Cones
 from hmc.body.nearest_cone import part_distances
@@ -26,8 +27,11 @@ from hmc.pose.objectives.four_scores import (
     observe,
     scores,
 )
+from hmc.pose.objectives.keypoints import KeypointCost, KeypointSettings
+from hmc.pose.objectives.objective import Objective, Sum
 from hmc.pose.objectives.symmetric import BodyPoints, Symmetric, SymmetricSettings, thinned
 from hmc.pose.views.hull_target import HullTarget
+from hmc.pose.views.keypoints import SeenKeypoints
 from hmc.search.filters import LogLikelihood
 from hmc.voxels.grid import VoxelGrid
 
@@ -170,26 +174,39 @@ class SymmetricData:
     settings : SymmetricSettings
     part : ndarray of int, shape (k,), optional
         Which part is expected to cover each: the nearest one in the pose that is expected. Needed for some parts only.
+    keypoints : SeenKeypoints, optional
+        What a detector saw besides, and what it weighs.
     """
 
     target: HullTarget
     points: np.ndarray
     settings: SymmetricSettings
     part: np.ndarray | None = None
+    keypoints: tuple[SeenKeypoints, KeypointSettings] | None = None
 
     def likelihood(self, subject: Subject, keep: np.ndarray, every: int = 1, by_limb: bool = False) -> LogLikelihood:
         """The log-likelihood of the kept parts, at every so many-th point of the body's surface; whole, or a column a limb."""
         one, target = restricted(subject, keep), restrict_target(self.target, keep)
         samples = one.points if every == 1 else thinned(one.points, max(1, len(one.points.surface.points) // every))
         if self.part is None:
-            objective = Symmetric(one.body, samples, target, self.points, self.settings)
+            objective = self._with_keypoints(Symmetric(one.body, samples, target, self.points, self.settings), subject)
             return lambda states: -objective.cost(states)
         rows = np.flatnonzero(keep[self.part])
         rows = rows if len(rows) else np.arange(1)
-        objective = Symmetric(one.body, samples, target, self.points[rows], self.settings, self.part[rows])
+        objective = self._with_keypoints(
+            Symmetric(one.body, samples, target, self.points[rows], self.settings, self.part[rows]), subject, keep
+        )
         if by_limb:
             return lambda states: -objective.by_part(states) @ _LIMBS  # type: ignore[operator]
         return lambda states: -objective.cost(states)
+
+    def _with_keypoints(self, objective: Symmetric, subject: Subject, keep: np.ndarray | None = None) -> Objective:
+        """The hulls' objective, and the keypoints of the kept parts."""
+        if self.keypoints is None:
+            return objective
+        seen, settings = self.keypoints
+        kept = seen if keep is None else seen.of(keep[KEYPOINT_PART[seen.keypoint]])
+        return Sum([objective, KeypointCost(objective.body, kept, subject.capture.beside, settings)]) if len(kept.keypoint) else objective
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from hmc.io.recording import Recording
 from hmc.io.results import TrackTable
 from hmc.pose.spectral.graph import color_votes, face_neighbours
 from hmc.pose.views.hull_target import HullTarget, make_target, sound_hull
+from hmc.pose.views.keypoints import SeenKeypoints
 from hmc.pose.views.markers import SeenMarkers
 from hmc.pose.views.rays import with_rays
 from hmc.pose.views.skin import Skin, observe_voxels
@@ -73,6 +74,7 @@ class PersonView:
     voxels : VoxelView or None
         Of the strict hull, or of the tolerant one where a camera lost the person.
     markers : SeenMarkers or None
+    keypoints : SeenKeypoints or None
     velocity : ndarray, shape (3,)
         Of the person's track, metres a second.
     """
@@ -82,6 +84,7 @@ class PersonView:
     skin: Skin | None = None
     voxels: VoxelView | None = None
     markers: SeenMarkers | None = None
+    keypoints: SeenKeypoints | None = None
     velocity: np.ndarray = field(default_factory=lambda: np.zeros(3))
 
 

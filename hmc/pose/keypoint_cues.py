@@ -1,0 +1,153 @@
+"""A detector's keypoints beside the hulls: read frame by frame, given to the people who are tracked, and what the recording tells of them.
+
+Two things of a detector are learnt, not assumed. How far it scatters: by how far cameras agree, before anything is followed
+(`learn_scatter`). And what it takes for a hip, say, against what the body's hip is: in the second pass, from the first one's poses
+(`learn_beside`). A detector's landmark is not a joint's centre, but it is so in the same way all through a recording.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hmc.body.keypoint_places import BODY_KEYPOINTS, KEYPOINT_SEGMENTS, keypoint_places
+from hmc.body.kinematics import segment_transforms
+from hmc.body.model import BodyModel
+from hmc.camera.model import Rig
+from hmc.io.keypoints.layouts import KEYPOINTS
+from hmc.io.keypoints.source import KeypointSource
+from hmc.io.results import TrackTable
+from hmc.pose.objectives.keypoints import BESIDE_M, Beside
+from hmc.pose.views.keypoints import SCATTER_M, SeenKeypoints, see_keypoints
+from hmc.pose.views.person_view import PersonView
+
+__all__ = ["KeypointCues", "beside_body", "learn_beside", "learn_scatter", "spread_frames", "with_keypoints"]
+
+#: Frames from which scatter is learnt, at most, well spread.
+LEARNING_FRAMES = 120
+#: Of a normal distribution, the median of squared distances in a plane over the variance along one axis.
+MEDIAN_IN_PLANE = 2 * np.log(2)
+#: Scatter that was learnt is within these, metres; fewer detections of a keypoint in a camera teach nothing.
+SCATTER_RANGE_M, LEAST_DETECTIONS = (0.008, 0.08), 10
+#: An offset that was learnt is no better known than this, metres: what of it turns and bends with the body is not constant.
+LEARNT_M = 0.008
+#: Frames one after the other that tell as much as one.
+ALIKE = 3
+_OF_BODY = [KEYPOINTS.index(name) for name in BODY_KEYPOINTS]
+
+
+@dataclass(frozen=True)
+class KeypointCues:
+    """Keypoints of a recording as a likelihood reads them.
+
+    Parameters
+    ----------
+    source : KeypointSource
+    scatter_m : ndarray, shape (n_cameras, 15)
+        Standard deviation of a sure detection across its line of sight, metres.
+    """
+
+    source: KeypointSource
+    scatter_m: np.ndarray
+
+
+def with_keypoints(views: Mapping[int, PersonView], rig: Rig, tracks: TrackTable, cues: KeypointCues | None) -> dict[int, PersonView]:
+    """The views of one frame, with the keypoints of each person.
+
+    Parameters
+    ----------
+    views : mapping of int to PersonView
+    rig : Rig
+    tracks : TrackTable
+    cues : KeypointCues or None
+        The views as they are where there are none.
+    """
+    if cues is None or not views:
+        return dict(views)
+    frame = next(iter(views.values())).frame
+    seen = _seen(rig, tracks, cues, frame)
+    return {person: replace(view, keypoints=seen.get(person)) for person, view in views.items()}
+
+
+def _seen(rig: Rig, tracks: TrackTable, cues: KeypointCues, frame: int) -> dict[int, SeenKeypoints]:
+    rows = np.flatnonzero(tracks.frames == frame)
+    people = dict(zip(tracks.persons[rows].tolist(), tracks.positions[rows], strict=True))
+    return see_keypoints(rig, [given[:, _OF_BODY] for given in cues.source.frame(frame)], people, cues.scatter_m)
+
+
+def learn_scatter(rig: Rig, tracks: TrackTable, source: KeypointSource) -> KeypointCues:
+    """How far each camera's detections of each keypoint are from where the other cameras' lines meet.
+
+    Parameters
+    ----------
+    rig : Rig
+    tracks : TrackTable
+    source : KeypointSource
+
+    Returns
+    -------
+    KeypointCues
+    """
+    cues = KeypointCues(source, np.full((len(rig), len(BODY_KEYPOINTS)), SCATTER_M))
+    missed: list[list[list[float]]] = [[[] for _ in BODY_KEYPOINTS] for _ in rig]
+    for frame in spread_frames(np.unique(tracks.frames), LEARNING_FRAMES):
+        for seen in _seen(rig, tracks, cues, frame).values():
+            off = np.einsum("kij,kj->ki", seen.across, seen.points[seen.keypoint] - seen.centre)
+            cameras = np.bincount(seen.keypoint, minlength=len(BODY_KEYPOINTS))[seen.keypoint]
+            # The point was fitted to the line too: it is as much nearer as one of so many lines pulls it.
+            squared = (off**2).sum(axis=1) / np.maximum(1 - 1.5 / np.maximum(cameras, 2), 0.25)
+            for c, k, value in zip(seen.camera.tolist(), seen.keypoint.tolist(), squared.tolist(), strict=True):
+                if np.isfinite(value):
+                    missed[c][k].append(value)
+    scatter = cues.scatter_m.copy()
+    for c, of_camera in enumerate(missed):
+        for k, values in enumerate(of_camera):
+            if len(values) >= LEAST_DETECTIONS:
+                scatter[c, k] = np.clip(np.sqrt(np.median(values) / MEDIAN_IN_PLANE), *SCATTER_RANGE_M)
+    return replace(cues, scatter_m=scatter)
+
+
+def beside_body(body: BodyModel, state: np.ndarray, seen: SeenKeypoints) -> np.ndarray:
+    """Where lines of sight meet beside the body's places of the keypoints, on their segments, shape (15, 3), metres; NaN where none do.
+
+    Parameters
+    ----------
+    body : BodyModel
+    state : ndarray, shape (33,)
+    seen : SeenKeypoints
+    """
+    rotations, positions = segment_transforms(body, state)
+    way = seen.points - positions[KEYPOINT_SEGMENTS]
+    return np.einsum("kji,kj->ki", rotations[KEYPOINT_SEGMENTS], way) - keypoint_places(body)
+
+
+def learn_beside(found: Sequence[np.ndarray]) -> Beside:
+    """Where a detector's keypoints lie beside the body's, by poses that they had no part in.
+
+    The median over frames and people; little is believed of what was seldom seen.
+
+    Parameters
+    ----------
+    found : sequence of ndarray, shape (15, 3)
+        As from `beside_body`.
+    """
+    if not len(found):
+        return Beside()
+    off = np.array(found)
+    told = np.isfinite(off).all(axis=-1).sum(axis=0)
+    off = np.where(told[:, None] > 0, off, 0.0)
+    middle = np.nanmedian(off, axis=0)
+    scatter = 1.5 * np.nanmedian(np.abs(off - middle), axis=0).mean(axis=-1)
+    # The error of a median of frames that are alike for a while, against what such offsets commonly are.
+    error = np.maximum(scatter, 0.01) / np.sqrt(np.maximum(told / ALIKE, 1))
+    believed = np.where(told > 0, BESIDE_M**2 / (BESIDE_M**2 + error**2), 0.0)
+    deviation = np.sqrt(believed * error**2 + (1 - believed) * BESIDE_M**2)
+    deviation = np.minimum(np.hypot(deviation, np.maximum(scatter, LEARNT_M)), 2 * BESIDE_M)
+    return Beside(believed[:, None] * middle, np.where(told > 0, deviation, BESIDE_M))
+
+
+def spread_frames(frames: np.ndarray, most: int) -> list[int]:
+    """So many frames at most, well spread."""
+    return frames[np.unique(np.linspace(0, len(frames) - 1, min(most, len(frames))).round().astype(int))].tolist()
