@@ -93,6 +93,8 @@ def _load(path: Path, limit: int) -> Any:
         if size > limit:
             raise InputError(f"{path}: {size / 2**20:.0f} MB, more than the {limit // 2**20} MB that are read; write one file a frame")
         return json.loads(path.read_text(encoding="utf-8-sig"))
+    except InputError:
+        raise
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror})") from None
     except (ValueError, RecursionError) as error:  # not UTF-8, no JSON, a number of thousands of digits, brackets without end
