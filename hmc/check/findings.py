@@ -15,10 +15,12 @@ import numpy as np
 
 from hmc.camera.coverage import estimate_room, in_view
 from hmc.camera.model import Camera, Rig, undistort
+from hmc.check.keypoints import KeypointAgreement, keypoint_agreement, keypoint_findings
 from hmc.check.silhouettes import hull_findings, probe_masks
 from hmc.errors import InputError
 from hmc.io.calibration import CalibrationEntry, build_camera, read_entries
 from hmc.io.footage import IMAGE_SUFFIXES, VIDEO_SUFFIXES, Footage, read_footage
+from hmc.io.keypoints import open_keypoints
 from hmc.io.recording import Frame, Recording, find_views, gaps, iterate_frames, open_recording, wrong_sizes, wrong_units
 from hmc.io.settings import read_settings
 
@@ -47,13 +49,17 @@ class Finding:
 
 @dataclass(frozen=True, eq=False)
 class Inspection:
-    """All findings, and as much of the recording as could be had for a picture: rig, room and one image a camera (or None)."""
+    """All findings, and as much of the recording as could be had for a picture: rig, room and one image a camera (or None).
+
+    ``keypoints`` says how far the cameras' keypoints agree, where a 2-D detector left some.
+    """
 
     findings: tuple[Finding, ...]
     rig: Rig | None = None
     room: np.ndarray | None = None
     images: tuple[np.ndarray | None, ...] = ()
     recording: Recording | None = None
+    keypoints: KeypointAgreement | None = None
 
     @property
     def usable(self) -> bool:
@@ -125,7 +131,7 @@ def inspect_recording(path: str | Path, cameras: Sequence[str] | None = None, re
         room = estimate_room(rig) if room is None else room
         say(*coverage(rig, room))
 
-    recording = None
+    recording = keypoints = None
     images = tuple(None if view is None else next(read_footage(view, 0, 1, lambda line: None, ""), None) for view in own)
     if not any(finding.severity == "error" for finding in found):
         try:
@@ -139,7 +145,17 @@ def inspect_recording(path: str | Path, cameras: Sequence[str] | None = None, re
             say("note", [f"recording.toml gives no `room`; estimated from the rig: {low} to {high} m"])
         say("note", background(recording))
         say("warning", _read(recording, read_all))
-    return Inspection(_sorted(found), rig, room, images, recording)
+        try:
+            keypoints = _compare_keypoints(recording)
+            say("warning", [] if keypoints is None else keypoint_findings(keypoints))
+        except InputError as error:
+            say("warning", [str(error)])
+    return Inspection(_sorted(found), rig, room, images, recording, keypoints)
+
+
+def _compare_keypoints(recording: Recording) -> KeypointAgreement | None:
+    source = open_keypoints(recording)
+    return None if source is None else keypoint_agreement(recording, source)
 
 
 def _sorted(found: Sequence[Finding]) -> tuple[Finding, ...]:

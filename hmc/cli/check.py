@@ -16,6 +16,7 @@ def add_parser(subparsers) -> None:
         "check",
         help="tell what is wrong with a recording, and draw its rig",
         description="Look a recording over, tell everything that is wrong with it, and draw its rig from above with a frame of every view. "
+        "Where a 2-D keypoint detector left its results, tell how far the cameras agree. "
         "The exit code is 2 if the recording cannot be used.",
     )
     parser.add_argument("recording", type=Path, help="folder of the recording")
@@ -25,12 +26,16 @@ def add_parser(subparsers) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print one line a finding and a last one that sums up; write the picture."""
+    """Print one line a finding, a table of keypoints where there are some, and a last line that sums up; write the picture."""
     from hmc.check import inspect_recording
 
     inspection = inspect_recording(args.recording, args.cameras, args.all)
     for finding in inspection.findings:
         print(finding)
+    if inspection.keypoints is not None:
+        from hmc.check.keypoints import agreement_lines
+
+        print(*agreement_lines(inspection.keypoints), sep="\n")
     name = args.recording.resolve().name
     if inspection.rig is not None and inspection.room is not None:
         from hmc.camera.rig_picture import save_rig_picture
