@@ -21,6 +21,7 @@ from hmc.voxels.hulls import HullStep, stream_hulls, stream_masks
 if TYPE_CHECKING:
     from hmc.check import Finding
     from hmc.io.detections import DetectionTable
+    from hmc.io.keypoints import KeypointSource
     from hmc.metrics.mot import MotScores
     from hmc.metrics.scores.poses import PoseEvaluation
     from hmc.pose.follow import PosedPeople
@@ -178,6 +179,7 @@ def pose(
     smooth_s: float = 0.0,
     detections: DetectionTable | None = None,
     on_frame: Callable[[int, int], None] | None = None,
+    keypoints: KeypointSource | None = None,
 ) -> PosedPeople:
     """The pose of every person in every frame.
 
@@ -199,6 +201,8 @@ def pose(
         Of markers (`hmc.io.detections.read_detections`), for the methods that need them; without hulls they need no tracks.
     on_frame : callable, optional
         Called with the number of frames that are done and that of all.
+    keypoints : KeypointSource, optional
+        What a detector of 2-D keypoints saw (`hmc.io.keypoints.open_keypoints`), to be used beside the silhouettes.
 
     Returns
     -------
@@ -221,6 +225,7 @@ def pose(
     from hmc.pose.backward import backward
     from hmc.pose.clear_views import with_clear_views
     from hmc.pose.follow import FollowOptions, follow
+    from hmc.pose.keypoint_cues import learn_scatter
     from hmc.pose.registry import pose_method
     from hmc.pose.smoothing import smooth_people
     from hmc.voxels.run_options import RunOptions
@@ -239,7 +244,8 @@ def pose(
         if tracks is None and method.needs_tracks:
             tracks = _tracked(recording, "sparse", seed, TRACK_VOXEL_M, masks)
         run = RunOptions(masks=masks, key=_KEY, progress=counted)
-        options = FollowOptions(POSE_VOXEL_M, seed, height, detections)
+        cues = None if keypoints is None or tracks is None or not method.keypoints else learn_scatter(recording.rig, tracks, keypoints)
+        options = FollowOptions(POSE_VOXEL_M, seed, height, detections, keypoints=cues)
         people = follow(recording, tracks, method, options, run)
         run = replace(run, progress=None)
         if tracks is not None:

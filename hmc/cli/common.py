@@ -25,7 +25,19 @@ __all__ = [
 
 T = TypeVar("T")
 #: Files of a recording on which its results depend.
-SOURCES = ("calibration*", "recording.toml", "videos/*", "images/*/*", "images/*", "silhouettes/*/*", "background/*", "background/*/*")
+SOURCES = (
+    "calibration*",
+    "recording.toml",
+    "videos/*",
+    "images/*/*",
+    "images/*",
+    "silhouettes/*/*",
+    "background/*",
+    "background/*/*",
+    "keypoints/*",
+    "keypoints/*/*",
+    "pose/*/*",
+)
 
 
 def add_selection_options(parser: argparse.ArgumentParser) -> None:

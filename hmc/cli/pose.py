@@ -30,6 +30,8 @@ POSE_JOURNAL = ".pose.journal"
 BACK_JOURNAL = ".back.journal"
 #: Time over which poses are smoothed where no other is said, seconds.
 SMOOTH_S = 0.3
+#: What `--cues` may say.
+CUES = ("silhouettes", "silhouettes,keypoints")
 #: Its silhouettes, which the tracker leaves for the poses.
 MASKS = ".masks"
 RESULTS = ("joints.csv", "tracks.csv", "pose.npz", "run.toml")
@@ -83,6 +85,12 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
         "single person, else auto",
     )
     parser.add_argument(
+        "--cues",
+        choices=CUES,
+        help="what poses are fitted to: silhouettes alone, or with the keypoints that a 2-D detector left in the recording, for "
+        "methods that refine (default: both where both are there)",
+    )
+    parser.add_argument(
         "--passes",
         type=int,
         choices=(1, 2),
@@ -110,6 +118,7 @@ def run(args: argparse.Namespace) -> int:
     from hmc.pose.backward import backward
     from hmc.pose.clear_views import with_clear_views
     from hmc.pose.follow import FollowOptions, follow
+    from hmc.pose.keypoint_cues import learn_scatter
     from hmc.pose.smoothing import smooth_people
     from hmc.tracking.resumable import person_grid, track_recording
     from hmc.voxels.run_options import RunOptions
@@ -120,6 +129,7 @@ def run(args: argparse.Namespace) -> int:
     if args.out.is_file():
         raise InputError(f"--out {args.out}: is a file; give a folder")
     height, tracked, frontend = _height(args.height, recording), method.needs_tracks, selected_frontend(args)
+    source_of_keypoints = _keypoints(args.cues, recording, method.keypoints)
     parameters: dict[str, Any] = {
         "start": recording.start,
         "frames": recording.n_frames,
@@ -135,6 +145,8 @@ def run(args: argparse.Namespace) -> int:
         "back": method.back,
         "smooth_s": args.smooth or 0.0,
     } | plugins
+    if source_of_keypoints is not None:
+        parameters["cues"] = CUES[1]
     if tracked:
         person_grid(recording, args.voxel)  # voxels that will not do are refused before any work is done
         tracker = selected_tracker(args)
@@ -161,7 +173,8 @@ def run(args: argparse.Namespace) -> int:
 
     tracks = track_recording(recording, args.track_voxel, tracker, args.seed, kept(JOURNAL, "track")) if tracked else None
     detections = None if markers is None else markers.table(args, key, problems)
-    options = FollowOptions(args.voxel, args.seed, height, detections)
+    cues = None if tracks is None or source_of_keypoints is None else learn_scatter(recording.rig, tracks, source_of_keypoints)
+    options = FollowOptions(args.voxel, args.seed, height, detections, keypoints=cues)
     people = follow(recording, tracks, method, options, kept(POSE_JOURNAL, "pose"))
     if markers is not None:
         markers.refuse_nothing(people)
@@ -184,6 +197,21 @@ def run(args: argparse.Namespace) -> int:
     _tell(people, recording, paths["joints.csv"])
     print_problems(problems)
     return 0
+
+
+def _keypoints(cues: str | None, recording, taken: bool):
+    """The keypoints that are to be used, or None: those that are there, unless silhouettes alone are asked for."""
+    from hmc.errors import InputError
+    from hmc.io.keypoints import open_keypoints
+
+    if cues == CUES[1] and not taken:
+        raise InputError(f"--cues {cues}: this method has no use for keypoints; use the preset `default` of apf, smd or pso, say")
+    if cues == CUES[0] or not taken:
+        return None
+    found = open_keypoints(recording)
+    if found is None and cues == CUES[1]:
+        raise InputError(f"--cues {cues}: {recording.path} has no keypoints; put a detector's into keypoints/CAMERA/ (docs/conventions.md)")
+    return found
 
 
 def _pelvis_tracks(people):

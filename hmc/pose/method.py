@@ -281,6 +281,8 @@ class PoseMethod:
         How the frames around decide between alternatives (`hmc.pose.legs`); None: the pose stays as the step has it.
     back : BackwardSettings or None
         How a second pass goes, backward in time (`hmc.pose.backward`); None: there is none.
+    keypoints : bool
+        Whether it takes the keypoints of a detector beside the hulls, where there are some.
     limits : JointLimits
         Of the bodies that the start makes.
     window_s : float
@@ -301,6 +303,7 @@ class PoseMethod:
     alternatives: FindAlternatives | None = None
     legs: Any = None
     back: Any = None
+    keypoints: bool = False
     limits: JointLimits = field(default_factory=default_limits)
     window_s: float = 1.5
     gate_px: float = 30.0

@@ -56,6 +56,7 @@ def annealed_method(preset: PosePreset, name: str = "apf") -> PoseMethod:
         alternatives=TellLegs(preset.polish) if refines else None,
         legs=LegSettings() if refines else None,
         back=BackwardSettings(preset.polish, preset.fit_body) if refines and preset.limbs is None else None,
+        keypoints=refines,
         limits={"default": default_limits, "stiff": stiff_limits, "canton": canton_limits}[preset.body](),
         settings=preset,
     )

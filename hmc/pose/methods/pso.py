@@ -122,6 +122,7 @@ def pso_method(preset: SwarmPreset, house: PosePreset | None = None, read: Read 
         equip=equip,
         recover=Recovery(house),
         alternatives=TellLegs(house.polish),
+        keypoints=True,
         legs=LegSettings(),
         back=BackwardSettings(house.polish),
         settings={"swarm": preset, "house": house},

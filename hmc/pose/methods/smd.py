@@ -107,5 +107,6 @@ def smd_method(preset: SmdPreset, house: PosePreset | None = None) -> PoseMethod
         alternatives=TellLegs(house.polish),
         legs=LegSettings(),
         back=BackwardSettings(house.polish),
+        keypoints=True,
         settings={"descent": preset, "house": house},
     )
