@@ -188,15 +188,16 @@ def _with_beside(pass_: _Pass, people: PosedPeople, fitted: np.ndarray, bodies: 
     if pass_.options.keypoints is None:
         return pass_
     persons = {number: _begun(people, fitted, number, make_subject(body, pass_.capture)) for number, body in bodies.items()}
-    found = []
+    found, costs = [], []
     for frame, views in pass_.views(spread_frames(np.unique(people.frames[fitted]), BESIDE_FRAMES)):
         for number, person in persons.items():
             view = views.get(number)
             if frame in person.row_of and view is not None and view.keypoints is not None and shows_enough(view.target):
                 hulls = fine_objective(pass_.rng(number, frame), person.subject, replace(view, keypoints=None), pass_.settings.polish)
-                state, _ = refine(hulls, person.own[person.row_of[frame]], pass_.settings.polish.refine)
+                state, info = refine(hulls, person.own[person.row_of[frame]], pass_.settings.polish.refine)
+                costs.append(info.cost)
                 found.append(beside_body(person.subject.body, state, view.keypoints))
-    return replace(pass_, capture=replace(pass_.capture, beside=learn_beside(found)))
+    return replace(pass_, capture=replace(pass_.capture, beside=learn_beside(found, costs)))
 
 
 def _bodies(pass_: _Pass, people: PosedPeople, fitted: np.ndarray) -> dict[int, BodyModel]:

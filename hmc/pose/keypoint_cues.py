@@ -33,6 +33,8 @@ MEDIAN_IN_PLANE = 2 * np.log(2)
 SCATTER_RANGE_M, LEAST_DETECTIONS = (0.008, 0.08), 10
 #: An offset that was learnt is no better known than this, metres: what of it turns and bends with the body is not constant.
 LEARNT_M = 0.008
+#: What hulls of good silhouettes cost (as on rendered people), by which the weight is told; and how far it may go with what they cost.
+HULL_COST_M2, WORTH_RANGE = 1e-4, (0.5, 4.0)
 #: Frames one after the other that tell as much as one.
 ALIKE = 3
 _OF_BODY = [KEYPOINTS.index(name) for name in BODY_KEYPOINTS]
@@ -123,7 +125,7 @@ def beside_body(body: BodyModel, state: np.ndarray, seen: SeenKeypoints) -> np.n
     return np.einsum("kji,kj->ki", rotations[KEYPOINT_SEGMENTS], way) - keypoint_places(body)
 
 
-def learn_beside(found: Sequence[np.ndarray]) -> Beside:
+def learn_beside(found: Sequence[np.ndarray], hull_costs: Sequence[float]) -> Beside:
     """Where a detector's keypoints lie beside the body's, by poses that they had no part in.
 
     The median over frames and people; little is believed of what was seldom seen.
@@ -132,9 +134,12 @@ def learn_beside(found: Sequence[np.ndarray]) -> Beside:
     ----------
     found : sequence of ndarray, shape (15, 3)
         As from `beside_body`.
+    hull_costs : sequence of float
+        Of the same poses, the hulls' part, square metres: two kinds of data weigh as their own errors say.
     """
     if not len(found):
         return Beside()
+    worth = float(np.clip(np.median(hull_costs) / HULL_COST_M2, *WORTH_RANGE))
     off = np.array(found)
     told = np.isfinite(off).all(axis=-1).sum(axis=0)
     off = np.where(told[:, None] > 0, off, 0.0)
@@ -145,7 +150,7 @@ def learn_beside(found: Sequence[np.ndarray]) -> Beside:
     believed = np.where(told > 0, BESIDE_M**2 / (BESIDE_M**2 + error**2), 0.0)
     deviation = np.sqrt(believed * error**2 + (1 - believed) * BESIDE_M**2)
     deviation = np.minimum(np.hypot(deviation, np.maximum(scatter, LEARNT_M)), 2 * BESIDE_M)
-    return Beside(believed[:, None] * middle, np.where(told > 0, deviation, BESIDE_M))
+    return Beside(believed[:, None] * middle, np.where(told > 0, deviation, BESIDE_M), worth)
 
 
 def spread_frames(frames: np.ndarray, most: int) -> list[int]:

@@ -62,10 +62,10 @@ class Stored:
 
     def frame(self, index):
         out = []
-        for given in self.frames[index]:
-            whole = np.full((len(given), len(KEYPOINTS), 3), np.nan)
+        for people in self.frames[index]:
+            whole = np.full((len(people), len(KEYPOINTS), 3), np.nan)
             whole[..., 2] = 0
-            whole[:, OF_BODY] = given
+            whole[:, OF_BODY] = people
             out.append(whole)
         return tuple(out)
 
@@ -226,12 +226,13 @@ def test_what_lies_beside_is_learnt_and_what_is_never_seen_is_not(ring):
         for one in given:
             one[:, 4] = np.nan
         found.append(beside_body(BODY, state, see_keypoints(ring, given, {0: state[:3]})[0]))
-    learnt = learn_beside(found)
+    learnt = learn_beside(found, [2e-4] * 40)
     told = np.arange(15) != 4
     assert np.abs(learnt.offset_m - beside)[told].max() < 0.006
     assert not learnt.offset_m[4].any() and learnt.deviation_m[4] == BESIDE_M[4]
     assert (learnt.deviation_m[told] < BESIDE_M[told]).all()
-    assert not learn_beside([]).offset_m.any()
+    assert learnt.worth == 2 and learn_beside(found, [1.0]).worth == 4
+    assert not learn_beside([], []).offset_m.any()
 
 
 def test_lines_that_are_hardly_apart_do_not_meet():

@@ -37,10 +37,13 @@ class Beside:
         On their segments, metres.
     deviation_m : ndarray, shape (15,)
         How far that is not known.
+    worth : float
+        Factor on what keypoints weigh: the worse hulls are commonly met, the more.
     """
 
     offset_m: np.ndarray = field(default_factory=lambda: np.zeros((len(BODY_KEYPOINTS), 3)))
     deviation_m: np.ndarray = field(default_factory=lambda: BESIDE_M)
+    worth: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -55,7 +58,7 @@ class KeypointSettings:
         Deviations from which on a miss counts ever less.
     """
 
-    weight: float = 0.15
+    weight: float = 0.12
     wide: float = 3.0
 
 
@@ -137,7 +140,7 @@ class KeypointCost:
         """Of each line, square metres: all keypoints alike, however many cameras see them, but for those that one alone sees."""
         cameras = np.bincount(self.seen.keypoint, minlength=len(BODY_KEYPOINTS))
         share = 1 / np.maximum(2, cameras)[self.seen.keypoint]
-        return self.settings.weight * SCATTER_M**2 / len(BODY_KEYPOINTS) * share
+        return self.settings.weight * self.beside.worth * SCATTER_M**2 / len(BODY_KEYPOINTS) * share
 
     def _by_line(self, states: np.ndarray) -> np.ndarray:
         rotations, positions = segment_transforms(self.body, states)
