@@ -1,8 +1,8 @@
 """The whole chain as `hmc pose` runs it, from videos to the poses of everybody, or without one of its parts: one cell, one recording.
 
-Nothing differs from ``hmc pose RECORDING --height auto --cues silhouettes --seed REPEAT --frames FRAMES``: the same seed gives the same joints.
-What cells share is made once and kept beside them: silhouettes of a recording, tracks of each seed, and the first pass of all that leave
-out something of the second one.
+Nothing differs from ``hmc pose RECORDING --height auto --cues silhouettes --seed REPEAT --frames FRAMES``: the same seed gives the same
+joints. What cells share is made once and kept beside them: silhouettes of a recording, tracks of each seed, and the first pass of all that
+leave out something of the second one.
 """
 
 from __future__ import annotations
