@@ -17,9 +17,9 @@ def add_parser(subparsers) -> None:
         "view",
         help="draw a result over its recording",
         description="Draw the fitted bodies into every camera's image, beside a 3-D panel with the voxels; left limbs orange, right "
-        "limbs blue. What a 2-D keypoint detector left in the recording is drawn as crosses. Of tracks alone, draw every person as an ellipsoid with a number, beside the room from above. "
-        "A video shows all selected frames (by default those of the run), a picture one of them (the middle one) or those of --frame, one "
-        "below the other.",
+        "limbs blue. What a 2-D keypoint detector left in the recording is drawn as crosses. Of tracks alone, draw every person as an "
+        "ellipsoid with a number, beside the room from above. A video shows all selected frames (by default those of the run), a picture "
+        "one of them (the middle one) or those of --frame, one below the other.",
     )
     parser.add_argument("directory", type=Path, metavar="DIR", help="folder of the result, with joints.csv or tracks.csv")
     add_selection_options(parser)

@@ -18,8 +18,8 @@ import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
 from hmc.errors import InputError
-from hmc.experiments.chain_runs import WHOLE, FollowedPeople, chain_options, followed, method_without, scored_poses, truth_in
 from hmc.experiments.chain_runs import PARTS as CHAIN_PARTS
+from hmc.experiments.chain_runs import WHOLE, FollowedPeople, chain_options, followed, method_without, scored_poses, truth_in
 from hmc.experiments.engine.experiment import Parameters, Results
 from hmc.experiments.engine.inputs import Inputs, once, recipe_of
 from hmc.experiments.engine.store import digest
@@ -27,7 +27,7 @@ from hmc.experiments.keypoint_faults import NO_FAULT, fault_frames, with_fault
 from hmc.experiments.markerless_runs import opened
 from hmc.io.keypoints import KeypointSource, open_keypoints
 from hmc.io.recording import Recording, open_recording
-from hmc.io.results import PoseTable
+from hmc.io.results import PoseTable, TrackTable
 from hmc.landmarks import LANDMARKS
 from hmc.pose.backward import backward
 from hmc.pose.follow import follow
@@ -38,7 +38,7 @@ from hmc.synthetic.keypoints import write_keypoints
 from hmc.synthetic.recipe import Recipe
 from hmc.synthetic.room import furnish
 
-__all__ = ["BOTH", "FAMILY", "KEYPOINTS", "SILHOUETTES", "VERSION", "WAYS", "Footage", "cell", "low_passed"]
+__all__ = ["BOTH", "FAMILY", "KEYPOINTS", "SILHOUETTES", "VERSION", "WAYS", "Footage", "cell", "low_passed", "triangulated"]
 
 FAMILY, VERSION = "cues", 1
 SILHOUETTES, KEYPOINTS, BOTH = "silhouettes", "keypoints", "both"
@@ -75,13 +75,30 @@ def _by_the_chain(parameters: Parameters, seen: Footage) -> PoseTable:
 
 
 def _by_triangulation(parameters: Parameters, seen: Footage) -> PoseTable:
-    """Where each person's lines of sight meet, low-passed; no body at all."""
-    recording, tracks = seen.recording, seen.people.tracks
+    return triangulated(seen.recording, seen.people.tracks, seen.cues)
+
+
+def triangulated(recording: Recording, tracks: TrackTable, cues: KeypointCues | None) -> PoseTable:
+    """Where each person's lines of sight meet, low-passed (`low_passed`): joints of the limbs alone, and no body at all.
+
+    Parameters
+    ----------
+    recording : Recording
+    tracks : TrackTable
+        Whose detections they are is told by where people are tracked.
+    cues : KeypointCues or None
+        As from `hmc.pose.keypoint_cues.learn_scatter`; without, nothing is found.
+
+    Returns
+    -------
+    PoseTable
+        The rows of `tracks`; NaN for what no two lines tell, and for pelvis, neck and head.
+    """
     points = np.full((len(tracks.frames), len(LANDMARKS), 3), np.nan)
     row_of = {pair: row for row, pair in enumerate(zip(tracks.frames.tolist(), tracks.persons.tolist(), strict=True))}
     for frame in np.unique(tracks.frames).tolist():
         views = {int(person): PersonView(frame) for person in tracks.persons[tracks.frames == frame]}
-        for person, view in with_keypoints(views, recording.rig, tracks, seen.cues).items():
+        for person, view in with_keypoints(views, recording.rig, tracks, cues).items():
             if view.keypoints is not None:
                 points[row_of[frame, person]] = landmarks_seen(view.keypoints)
     for person in np.unique(tracks.persons):
@@ -91,7 +108,7 @@ def _by_triangulation(parameters: Parameters, seen: Footage) -> PoseTable:
     return PoseTable(tracks.frames, tracks.persons, points)
 
 
-#: What poses are made of what; whether keypoints are read is told by the second.  A way without hulls that fits a body has its place here.
+#: How poses are made, and whether keypoints are read for it. Another way, as a body fitted to keypoints without hulls, has its place here.
 WAYS: dict[str, tuple[Callable[[Parameters, Footage], PoseTable], bool]] = {
     SILHOUETTES: (_by_the_chain, False),
     KEYPOINTS: (_by_triangulation, True),
@@ -102,7 +119,8 @@ WAYS: dict[str, tuple[Callable[[Parameters, Footage], PoseTable], bool]] = {
 def low_passed(points: np.ndarray, frames: np.ndarray, fps: float) -> np.ndarray:
     """Points over time without what is faster than `CUTOFF_HZ`, by a Butterworth filter that is run forward and back (no phase).
 
-    Gaps of up to `GAP_S` are bridged by straight lines first; longer ones, and what is before the first point and after the last, stay open.
+    Gaps of up to `GAP_S` are bridged by straight lines first; longer ones, and what is before the first point and after the last, stay
+    open.
 
     Parameters
     ----------

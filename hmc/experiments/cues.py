@@ -211,13 +211,17 @@ def _claims(cells: Sequence[Cell]) -> Iterator[Claim]:
     wrists = _by_cameras(plain, BOTH, partial(_mean_mm, joints=WRISTS)).get(MANY, {})
     if wrists:
         found = mean_interval(wrists)
-        yield Claim(f"{MANY} cameras, both: wrists {WRIST_MM:g} mm at most", bool(found.value <= WRIST_MM), f"{found} mm, {_of_runs(wrists)}")
+        yield Claim(
+            f"{MANY} cameras, both: wrists {WRIST_MM:g} mm at most", bool(found.value <= WRIST_MM), f"{found} mm, {_of_runs(wrists)}"
+        )
     for fault in FAULTS:
         whole, there, _ = _costs(cells, fault, BOTH)
         for when, cost in (("", whole), (" while it lasts", there)):
             if cost:
                 found = mean_interval(cost)
-                yield Claim(f"{fault}: costs both less than {COST_MM:g} mm{when}", bool(found.high < COST_MM), f"{found} mm, {_of_runs(cost)}")
+                yield Claim(
+                    f"{fault}: costs both less than {COST_MM:g} mm{when}", bool(found.high < COST_MM), f"{found} mm, {_of_runs(cost)}"
+                )
 
 
 def _by_cameras(cells: Sequence[Cell], cues: str, value: Callable[[Cell], float]) -> ByCameras:
