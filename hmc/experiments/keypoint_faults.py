@@ -147,8 +147,7 @@ def _spoilt(spoil: Spoil, camera: Camera, people: np.ndarray, body: np.ndarray) 
     with np.errstate(invalid="ignore"):
         off = np.linalg.norm(people[:, _POINTS, :2] - uv, axis=-1) * depth / camera.matrix[0, 0]
     off = np.where(known & np.isfinite(off), off, np.nan)
-    told: np.ndarray = np.isfinite(off).any(axis=1)
-    apart = np.array([np.nanmedian(row) if sure else np.inf for row, sure in zip(off, told, strict=True)])
+    apart = np.array([np.nanmedian(row) if np.isfinite(row).any() else np.inf for row in off])
     if not (apart < GATE_M).any():
         return people
     k, spoilt = int(apart.argmin()), people.copy()
