@@ -17,9 +17,9 @@ def add_parser(subparsers) -> None:
         "view",
         help="draw a result over its recording",
         description="Draw the fitted bodies into every camera's image, beside a 3-D panel with the voxels; left limbs orange, right "
-        "limbs blue. Of tracks alone, draw every person as an ellipsoid with a number, beside the room from above. "
-        "A video shows all selected frames (by default those of the run), a picture one of them (the middle one) or those of --frame, one "
-        "below the other.",
+        "limbs blue. What a 2-D keypoint detector left in the recording is drawn as crosses. Of tracks alone, draw every person as an "
+        "ellipsoid with a number, beside the room from above. A video shows all selected frames (by default those of the run), a picture "
+        "one of them (the middle one) or those of --frame, one below the other.",
     )
     parser.add_argument("directory", type=Path, metavar="DIR", help="folder of the result, with joints.csv or tracks.csv")
     add_selection_options(parser)
@@ -28,6 +28,7 @@ def add_parser(subparsers) -> None:
     parser.add_argument("--voxel", type=positive_float, default=0.04, metavar="M", help="voxel size in the panel, metres (default: 0.04)")
     parser.add_argument("--no-voxels", action="store_true", help="no voxels in the panel: quicker, as nothing is segmented")
     parser.add_argument("--no-outlines", action="store_true", help="stick figures only, without the outline of the flesh")
+    parser.add_argument("--no-keypoints", action="store_true", help="without the keypoints that a 2-D detector left in the recording")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -53,6 +54,7 @@ def run(args: argparse.Namespace) -> int:
         None if args.no_voxels else args.voxel,
         not args.no_outlines,
         (problems.append, lambda pictures, total: progress(pictures, total, "view", args.quiet)),
+        not args.no_keypoints,
     )
     print_problems(problems)
     return 0

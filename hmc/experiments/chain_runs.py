@@ -22,7 +22,7 @@ from hmc.experiments.truth import all_truth, truth_path
 from hmc.io.masks import keep_masks
 from hmc.io.provenance import code_digest
 from hmc.io.recording import Recording, open_recording
-from hmc.io.results import TrackTable, read_centroids
+from hmc.io.results import PoseTable, TrackTable, read_centroids
 from hmc.metrics.scores import evaluate_pose, evaluate_tracks
 from hmc.pose.backward import backward
 from hmc.pose.follow import FollowOptions, PosedPeople, follow
@@ -34,7 +34,10 @@ from hmc.tracking.resumable import track_recording
 from hmc.voxels.hulls import FrontendSettings, stream_masks
 from hmc.voxels.run_options import RunOptions
 
-__all__ = ["FAMILY", "FEW", "MANY", "PARTS", "VERSION", "WHOLE", "Part", "cell", "method_without", "name_of", "one_before_many"]
+__all__ = [
+    "FAMILY", "FEW", "MANY", "PARTS", "VERSION", "WHOLE", "FollowedPeople", "Part", "cell", "chain_options", "followed", "method_without",
+    "name_of", "one_before_many", "scored_poses", "truth_in",
+]  # fmt: skip
 
 FAMILY, VERSION = "chain", 1
 WHOLE = ""
@@ -132,11 +135,26 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
     """
     some = opened(inputs, parameters["recording"], parameters["cameras"])
     recording = open_recording(some.path, some.rig.names, frames=parameters["frames"] or None)
-    first, last = recording.start, recording.start + recording.n_frames
-    truth = all_truth(recording)
-    truth = truth.where((truth.frames >= first) & (truth.frames < last))
+    truth = truth_in(recording)
     people, counts = _run(parameters, inputs, recording)
-    persons = evaluate_pose(people.poses, truth).persons
+    return scored_poses(recording, people.poses, truth) | {"tracks": counts}
+
+
+def truth_in(recording: Recording) -> PoseTable:
+    """True joints of everybody in the recording's selection; `hmc.experiments.truth.truth_path` says what is refused."""
+    truth = all_truth(recording)
+    return truth.where((truth.frames >= recording.start) & (truth.frames < recording.start + recording.n_frames))
+
+
+def scored_poses(recording: Recording, poses: PoseTable, truth: PoseTable) -> Results:
+    """The results of a cell, but for its tracks: what `cell` returns.
+
+    Raises
+    ------
+    InputError
+        When the truth is empty.
+    """
+    persons = evaluate_pose(poses, truth).persons
     return {
         "frames": np.concatenate([one.frames for one in persons]),
         "persons": np.concatenate([np.full(len(one.frames), one.person) for one in persons]),
@@ -145,15 +163,42 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
         "fps": recording.fps,
         "cameras": len(recording.rig),
         "reference": truth_path(recording).parent.name != "truth",
-        "tracks": counts,
     }
 
 
-def _run(parameters: Parameters, inputs: Inputs, recording: Recording) -> tuple[PosedPeople, dict[str, int]]:
-    """The poses of all people, and the errors of their tracks."""
-    part, seed = PARTS[parameters["without"]], parameters["repeat"]
+@dataclass(frozen=True)
+class FollowedPeople:
+    """The tracks of a recording's people, and what cells that pose them share.
+
+    Parameters
+    ----------
+    tracks : TrackTable
+    run : RunOptions
+        With the silhouettes.
+    folder : Path
+        For what else is made once.
+    """
+
+    tracks: TrackTable
+    run: RunOptions
+    folder: Path
+
+
+def followed(parameters: Parameters, inputs: Inputs, recording: Recording, without: str = WHOLE) -> FollowedPeople:
+    """Segment a recording and track its people, once for all cells of the same recording, cameras, frames and seed.
+
+    Parameters
+    ----------
+    parameters : mapping
+        ``recording``, ``cameras``, ``frames``, ``repeat``.
+    inputs : Inputs
+    recording : Recording
+        Opened with these cameras and frames.
+    without : str
+        A key of `PARTS`.
+    """
+    part, seed = PARTS[without], parameters["repeat"]
     frontend = FrontendSettings(threads=1, **part.frontend)
-    method, options = method_without(part), FollowOptions(VOXEL_M, seed)
     # Of other code nothing is taken over: what was kept and what is computed now belong together.
     chosen = f"{parameters['cameras']}-cameras-{parameters['frames']}-frames-{code_digest()[:8]}"
     folder = inputs.folder / parameters["recording"] / f"chain-{chosen}"
@@ -163,20 +208,33 @@ def _run(parameters: Parameters, inputs: Inputs, recording: Recording) -> tuple[
         for _ in keep_masks(file, _KEY, recording.start, steps, _ignore):
             pass
 
-    masks = once(folder / f"masks{_slug(parameters['without'] if part.frontend else WHOLE)}", segment)
+    masks = once(folder / f"masks{_slug(without if part.frontend else WHOLE)}", segment)
     run = RunOptions(frontend, masks=masks, key=_KEY, on_problem=_ignore)
 
     def track(file: Path) -> TrackTable:
         return track_recording(recording, TRACK_VOXEL_M, seed=seed, run=replace(run, journal=file))
 
-    tracks = track(once(masks.with_name(f"{masks.name}-tracks-{seed}"), track))
+    return FollowedPeople(track(once(masks.with_name(f"{masks.name}-tracks-{seed}"), track)), run, folder)
+
+
+def chain_options(parameters: Parameters) -> FollowOptions:
+    """What the poses of a cell are computed with."""
+    return FollowOptions(VOXEL_M, parameters["repeat"])
+
+
+def _run(parameters: Parameters, inputs: Inputs, recording: Recording) -> tuple[PosedPeople, dict[str, int]]:
+    """The poses of all people, and the errors of their tracks."""
+    without, seed = parameters["without"], parameters["repeat"]
+    method, options = method_without(PARTS[without]), chain_options(parameters)
+    seen = followed(parameters, inputs, recording, without)
+    tracks, run = seen.tracks, seen.run
 
     def pose(own: Path) -> PosedPeople:
         own.mkdir(exist_ok=True)
         return follow(recording, tracks, method, options, replace(run, journal=own / "journal"))
 
     # The journal of a finished run holds all of it, to the last digit.
-    people = pose(once(folder / f"first-pass{_slug(parameters['without'] if part.changes_first else WHOLE)}-{seed}", pose))
+    people = pose(once(seen.folder / f"first-pass{_slug(without if PARTS[without].changes_first else WHOLE)}-{seed}", pose))
     people = backward(recording, tracks, method, people, options, run)
     path = recording.path / "truth" / "centroids.csv"
     if not path.is_file():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -16,10 +16,11 @@ from hmc.body.model import BodyModel
 from hmc.body.proportions import make_bodies
 from hmc.camera.model import Camera
 from hmc.errors import InputError
+from hmc.io.keypoints import KeypointSource
 from hmc.io.recording import Frame, Recording, iterate_frames
 from hmc.io.results import PoseStates, PoseTable, TrackTable, read_joints, read_pose, read_tracks
 from hmc.landmarks import ENOUGH_VIEWS, landmark_index
-from hmc.view.overlay import LEFT, RIGHT, draw_label, draw_outline, draw_paths, draw_sticks, draw_track, person_color
+from hmc.view.overlay import LEFT, RIGHT, draw_keypoints, draw_label, draw_outline, draw_paths, draw_sticks, draw_track, person_color
 from hmc.view.scene import BACKGROUND, draw_floor, draw_rig, draw_voxels, from_above, viewpoint
 from hmc.voxels.grid import VoxelGrid
 from hmc.voxels.hulls import HullStep, stream_hulls
@@ -161,6 +162,7 @@ def render(
     panel: np.ndarray,
     panel_camera: Camera,
     outlines: bool = True,
+    keypoints: Sequence[np.ndarray] | None = None,
 ) -> np.ndarray:
     """Draw one mosaic.
 
@@ -177,6 +179,8 @@ def render(
         The panel's viewpoint.
     outlines : bool
         Draw the flesh too, where it is known.
+    keypoints : sequence of ndarray, shape (n_people, 26, 3), optional
+        What a 2-D detector found, an array a camera.
 
     Returns
     -------
@@ -199,6 +203,8 @@ def render(
             else np.full((*small.size[::-1], 3), 60, np.uint8)
         )
         draw_people(picture, small, people if known else [], outlines)
+        if keypoints is not None and known:
+            draw_keypoints(picture, _shrunk(keypoints[k], camera, small))
         draw_label(picture, camera.name if known else f"{camera.name}: no image", (8, 18))
         y, x = row * cell_height + (cell_height - small.size[1]) // 2, column * cell_width + (cell_width - small.size[0]) // 2
         out[y : y + small.size[1], x : x + small.size[0]] = picture[: height - y, : width - x]
@@ -211,6 +217,12 @@ def render(
     left, top = layout.panel[:2]
     out[top : top + panel.shape[0], left : left + panel.shape[1]] = panel
     return out
+
+
+def _shrunk(points: np.ndarray, camera: Camera, small: Camera) -> np.ndarray:
+    """Keypoints, (n, 26, 3), in pixels of the image as it is drawn; the first pixel's centre is half a pixel inside."""
+    uv = (points[..., :2] + 0.5) * (np.array(small.size) / camera.size) - 0.5
+    return np.concatenate([uv, points[..., 2:]], axis=-1)
 
 
 def draw_people(image: np.ndarray, camera: Camera, people: list[Person], outlines: bool) -> None:
@@ -236,6 +248,7 @@ def stream_mosaics(
     last: int | None = None,
     voxel_size_m: float | None = 0.04,
     outlines: bool = True,
+    keypoints: KeypointSource | None = None,
     on_problem: Callable[[str], None] | None = None,
 ) -> Iterator[tuple[int, np.ndarray]]:
     """A mosaic of every selected frame, in order; memory does not grow with their number.
@@ -250,6 +263,8 @@ def stream_mosaics(
         Of the voxels in the panel; None draws none, and then nothing is segmented.
     outlines : bool
         Draw the flesh too, where it is known.
+    keypoints : KeypointSource, optional
+        What a 2-D detector found, drawn over the people.
     on_problem : callable, optional
         Called with one line for everything that was survived.
 
@@ -275,7 +290,8 @@ def stream_mosaics(
         draw_trails(panel, camera, result, frame.index)
         if grid is not None and isinstance(frame, HullStep):
             draw_voxels(panel, camera, grid, frame.strict)
-        yield frame.index, render(layout, recording, frame, people_in(result, frame.index), panel, camera, outlines)
+        found = None if keypoints is None else keypoints.frame(frame.index)
+        yield frame.index, render(layout, recording, frame, people_in(result, frame.index), panel, camera, outlines, found)
 
 
 def panel_views(result: Result, room: np.ndarray, size: tuple[int, int]) -> Callable[[int], Camera]:

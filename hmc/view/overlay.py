@@ -14,9 +14,10 @@ from hmc.body.flesh import place_points, surface_samples
 from hmc.body.kinematics import segment_transforms
 from hmc.body.model import BodyModel
 from hmc.camera.model import Camera, project
+from hmc.io.keypoints import KEYPOINTS
 from hmc.landmarks import BONES, landmark_index
 
-__all__ = ["LEFT", "RIGHT", "draw_label", "draw_outline", "draw_paths", "draw_sticks", "draw_track", "person_color"]
+__all__ = ["LEFT", "RIGHT", "draw_keypoints", "draw_label", "draw_outline", "draw_paths", "draw_sticks", "draw_track", "person_color"]
 
 Color = tuple[int, int, int]
 
@@ -24,6 +25,7 @@ LEFT: Color = (40, 140, 255)
 RIGHT: Color = (255, 160, 60)
 PERSONS: tuple[Color, ...] = ((120, 230, 110), (220, 110, 235), (70, 225, 250), (225, 225, 90), (150, 150, 255), (200, 200, 200))
 DARK: Color = (25, 22, 20)
+WHITE: Color = (255, 255, 255)
 
 #: Sub-pixel bits of OpenCV's drawing functions.
 SHIFT = 4
@@ -138,6 +140,28 @@ def track_ellipsoid(position: np.ndarray) -> np.ndarray:
     along, around = np.meshgrid(np.linspace(0, np.pi, TRACK_POINTS), np.arange(TRACK_POINTS) * 2 * np.pi / TRACK_POINTS)
     sphere = np.stack([np.sin(along) * np.cos(around), np.sin(along) * np.sin(around), np.cos(along)], axis=-1).reshape(-1, 3)
     return position + sphere * np.array([TRACK_RADIUS_M, TRACK_RADIUS_M, position[2]])
+
+
+def draw_keypoints(image: np.ndarray, points: np.ndarray, reach: float = 3.0) -> None:
+    """Mark what a 2-D detector found with crosses: left ones orange, right ones blue, those of neither side white.
+
+    Parameters
+    ----------
+    image : ndarray, shape (h, w, 3), uint8
+        Drawn into.
+    points : ndarray, shape (n_people, 26, 3)
+        x, y (pixels of this image) and confidence, as of `hmc.io.keypoints.KeypointSource.frame`; what is not given is left out.
+    reach : float
+        Of an arm of a cross, pixels.
+    """
+    sides = [{"l_": LEFT, "r_": RIGHT}.get(name[:2], WHITE) for name in KEYPOINTS]
+    far = 3 * max(image.shape[:2])
+    given = (points[..., 2] > 0) & (np.abs(np.nan_to_num(points[..., :2], nan=np.inf)) < far).all(axis=-1)
+    arms = reach * np.array([[[-1, -1], [1, 1]], [[-1, 1], [1, -1]]])
+    for person, k in np.argwhere(given):
+        ends = np.round((points[person, k, :2] + arms) * 2**SHIFT).astype(np.int32)
+        for color, width in ((DARK, 3), (sides[k], 1)):
+            cv2.polylines(image, list(ends), False, color, width, cv2.LINE_AA, SHIFT)
 
 
 def draw_paths(image: np.ndarray, camera: Camera, paths: np.ndarray, colors: Color | list[Color], width: float) -> None:

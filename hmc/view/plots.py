@@ -23,7 +23,7 @@ from hmc.io.results import TrackTable
 from hmc.landmarks import BONES, LANDMARKS, landmark_index
 from hmc.view.mosaic import Person
 from hmc.view.mosaic import draw_people as _draw_people_into
-from hmc.view.overlay import LEFT, RIGHT, cone_rings, person_color
+from hmc.view.overlay import LEFT, RIGHT, cone_rings, draw_keypoints, person_color
 from hmc.voxels.grid import VoxelGrid
 from hmc.voxels.surface import surface
 
@@ -72,7 +72,14 @@ def draw_mask(image: np.ndarray | None, mask: np.ndarray, ax: Axes | None = None
     return _as_picture(ax, title)
 
 
-def draw_overlay(camera: Camera, image: np.ndarray, people: Sequence[Person], ax: Axes | None = None, outlines: bool = True) -> Axes:
+def draw_overlay(
+    camera: Camera,
+    image: np.ndarray,
+    people: Sequence[Person],
+    ax: Axes | None = None,
+    outlines: bool = True,
+    keypoints: np.ndarray | None = None,
+) -> Axes:
     """Draw people over a camera's image, as `hmc view` does.
 
     Parameters
@@ -85,9 +92,13 @@ def draw_overlay(camera: Camera, image: np.ndarray, people: Sequence[Person], ax
     ax : Axes, optional
     outlines : bool
         Draw the flesh too, where it is known.
+    keypoints : ndarray, shape (n_people, 26, 3), optional
+        What a 2-D detector found in this image (`hmc.io.keypoints.KeypointSource.frame`).
     """
     picture = image.copy()
     _draw_people_into(picture, camera, list(people), outlines)
+    if keypoints is not None:
+        draw_keypoints(picture, keypoints)
     ax = _flat_axes(ax)
     ax.imshow(picture[..., ::-1])
     return _as_picture(ax, camera.name)

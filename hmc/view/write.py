@@ -10,6 +10,7 @@ import numpy as np
 
 from hmc.errors import InputError
 from hmc.io.files import atomic_write, sibling
+from hmc.io.keypoints import open_keypoints
 from hmc.io.recording import Recording
 from hmc.view.mosaic import Result, stream_mosaics
 
@@ -27,6 +28,7 @@ def write_view(
     voxel_size_m: float | None = 0.04,
     outlines: bool = True,
     how: tuple[Callable[[str], None] | None, Callable[[Iterable, int], Iterable] | None] = (None, None),
+    keypoints: bool = True,
 ) -> None:
     """Draw a result over the images of a recording.
 
@@ -44,19 +46,25 @@ def write_view(
         Draw the outline of the flesh.
     how : tuple
         Called with every problem; and what shows progress, ``progress(pictures, total)``. Each None: nothing.
+    keypoints : bool
+        Draw what a 2-D detector left in the recording, where it did.
 
     Raises
     ------
     InputError
-        When the ending is of neither, a frame is not in the selection, or the file cannot be written.
+        When the ending is of neither, a frame is not in the selection, keypoints cannot be read, or the file cannot be written.
     """
     path, (report, progress) = Path(path), how
     suffix = path.suffix.lower()
     if suffix not in PICTURES + VIDEOS:
         raise InputError(f"{path}: must end in .png (a picture) or .mp4 (a video)")
 
+    found = open_keypoints(recording) if keypoints else None
+
     def draw(**selection):
-        return stream_mosaics(recording, result, voxel_size_m=voxel_size_m, outlines=outlines, on_problem=report, **selection)
+        return stream_mosaics(
+            recording, result, voxel_size_m=voxel_size_m, outlines=outlines, keypoints=found, on_problem=report, **selection
+        )
 
     if suffix in PICTURES:
         wanted = choose_frames(list(frames), recording.start, recording.n_frames, result.frames)

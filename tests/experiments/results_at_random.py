@@ -284,6 +284,13 @@ def chained(rng, parameters, noise):
     return pose(rng, parameters, noise) | {"persons": np.repeat(np.arange(4 if several else 1), FRAMES // 4 if several else FRAMES)} | more
 
 
+def cued(rng, parameters, noise):
+    """The chain's without tracks; a fault lasts a third of it."""
+    several = parameters["recording"].startswith(("crossing", "sit"))
+    more = {"cameras": parameters["cameras"] or (5 if several else 7), "faulty": [20, 40] if parameters["fault"] else []}
+    return chained(rng, parameters, noise) | more
+
+
 def overlaps(rng, parameters, noise):
     usual = rng.uniform(0.1, 0.9) if noise else rng.uniform(0.78, 0.82)
     return {"silhouettes": np.clip(usual + 0.01 * rng.normal(size=(4, 5)), 0, 1), "hulls": np.clip(usual + 0.01 * rng.normal(size=4), 0, 1)}
@@ -303,7 +310,7 @@ RESULTS = {
     "fig-6.11": maps, "markers": marked, "filters": filtered, "markerless": pose, "fig-7.8": schedule, "fig-7.15": behind_furniture,
     "lost-arm": lost_arm, "over-time": unseen, "all-methods": timed, "fig-B.1": square, "hsiao-3.8": ghosts, "hsiao-parts": parts,
     "hsiao-4": swarmed, "why-hsiao": swarmed, "hsiao-pso": optimised, "repairs": overlaps, "body-bias": pulled_off,
-    "chain": chained,
+    "chain": chained, "cues": cued,
     "kehl-1": carved, "kehl-4": edges, "kehl-9": displaced, "kehl": descended,
 }  # fmt: skip
 

@@ -130,6 +130,18 @@ def test_people_get_their_own_detections_and_nobody_what_is_nobodys(ring):
         assert_allclose(seen[person].points, places(state), atol=2e-3)
 
 
+def test_somebody_a_metre_beside_is_somebody_else(ring):
+    state = pose(np.random.default_rng(11))
+    given = detected(ring, places(state))
+    camera = ring.cameras[1]
+    across = camera.rotation[0]  # a metre to the right in this camera's image
+    given[1] = detected(ring, places(state) + across)[1]
+    seen = see_keypoints(ring, given, {0: state[:3]})[0]
+    assert 1 not in seen.camera
+    given[1] = detected(ring, places(state) + 0.4 * across)[1]
+    assert 1 in see_keypoints(ring, given, {0: state[:3]})[0].camera
+
+
 def test_a_camera_that_exchanges_left_and_right_is_turned(ring):
     state = pose(np.random.default_rng(7))
     given = detected(ring, places(state))

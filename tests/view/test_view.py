@@ -18,11 +18,12 @@ from hmc.body.proportions import default_body
 from hmc.camera.model import look_at
 from hmc.cli import main
 from hmc.io.calibration import write_calibration
+from hmc.io.keypoints import KEYPOINTS, write_openpose
 from hmc.io.recording import open_recording
 from hmc.io.results import PoseStates, PoseTable, TrackTable, read_pose, write_joints, write_pose, write_run, write_tracks
 from hmc.landmarks import landmark_index
 from hmc.view.mosaic import make_layout, people_in, read_result, stream_mosaics
-from hmc.view.overlay import LEFT, RIGHT, draw_outline, draw_paths, draw_sticks, draw_track, person_color
+from hmc.view.overlay import LEFT, RIGHT, draw_keypoints, draw_outline, draw_paths, draw_sticks, draw_track, person_color
 from hmc.view.scene import BACKGROUND, draw_floor, draw_rig, draw_voxels, from_above, viewpoint
 from hmc.voxels.grid import VoxelGrid
 
@@ -329,3 +330,41 @@ def test_wrong_input_is_one_line_and_exit_code_2(recording, result, tmp_path, ca
         assert main(["view", "--quiet", *arguments]) == 2
         captured = capsys.readouterr()
         assert says in captured.err and captured.err.count("\n") == 1
+
+
+def test_keypoints_are_crosses_of_their_side():
+    image = np.zeros((60, 80, 3), np.uint8)
+    points = np.full((1, len(KEYPOINTS), 3), (np.nan, np.nan, 0.0))
+    at = {"l_wrist": (20, 30), "r_wrist": (60, 30), "nose": (40, 10)}
+    for name, place in at.items():
+        points[0, KEYPOINTS.index(name)] = *place, 0.8
+    points[0, KEYPOINTS.index("l_hip")] = 1e12, 3, 0.9  # as far off as no picture is
+    draw_keypoints(image, points)
+    for name, color in (("l_wrist", LEFT), ("r_wrist", RIGHT), ("nose", (255, 255, 255))):
+        x, y = at[name]
+        assert np.abs(image[y, x].astype(int) - color).max() < 30
+        assert image[y + 2, x + 2].any() and not image[y, x + 6].any()
+    before = image.copy()
+    draw_keypoints(image, np.zeros((0, len(KEYPOINTS), 3)))
+    assert (image == before).all()
+
+
+def test_keypoints_of_a_recording_are_drawn_unless_they_are_left_out(recording, result, tmp_path):
+    folder = tmp_path / "recording"
+    shutil.copytree(recording, folder)
+    camera = open_recording(folder).rig[0]
+    people = np.full((1, len(KEYPOINTS), 3), (np.nan, np.nan, 0.0))
+    people[0, KEYPOINTS.index("l_wrist")] = 30, 20, 0.9
+    for frame in range(FRAMES):
+        write_openpose(folder / "keypoints", camera.name, frame, people)
+    pictures = []
+    for name, more in (("with", []), ("without", ["--no-keypoints"])):
+        out = tmp_path / f"{name}.png"
+        assert main(["view", str(result), str(folder), "--out", str(out), "--no-voxels", "--frame", "0", "--quiet", *more]) == 0
+        pictures.append(cv2.imread(str(out)))
+    changed = np.argwhere((pictures[0] != pictures[1]).any(axis=2))
+    layout = make_layout(one.size for one in open_recording(folder).rig)
+    factor = min(layout.cell[0] / camera.size[0], layout.cell[1] / camera.size[1])
+    expected = (np.array([20, 30]) + 0.5) * factor - 0.5
+    assert len(changed)
+    np.testing.assert_allclose(changed.mean(axis=0), expected + [(layout.cell[1] - round(camera.size[1] * factor)) // 2, 0], atol=1.5)

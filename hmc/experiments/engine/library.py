@@ -54,6 +54,7 @@ EXPERIMENTS = {
     "body-bias": "body_bias",
     "whole-chain": "whole_chain",
     "ablation": "ablation",
+    "cues": "cues",
     "what-each-adds": "what_each_adds",
     "lost-arm": "lost_arm",
     "over-time": "over_time",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +25,8 @@ TABLE_SUFFIXES = frozenset({".csv", ".json"})
 
 #: People of a frame, by the number that the files give it.
 Reader = Callable[[int], np.ndarray]
+#: ``change(index, people)``: what is made of the people of a frame, one array a camera.
+Change = Callable[[int, tuple[np.ndarray, ...]], tuple[np.ndarray, ...]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +48,12 @@ class KeypointSource:
     present: tuple[bool, ...]
     _readers: tuple[Reader | None, ...] = field(repr=False)
     _offsets: tuple[int, ...] = field(repr=False)
+    _change: Change | None = field(default=None, repr=False)
+
+    def changed(self, change: Change) -> KeypointSource:
+        """The same keypoints with every frame's people passed through ``change(index, people)``, which returns as many arrays."""
+        before = self._change
+        return replace(self, _change=change if before is None else lambda index, people: change(index, before(index, people)))
 
     def frame(self, index: int) -> tuple[np.ndarray, ...]:
         """People of one frame, in no particular order.
@@ -67,9 +75,10 @@ class KeypointSource:
         InputError
             When a file of this frame is not as it should be; one line with its name.
         """
-        return tuple(
+        people = tuple(
             NOBODY.copy() if reader is None else reader(index + offset) for reader, offset in zip(self._readers, self._offsets, strict=True)
         )
+        return people if self._change is None else self._change(index, people)
 
 
 @dataclass(frozen=True, eq=False)

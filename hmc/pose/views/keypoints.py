@@ -112,11 +112,12 @@ def _assigned(camera: Camera, given: np.ndarray, people: Mapping[int, np.ndarray
     if not len(given) or not people:
         return {}
     places = np.array(list(people.values()))
-    expected, depth = project(camera, places)
+    expected, valid = project(camera, places)
+    depth = places @ camera.rotation[2] + camera.translation[2]
     with np.errstate(all="ignore"):
         trunk = np.array([_middle(one) for one in given])
         apart = np.linalg.norm(trunk[:, None] - expected[None], axis=-1) * depth / camera.matrix[0, 0]
-    apart = np.where(np.isfinite(apart) & (depth > 0), apart, 10 * GATE_M)
+    apart = np.where(np.isfinite(apart) & valid, apart, 10 * GATE_M)
     rows, columns = linear_sum_assignment(np.minimum(apart, 10 * GATE_M))
     persons = list(people)
     return {persons[j]: i for i, j in zip(rows.tolist(), columns.tolist(), strict=True) if apart[i, j] < GATE_M}
