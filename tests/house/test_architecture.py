@@ -31,7 +31,7 @@ PERSON = STARTS | {"pose.legs", "pose.person"}
 MIXTURES = STEPS | {"pose.legs", "pose.mixtures"}
 FOLLOWING = PERSON | {"pose.records", "pose.follow", "pose.keypoint_cues"}
 METHODS = STARTS | MIXTURES | {"pose.recovery", "pose.methods"}
-POSE = METHODS | FOLLOWING | {"pose.backward", "pose.clear_views", "pose.occluders", "pose.smoothing", "pose.registry"}
+POSE = METHODS | FOLLOWING | {"pose.backward", "pose.clear_views", "pose.occluders", "pose.smoothing", "pose.registry", "pose.keypoint_tracks"}
 METRICS = IO | {"metrics"}
 VIEW = VOXELS | {"body", "view"}
 EVERYTHING = POSE | METRICS | VIEW | {"check", "synthetic", "plugins"}
@@ -56,6 +56,7 @@ MAY_IMPORT = {
     "pose.records": PERSON | {"pose.records"},
     "pose.follow": FOLLOWING,
     "pose.keypoint_cues": OBJECTIVES,
+    "pose.keypoint_tracks": VIEWS,
     "pose.mixtures": MIXTURES,
     "pose.occluders": VIEWS,
     "pose.backward": FOLLOWING | MIXTURES | {"pose.backward", "pose.occluders"},
