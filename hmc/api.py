@@ -209,7 +209,7 @@ def pose(
     -------
     PosedPeople
         `positions`, shape (n, 15, 3), metres; `angles`, radians; `frames`, `persons`; `poses.views`, how many cameras show each landmark
-        clear (`hmc.pose.clear_views`); `to_frame()` as a pandas frame.
+        clear (`hmc.pose.clear_views`; by keypoints alone: agree on it, `hmc.pose.keypoint_views`); `to_frame()` as a pandas frame.
 
     Raises
     ------
@@ -228,6 +228,7 @@ def pose(
     from hmc.pose.follow import FollowOptions, follow
     from hmc.pose.keypoint_cues import learn_scatter
     from hmc.pose.keypoint_tracks import tracks_of_keypoints
+    from hmc.pose.keypoint_views import with_keypoint_views
     from hmc.pose.registry import pose_method
     from hmc.pose.smoothing import smooth_people
     from hmc.voxels.run_options import RunOptions
@@ -260,6 +261,8 @@ def pose(
             people = backward(recording, tracks, method, people, options, run)
         if smooth_s:
             people = smooth_people(people, method.limits, recording.fps, smooth_s)
+        if tracks is not None and cues is not None and not method.needs_hulls:
+            return with_keypoint_views(people, recording, tracks, cues)
         return with_clear_views(people, recording, run)
 
 

@@ -120,6 +120,7 @@ def run(args: argparse.Namespace) -> int:
     from hmc.pose.follow import FollowOptions, follow
     from hmc.pose.keypoint_cues import learn_scatter
     from hmc.pose.keypoint_tracks import tracks_of_keypoints
+    from hmc.pose.keypoint_views import with_keypoint_views
     from hmc.pose.smoothing import smooth_people
     from hmc.tracking.resumable import person_grid, track_recording
     from hmc.voxels.run_options import RunOptions
@@ -190,6 +191,8 @@ def run(args: argparse.Namespace) -> int:
         people = smooth_people(people, method.limits, recording.fps, args.smooth)
     if hulls:
         people = with_clear_views(people, recording, kept(POSE_JOURNAL, "views"))
+    elif tracks is not None and cues is not None:
+        people = with_keypoint_views(people, recording, tracks, cues)
     problems += people.notes
     write_tracks(paths["tracks.csv"], _pelvis_tracks(people) if tracks is None else tracks)
     write_joints(paths["joints.csv"], people.poses)

@@ -32,7 +32,7 @@ MIXTURES = STEPS | {"pose.legs", "pose.mixtures"}
 FOLLOWING = PERSON | {"pose.records", "pose.follow", "pose.keypoint_cues"}
 METHODS = STARTS | MIXTURES | {"pose.recovery", "pose.methods"}
 POSE = METHODS | FOLLOWING | {"pose.backward", "pose.clear_views", "pose.keypoint_tracks", "pose.occluders", "pose.registry"}
-POSE |= {"pose.smoothing"}
+POSE |= {"pose.keypoint_views", "pose.smoothing"}
 METRICS = IO | {"metrics"}
 VIEW = VOXELS | {"body", "view"}
 EVERYTHING = POSE | METRICS | VIEW | {"check", "synthetic", "plugins"}
@@ -58,6 +58,7 @@ MAY_IMPORT = {
     "pose.follow": FOLLOWING,
     "pose.keypoint_cues": OBJECTIVES,
     "pose.keypoint_tracks": VIEWS,
+    "pose.keypoint_views": FOLLOWING | {"pose.clear_views"},
     "pose.mixtures": MIXTURES,
     "pose.occluders": VIEWS,
     "pose.backward": FOLLOWING | MIXTURES | {"pose.backward", "pose.occluders"},

@@ -19,14 +19,15 @@ from hmc.body.proportions import default_body, stature
 from hmc.cli import main
 from hmc.io.keypoints import open_keypoints
 from hmc.io.results import read_run, read_tracks
+from hmc.landmarks import LANDMARKS
 from hmc.pose.follow import FollowOptions, follow
 from hmc.pose.keypoint_cues import learn_scatter
 from hmc.pose.keypoint_tracks import tracks_of_keypoints
+from hmc.pose.keypoint_views import with_keypoint_views
 from hmc.pose.objectives.posture import PostureCost
 from hmc.pose.objectives.residuals import residual_rows
 from hmc.pose.starts.keypoint_body import body_of_keypoints, measured_lengths
 from hmc.synthetic.keypoints import write_keypoints
-from hmc.voxels import hulls
 from hmc.voxels.run_options import RunOptions
 
 TINY = Path(__file__).resolve().parents[2] / "data" / "synthetic" / "tiny"
@@ -47,10 +48,8 @@ def nothing_is_segmented(monkeypatch):
     def refuse(*given, **named):
         raise AssertionError("silhouettes were asked for")
 
-    for name in ("stream_masks", "stream_hulls"):
-        monkeypatch.setattr(hulls, name, refuse)
-    monkeypatch.setattr("hmc.pose.follow.stream_hulls", refuse)
-    monkeypatch.setattr("hmc.tracking.resumable.stream_hulls", refuse)
+    for module in ("hmc.pose.follow", "hmc.tracking.resumable"):
+        monkeypatch.setattr(f"{module}.stream_hulls", refuse)
 
 
 def errors(people, folder) -> np.ndarray:
@@ -111,6 +110,21 @@ def test_a_length_that_few_frames_show_is_that_of_people():
     assert body.dimensions["forearm"] / body.dimensions["height"] == pytest.approx(0.150)
 
 
+def test_cameras_agree_with_a_pose_until_it_is_moved(clip):
+    recording = hmc.open_recording(clip, frames=3)
+    source = open_keypoints(recording)
+    people = hmc.pose(recording, method="keypoints", keypoints=source)
+    tracks = tracks_of_keypoints(recording, source)
+    cues = learn_scatter(recording.rig, tracks, source)
+    arm = people.states.states.copy()
+    arm[:, dof_index("l_elbow_z")] -= 1.5
+    moved = with_keypoint_views(replace(people, states=replace(people.states, states=arm)), recording, tracks, cues)
+    wrist = LANDMARKS.index("l_wrist")
+    assert (people.poses.views[:, wrist] >= 2).all() and (moved.poses.views[:, wrist] < 2).all()
+    others = np.arange(15) != wrist
+    assert_array_equal(moved.poses.views[:, others], people.poses.views[:, others])
+
+
 # --- from end to end
 
 
@@ -120,6 +134,8 @@ def test_the_clip_s_person_by_keypoints_alone(clip):
     assert people.frames.tolist() == list(range(FRAMES)) and set(people.status) == {"fitted"} and people.notes == ()
     off = errors(people, clip)
     assert off.mean() < 0.045 and off.max() < 0.2
+    views = people.poses.views
+    assert views.shape == (FRAMES, 15) and (views >= 2).mean() > 0.9 and views.max() <= len(recording.rig)
     again = hmc.pose(recording, method="keypoints", keypoints=open_keypoints(recording), seed=5)
     assert_array_equal(again.positions, people.positions)
 

@@ -20,7 +20,7 @@ from hmc.pose.objectives.keypoints import BESIDE_M
 __all__ = ["body_of_keypoints", "measured_lengths"]
 
 #: Statures: the middle of adults, metres, and the deviation of the logarithm, children among them; one that is given is known so well.
-STATURE_M, STATURE_DEVIATION, KNOWN_DEVIATION = 1.70, 0.15, 0.01
+STATURE_M, STATURE_DEVIATION, KNOWN_DEVIATION = 1.70, 0.08, 0.01
 #: A length is measured in so many frames at least; so many frames one after the other tell as much as one.
 LEAST_FRAMES, ALIKE = 3, 3
 #: What is measured: the dimensions that go with it, its length over stature, and whose landmarks are its ends.

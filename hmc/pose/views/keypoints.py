@@ -18,7 +18,7 @@ from hmc.body.keypoint_places import BODY_KEYPOINTS, MIRRORED
 from hmc.camera.epipolar import undistorted_pixels
 from hmc.camera.model import Camera, Rig, project
 
-__all__ = ["SCATTER_M", "SeenKeypoints", "lines_of", "meeting_points", "see_keypoints", "sight_lines"]
+__all__ = ["MEET", "SCATTER_M", "SeenKeypoints", "lines_of", "meeting_points", "see_keypoints", "sight_lines"]
 
 N_KEYPOINTS = len(BODY_KEYPOINTS)
 #: Standard deviation of a detection across its line of sight before anything was learnt, metres.
