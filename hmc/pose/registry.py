@@ -3,7 +3,7 @@
 Nothing heavy is imported until a method is made, so that the command line can list the names.
 
 >>> sorted(METHODS)[:3]
-['apf', 'ddm-apf', 'marker-apf']
+['apf', 'ddm-apf', 'keypoints']
 >>> pose_method("smd", preset="kehl2006").source
 'Kehl and Van Gool (2006)'
 """
