@@ -202,13 +202,14 @@ def pose(
     on_frame : callable, optional
         Called with the number of frames that are done and that of all.
     keypoints : KeypointSource, optional
-        What a detector of 2-D keypoints saw (`hmc.io.keypoints.open_keypoints`), to be used beside the silhouettes.
+        What a detector of 2-D keypoints saw (`hmc.io.keypoints.open_keypoints`), to be used beside the silhouettes; with the method
+        "keypoints" without any, and people are tracked by them too.
 
     Returns
     -------
     PosedPeople
         `positions`, shape (n, 15, 3), metres; `angles`, radians; `frames`, `persons`; `poses.views`, how many cameras show each landmark
-        clear (`hmc.pose.clear_views`); `to_frame()` as a pandas frame.
+        clear (`hmc.pose.clear_views`; by keypoints alone: agree on it, `hmc.pose.keypoint_views`); `to_frame()` as a pandas frame.
 
     Raises
     ------
@@ -226,6 +227,8 @@ def pose(
     from hmc.pose.clear_views import with_clear_views
     from hmc.pose.follow import FollowOptions, follow
     from hmc.pose.keypoint_cues import learn_scatter
+    from hmc.pose.keypoint_tracks import tracks_of_keypoints
+    from hmc.pose.keypoint_views import with_keypoint_views
     from hmc.pose.registry import pose_method
     from hmc.pose.smoothing import smooth_people
     from hmc.voxels.run_options import RunOptions
@@ -240,11 +243,17 @@ def pose(
                 on_frame(n, total)
 
     with tempfile.TemporaryDirectory() as folder:
-        masks = Path(folder) / "masks" if method.needs_tracks else None
-        if tracks is None and method.needs_tracks:
+        masks = Path(folder) / "masks" if method.needs_hulls else None
+        if tracks is None and keypoints is not None and "keypoints" in method.needs and not method.needs_hulls:
+            tracks = tracks_of_keypoints(recording, keypoints)
+        elif tracks is None and method.needs_hulls:
             tracks = _tracked(recording, "sparse", seed, TRACK_VOXEL_M, masks)
         run = RunOptions(masks=masks, key=_KEY, progress=counted)
-        cues = None if keypoints is None or tracks is None or not method.keypoints else learn_scatter(recording.rig, tracks, keypoints)
+        cues = (
+            None
+            if keypoints is None or tracks is None or not (method.keypoints or "keypoints" in method.needs)
+            else learn_scatter(recording.rig, tracks, keypoints)
+        )
         options = FollowOptions(POSE_VOXEL_M, seed, height, detections, keypoints=cues)
         people = follow(recording, tracks, method, options, run)
         run = replace(run, progress=None)
@@ -252,6 +261,8 @@ def pose(
             people = backward(recording, tracks, method, people, options, run)
         if smooth_s:
             people = smooth_people(people, method.limits, recording.fps, smooth_s)
+        if tracks is not None and cues is not None and not method.needs_hulls:
+            return with_keypoint_views(people, recording, tracks, cues)
         return with_clear_views(people, recording, run)
 
 

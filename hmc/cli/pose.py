@@ -31,7 +31,7 @@ BACK_JOURNAL = ".back.journal"
 #: Time over which poses are smoothed where no other is said, seconds.
 SMOOTH_S = 0.3
 #: What `--cues` may say.
-CUES = ("silhouettes", "silhouettes,keypoints")
+CUES = ("silhouettes", "silhouettes,keypoints", "keypoints")
 #: Its silhouettes, which the tracker leaves for the poses.
 MASKS = ".masks"
 RESULTS = ("joints.csv", "tracks.csv", "pose.npz", "run.toml")
@@ -50,9 +50,9 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the result")
     parser.add_argument(
         "--method",
-        default="apf",
         metavar="NAME",
-        help="; ".join(f"{entry.name}: {entry.help}" for entry in METHODS.values()) + "; or one of --plugin",
+        help="; ".join(f"{entry.name}: {entry.help}" for entry in METHODS.values())
+        + "; or one of --plugin (default: apf; with --cues keypoints: keypoints)",
     )
     add_plugin_option(parser)
     parser.add_argument(
@@ -87,8 +87,8 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     parser.add_argument(
         "--cues",
         choices=CUES,
-        help="what poses are fitted to: silhouettes alone, or with the keypoints that a 2-D detector left in the recording, for "
-        "methods that refine (default: both where both are there)",
+        help="what poses are fitted to: silhouettes alone, with the keypoints that a 2-D detector left in the recording, for "
+        "methods that refine (default: both where both are there), or with these keypoints alone, without any silhouette",
     )
     parser.add_argument(
         "--passes",
@@ -119,17 +119,20 @@ def run(args: argparse.Namespace) -> int:
     from hmc.pose.clear_views import with_clear_views
     from hmc.pose.follow import FollowOptions, follow
     from hmc.pose.keypoint_cues import learn_scatter
+    from hmc.pose.keypoint_tracks import tracks_of_keypoints
+    from hmc.pose.keypoint_views import with_keypoint_views
     from hmc.pose.smoothing import smooth_people
     from hmc.tracking.resumable import person_grid, track_recording
     from hmc.voxels.run_options import RunOptions
 
     plugins = load_given_plugins(args)
-    method = pose_method(args.method, args.preset, args.model, args.init, args.markers == "skin", args.passes)
+    name = args.method or ("keypoints" if args.cues == CUES[2] else "apf")
+    method = pose_method(name, args.preset, args.model, args.init, args.markers == "skin", args.passes)
     recording = open_selected(args)
     if args.out.is_file():
         raise InputError(f"--out {args.out}: is a file; give a folder")
-    height, tracked, frontend = _height(args.height, recording), method.needs_tracks, selected_frontend(args)
-    source_of_keypoints = _keypoints(args.cues, recording, method.keypoints)
+    height, hulls, frontend = _height(args.height, recording), method.needs_hulls, selected_frontend(args)
+    source_of_keypoints = _keypoints(args.cues, recording, method)
     parameters: dict[str, Any] = {
         "start": recording.start,
         "frames": recording.n_frames,
@@ -146,8 +149,8 @@ def run(args: argparse.Namespace) -> int:
         "smooth_s": args.smooth or 0.0,
     } | plugins
     if source_of_keypoints is not None:
-        parameters["cues"] = CUES[1]
-    if tracked:
+        parameters["cues"] = CUES[1 if hulls else 2]
+    if hulls:
         person_grid(recording, args.voxel)  # voxels that will not do are refused before any work is done
         tracker = selected_tracker(args)
         parameters |= {"voxel_size_m": args.voxel, "track_voxel_size_m": args.track_voxel}
@@ -157,7 +160,7 @@ def run(args: argparse.Namespace) -> int:
         markers = read_markers(args, recording)
         parameters |= markers.parameters
         source |= markers.source
-    depends_on = {"method": args.method, "seed": args.seed, **source, "parameters": parameters}
+    depends_on = {"method": name, "seed": args.seed, **source, "parameters": parameters}
     key, paths = to_toml(depends_on), {name: args.out / name for name in RESULTS}
     if was_finished([paths[name] for name in RESULTS[:3]], paths["run.toml"], depends_on):
         return 0
@@ -166,12 +169,16 @@ def run(args: argparse.Namespace) -> int:
 
     def kept(journal: str, what: str) -> RunOptions:
         """The run of a stage; the tracker leaves its silhouettes for the poses."""
-        masks = args.out / MASKS if tracked else None
+        masks = args.out / MASKS if hulls else None
         return RunOptions(
             frontend, args.out / journal, masks, key, problems.append, lambda steps, total: progress(steps, total, what, args.quiet)
         )
 
-    tracks = track_recording(recording, args.track_voxel, tracker, args.seed, kept(JOURNAL, "track")) if tracked else None
+    tracks = None
+    if hulls:
+        tracks = track_recording(recording, args.track_voxel, tracker, args.seed, kept(JOURNAL, "track"))
+    elif method.needs_tracks:
+        tracks = tracks_of_keypoints(recording, source_of_keypoints, kept(JOURNAL, "track"))
     detections = None if markers is None else markers.table(args, key, problems)
     cues = None if tracks is None or source_of_keypoints is None else learn_scatter(recording.rig, tracks, source_of_keypoints)
     options = FollowOptions(args.voxel, args.seed, height, detections, keypoints=cues)
@@ -182,15 +189,17 @@ def run(args: argparse.Namespace) -> int:
         people = backward(recording, tracks, method, people, options, kept(BACK_JOURNAL, "back"))
     if args.smooth:
         people = smooth_people(people, method.limits, recording.fps, args.smooth)
-    if tracked:
+    if hulls:
         people = with_clear_views(people, recording, kept(POSE_JOURNAL, "views"))
+    elif tracks is not None and cues is not None:
+        people = with_keypoint_views(people, recording, tracks, cues)
     problems += people.notes
     write_tracks(paths["tracks.csv"], _pelvis_tracks(people) if tracks is None else tracks)
     write_joints(paths["joints.csv"], people.poses)
     write_pose(paths["pose.npz"], people.states)
     if any(people.details):
         write_fits(args.out / "fits.csv", people.frames.tolist(), people.persons.tolist(), people.status, people.details)
-    write_run(paths["run.toml"], args.method, parameters, args.seed, **source, problems=gather_problems(problems))
+    write_run(paths["run.toml"], name, parameters, args.seed, **source, problems=gather_problems(problems))
     for name in (JOURNAL, POSE_JOURNAL, BACK_JOURNAL, MARKERS_JOURNAL, MASKS):
         for file in args.out.glob(f"{name}*"):
             file.unlink()
@@ -199,18 +208,24 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _keypoints(cues: str | None, recording, taken: bool):
+def _keypoints(cues: str | None, recording, method):
     """The keypoints that are to be used, or None: those that are there, unless silhouettes alone are asked for."""
     from hmc.errors import InputError
     from hmc.io.keypoints import open_keypoints
 
-    if cues == CUES[1] and not taken:
+    alone = "keypoints" in method.needs
+    if cues == CUES[2] and (method.needs_hulls or not alone):
+        raise InputError(f"--cues {cues}: method {method.name} needs more than keypoints; leave --method out")
+    if cues in CUES[:2] and alone and not method.needs_hulls:
+        raise InputError(f"--cues {cues}: method {method.name} has no use for silhouettes; leave --method or --cues out")
+    if cues == CUES[1] and not method.keypoints:
         raise InputError(f"--cues {cues}: this method has no use for keypoints; use the preset `default` of apf, smd or pso, say")
-    if cues == CUES[0] or not taken:
+    if cues == CUES[0] or not (method.keypoints or alone):
         return None
     found = open_keypoints(recording)
-    if found is None and cues == CUES[1]:
-        raise InputError(f"--cues {cues}: {recording.path} has no keypoints; put a detector's into keypoints/CAMERA/ (docs/conventions.md)")
+    if found is None and (cues is not None or alone):
+        asked = f"--cues {cues}" if cues else f"--method {method.name}"
+        raise InputError(f"{asked}: {recording.path} has no keypoints; put a detector's into keypoints/CAMERA/ (docs/conventions.md)")
     return found
 
 

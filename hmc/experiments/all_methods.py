@@ -41,7 +41,7 @@ def ways() -> list[tuple[str, str]]:
     load_plugins()
     found: list[tuple[str, str]] = []
     for name, entry in METHODS.items():
-        if "detections" in pose_method(name).needs:
+        if not pose_method(name).needs_hulls:
             continue
         papers = {preset for _, preset in found}
         found += [(name, preset) for preset in entry.presets if preset == DEFAULT or preset not in papers]

@@ -31,7 +31,7 @@ from hmc.voxels.run_options import RunOptions
 if TYPE_CHECKING:
     from hmc.pose.follow import PosedPeople
 
-__all__ = ["BorneOut", "clear_views", "with_clear_views"]
+__all__ = ["BorneOut", "clear_views", "guess_notes", "with_clear_views"]
 
 #: Flesh of a landmark's limb as near as this to it counts as its own, metres.
 NEAR_M = 0.15
@@ -132,11 +132,11 @@ def with_clear_views(people: PosedPeople, recording: Recording, run: RunOptions)
     steps = run.progress(steps, end - first) if run.progress else steps
     found = clear_views(recording.rig, steps, people.states)
     poses = replace(people.poses, views=found.views)
-    notes = (*people.notes, *_guess_notes(poses), *_uncovered_notes(recording.rig, found.uncovered))
+    notes = (*people.notes, *guess_notes(poses), *_uncovered_notes(recording.rig, found.uncovered))
     return replace(people, poses=poses, notes=notes)
 
 
-def _guess_notes(poses: PoseTable) -> list[str]:
+def guess_notes(poses: PoseTable) -> list[str]:
     """A line on every person of whose landmarks many are guesses: how many, and which most of all."""
     notes = []
     for person in np.unique(poses.persons).tolist():

@@ -160,6 +160,8 @@ def follow(
     options, run, needs = options or FollowOptions(), run or RunOptions(), check_needs(method.needs)
     if "detections" in needs and options.detections is None:
         raise InputError(f"method {method.name} needs detections (frame, camera, u, v)")
+    if "keypoints" in needs and options.keypoints is None:
+        raise InputError(f"method {method.name} needs keypoints of a 2-D detector (hmc.io.keypoints.open_keypoints)")
     tracks = only_person(recording) if tracks is None else tracks
     capture = Capture(recording.fps, options.voxel_size_m, recording.room, recording.rig, options.drift)
     task, persons = PoseTask(method, capture, options.seed, options.height_m), persons_of(recording, tracks)
@@ -188,16 +190,18 @@ def _views_from(
 ) -> Iterator[dict[int, PersonView]]:
     """What each frame shows of every person, from the first that one still needs to the end of the selection."""
     end = recording.start + recording.n_frames
-    if not method.needs_tracks:
+    cues = options.keypoints if method.keypoints or "keypoints" in method.needs else None
+    if not method.needs_hulls:
         frames: Iterable = range(first, end)
         for frame in run.progress(frames, end - first) if run.progress else frames:
             persons = tracks.persons[tracks.frames == frame].tolist()
-            yield _with_markers({person: PersonView(frame) for person in persons}, recording, method, options)
+            blank = with_keypoints({person: PersonView(frame) for person in persons}, recording.rig, tracks, cues)
+            yield _with_markers(blank, recording, method, options)
         return
     grid = person_grid(recording, options.voxel_size_m)
     hulls: Iterable = _hulls_from(recording, grid, run, first, bool(method.needs & IMAGES_FOR))
     for hull in run.progress(hulls, end - first) if run.progress else hulls:
-        views = with_keypoints(views_of(recording, grid, tracks, hull, method.needs), recording.rig, tracks, options.keypoints)
+        views = with_keypoints(views_of(recording, grid, tracks, hull, method.needs), recording.rig, tracks, cues)
         yield _with_markers(views, recording, method, options)
 
 

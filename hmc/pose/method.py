@@ -20,7 +20,7 @@ from hmc.camera.model import Rig
 from hmc.pose.objectives.four_scores import ScoreTable
 from hmc.pose.objectives.keypoints import Beside
 from hmc.pose.objectives.symmetric import BodyPoints, body_points
-from hmc.pose.views.person_view import PersonView
+from hmc.pose.views.person_view import HULLS_FOR, PersonView
 from hmc.search.filters import AnnealedInfo, ParticleState
 from hmc.search.structural import StructuralInfo
 
@@ -282,7 +282,7 @@ class PoseMethod:
     back : BackwardSettings or None
         How a second pass goes, backward in time (`hmc.pose.backward`); None: there is none.
     keypoints : bool
-        Whether it takes the keypoints of a detector beside the hulls, where there are some.
+        Whether it takes the keypoints of a detector, where there are some; beside the hulls unless it `needs` nothing else.
     limits : JointLimits
         Of the bodies that the start makes.
     window_s : float
@@ -313,6 +313,11 @@ class PoseMethod:
     def needs_tracks(self) -> bool:
         """Whether people are tracked first: not where detections are all that is read."""
         return not self.needs <= {"detections"}
+
+    @property
+    def needs_hulls(self) -> bool:
+        """Whether silhouettes are made and carved: not where detections or keypoints are all that is read."""
+        return bool(self.needs & HULLS_FOR)
 
 
 def unseen(tracked: Tracked, status: str = "no hull of this person in this frame") -> tuple[Tracked, StepInfo]:

@@ -3,7 +3,7 @@
 Nothing heavy is imported until a method is made, so that the command line can list the names.
 
 >>> sorted(METHODS)[:3]
-['apf', 'ddm-apf', 'marker-apf']
+['apf', 'ddm-apf', 'keypoints']
 >>> pose_method("smd", preset="kehl2006").source
 'Kehl and Van Gool (2006)'
 """
@@ -182,6 +182,12 @@ def _markers(choice: MethodChoice) -> PoseMethod:
     return marker_method(MARKER_PRESETS[choice.preset], choice.skin)
 
 
+def _keypoints(choice: MethodChoice) -> PoseMethod:
+    from hmc.pose.methods.keypoints import keypoint_method
+
+    return keypoint_method()
+
+
 #: By name, in the order in which they are listed.
 METHODS: dict[str, MethodEntry] = {
     entry.name: entry
@@ -201,6 +207,7 @@ METHODS: dict[str, MethodEntry] = {
         MethodEntry("smd", "superellipsoids by stochastic meta descent", ("default", "kehl2006"), _smd, frozenset({"init"})),
         MethodEntry("pso", "spectral skeleton and particle swarm", ("default", "hsiao2008"), _pso, frozenset({"init"})),
         MethodEntry("marker-apf", "annealed particle filter on markers", ("default", "canton2009"), _markers),
+        MethodEntry("keypoints", "a 2-D detector's keypoints alone, without silhouettes", ("default",), _keypoints),
     )
 }
 #: Of these, the ones that come with the package.

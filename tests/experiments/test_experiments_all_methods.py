@@ -26,7 +26,7 @@ def grid_of(quick):
 
 
 def test_every_method_that_needs_no_markers_takes_part_and_every_paper_once():
-    assert {name for name, _ in ways()} == {name for name in METHODS if pose_method(name).needs_tracks}
+    assert {name for name, _ in ways()} == {name for name in METHODS if pose_method(name).needs_hulls}
     assert [way for way in ways() if way[1] != "default"] == [("apf", "canton2009"), ("smd", "kehl2006"), ("pso", "hsiao2008")]
     grid, titles = grid_of(False)
     papers = sum(preset != "default" for _, preset in ways())

@@ -31,7 +31,8 @@ PERSON = STARTS | {"pose.legs", "pose.person"}
 MIXTURES = STEPS | {"pose.legs", "pose.mixtures"}
 FOLLOWING = PERSON | {"pose.records", "pose.follow", "pose.keypoint_cues"}
 METHODS = STARTS | MIXTURES | {"pose.recovery", "pose.methods"}
-POSE = METHODS | FOLLOWING | {"pose.backward", "pose.clear_views", "pose.occluders", "pose.smoothing", "pose.registry"}
+POSE = METHODS | FOLLOWING | {"pose.backward", "pose.clear_views", "pose.keypoint_tracks", "pose.occluders", "pose.registry"}
+POSE |= {"pose.keypoint_views", "pose.smoothing"}
 METRICS = IO | {"metrics"}
 VIEW = VOXELS | {"body", "view"}
 EVERYTHING = POSE | METRICS | VIEW | {"check", "synthetic", "plugins"}
@@ -56,6 +57,8 @@ MAY_IMPORT = {
     "pose.records": PERSON | {"pose.records"},
     "pose.follow": FOLLOWING,
     "pose.keypoint_cues": OBJECTIVES,
+    "pose.keypoint_tracks": VIEWS,
+    "pose.keypoint_views": FOLLOWING | {"pose.clear_views"},
     "pose.mixtures": MIXTURES,
     "pose.occluders": VIEWS,
     "pose.backward": FOLLOWING | MIXTURES | {"pose.backward", "pose.occluders"},

@@ -189,6 +189,8 @@ def test_people_are_tracked_unless_detections_are_all_that_is_read():
     markers = pose_method("marker-apf")
     assert not markers.needs_tracks
     assert replace(markers, needs=frozenset({"detections", "hulls"})).needs_tracks
+    keypoints = pose_method("keypoints")
+    assert keypoints.needs_tracks and not keypoints.needs_hulls and not markers.needs_hulls
 
 
 def test_what_a_method_has_no_use_for_is_refused():

@@ -18,7 +18,7 @@ from hmc.body.keypoint_places import BODY_KEYPOINTS, MIRRORED
 from hmc.camera.epipolar import undistorted_pixels
 from hmc.camera.model import Camera, Rig, project
 
-__all__ = ["SCATTER_M", "SeenKeypoints", "meeting_points", "see_keypoints", "sight_lines"]
+__all__ = ["MEET", "SCATTER_M", "SeenKeypoints", "lines_of", "meeting_points", "see_keypoints", "sight_lines"]
 
 N_KEYPOINTS = len(BODY_KEYPOINTS)
 #: Standard deviation of a detection across its line of sight before anything was learnt, metres.
@@ -134,7 +134,7 @@ def _middle(one: np.ndarray) -> np.ndarray:
 
 def _seen(rig: Rig, given: Sequence[np.ndarray | None], place: np.ndarray, scatter: np.ndarray) -> SeenKeypoints | None:
     """One person's detections as lines of sight, turned where left and right are exchanged."""
-    lines = [_lines_of(camera, one) for camera, one in zip(rig, given, strict=True)]
+    lines = [lines_of(camera, one) for camera, one in zip(rig, given, strict=True)]
     directions = np.array([line[0] for line in lines])
     confidence = np.array([line[1] for line in lines])
     if not (confidence > 0).any():
@@ -151,7 +151,7 @@ def _seen(rig: Rig, given: Sequence[np.ndarray | None], place: np.ndarray, scatt
     return SeenKeypoints(keypoint, camera, centres[camera], _across(directions[camera, keypoint]), deviation[camera, keypoint], points)
 
 
-def _lines_of(camera: Camera, one: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+def lines_of(camera: Camera, one: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
     """Directions (15, 3), NaN where nothing was given, and confidences (15,), 0 there."""
     directions, confidence = np.full((N_KEYPOINTS, 3), np.nan), np.zeros(N_KEYPOINTS)
     if one is not None:

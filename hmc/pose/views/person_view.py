@@ -27,13 +27,15 @@ from hmc.tracking.tracks import person_voxels
 from hmc.voxels.grid import VoxelGrid
 from hmc.voxels.hulls import HullStep
 
-__all__ = ["EVIDENCE", "IMAGES_FOR", "PersonView", "VoxelView", "check_needs", "views_of"]
+__all__ = ["EVIDENCE", "HULLS_FOR", "IMAGES_FOR", "PersonView", "VoxelView", "check_needs", "views_of"]
 
 #: What a method may need of a frame: the hulls and the rays of the silhouettes; the colored surface and the images around it; the voxels
-#: with the votes of their colors; the detections of markers.
-EVIDENCE = ("hulls", "skin", "voxels", "detections")
+#: with the votes of their colors; the detections of markers; the keypoints of a detector.
+EVIDENCE = ("hulls", "skin", "voxels", "detections", "keypoints")
 #: For these the images are read too.
 IMAGES_FOR = frozenset({"skin", "voxels"})
+#: For these silhouettes are carved.
+HULLS_FOR = frozenset({"hulls", "skin", "voxels"})
 #: Of so few cameras, hulls in which one or two may miss are mostly no person: they count only where silhouettes ask for them. Of more, they
 #: are little fatter than the strict one, and hold what furniture hides without silhouettes that would ask for it.
 FEW_CAMERAS = 4
@@ -119,7 +121,7 @@ def views_of(
     tracks : TrackTable
     hull : HullStep
     needs : collection of str
-        Of `EVIDENCE`, without detections.
+        Of `EVIDENCE`, without detections and keypoints.
     unseen : ndarray of int, shape (k, 3), optional
         Voxels where the scene hides people (`hmc.pose.occluders.unseen_voxels`).
 
