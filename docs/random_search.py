@@ -21,7 +21,7 @@ DRAWS, SPREADS = 60, (0.1, 0.05, 0.025)
 
 def propose(rng, tracked, view):
     """Draw poses about the best so far, closer every time; metres and radians alike."""
-    objective, limits = fine_objective(rng, tracked.subject, view.target, HOUSE.polish), tracked.subject.body.limits
+    objective, limits = fine_objective(rng, tracked.subject, view, HOUSE.polish), tracked.subject.body.limits
     best = tracked.state
     for spread in SPREADS:
         drawn = best + spread * rng.standard_normal((DRAWS, len(best)))

@@ -61,7 +61,7 @@ class TopOfHead:
 
 
 def make_objective(rng, subject, view):
-    hulls = fine_objective(rng, subject, view.target, HOUSE.polish)
+    hulls = fine_objective(rng, subject, view, HOUSE.polish)
     return Sum([hulls, TopOfHead(subject.body, float(view.target.surface[:, 2].max()))])
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import matplotlib.pyplot as plt
@@ -83,14 +84,27 @@ def grid(plan: Plan) -> list[dict[str, Any]]:
 
 def _with_keypoints(sources: Sequence[Source]) -> tuple[Source, ...]:
     """Those for which there are keypoints, or for which they are pretended."""
-    kept = tuple(one for one in sources if one.folder is None or open_keypoints(open_recording(one.folder)) is not None)
+    kept = tuple(one for one in sources if one.folder is None or _has_keypoints(one.folder))
     if sources and not kept:
         raise InputError(f"none of the recordings has keypoints ({', '.join(one.name for one in sources)}); see docs/conventions.md")
     return kept
 
 
+def _has_keypoints(folder: Path) -> bool:
+    try:
+        return open_keypoints(open_recording(folder)) is not None
+    except InputError:  # its cells tell what is wrong
+        return True
+
+
 def _n_cameras(source: Source) -> int:
-    return sum(RIGS[recipe_of(source.name).rig.kind]) if source.folder is None else len(open_recording(source.folder).rig)
+    """Cameras of a source; of a recording that cannot be opened, as if it had one."""
+    if source.folder is None:
+        return sum(RIGS[recipe_of(source.name).rig.kind])
+    try:
+        return len(open_recording(source.folder).rig)
+    except InputError:
+        return 1
 
 
 def report(cells: Sequence[Cell], plan: Plan) -> Report:

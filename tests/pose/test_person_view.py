@@ -129,5 +129,5 @@ def test_a_strict_hull_that_is_whole_is_taken_however_fat_the_tolerant_one(frame
 
 def test_needs_that_nobody_knows_are_refused():
     assert check_needs(EVIDENCE) == frozenset(EVIDENCE)
-    with pytest.raises(InputError, match="may need hulls, skin, voxels, detections; got 'sound'"):
+    with pytest.raises(InputError, match="may need hulls, skin, voxels, detections, keypoints; got 'sound'"):
         check_needs(["hulls", "sound"])

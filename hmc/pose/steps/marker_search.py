@@ -17,6 +17,7 @@ from hmc.body.joints import DOF_NAMES, dof_index
 from hmc.body.kinematics import landmarks
 from hmc.body.marker_places import place_tips
 from hmc.body.model import BodyModel, neutral_state
+from hmc.landmarks import LANDMARKS
 from hmc.search.filters import AnnealedSettings, annealed_step, particle_init
 
 __all__ = ["LEAST_POINTS", "lay_body", "left_over", "point_cost", "search_near", "start_poses"]
@@ -123,7 +124,9 @@ def _search(
 
 
 def left_over(body: BodyModel, state: np.ndarray, points: np.ndarray, views: np.ndarray, gate_m: float = SEARCH_GATE_M) -> int:
-    """How many trusted points are nowhere near a body's markers: those of another person, where they are many.
+    """How many trusted points are nowhere near a body's markers, or more than a body has: those of another person, where they are many.
+
+    A pose may lie across two people and be near the points of both; but no body has more markers that all views agree on than it has.
 
     Parameters
     ----------
@@ -136,7 +139,8 @@ def left_over(body: BodyModel, state: np.ndarray, points: np.ndarray, views: np.
         What is farther than this from all markers is nowhere near, metres.
     """
     away = np.linalg.norm(points[:, None] - landmarks(body, state), axis=-1).min(axis=1)
-    return int(((away > gate_m) & (_trust(views) >= 0.5)).sum())
+    trust = _trust(views)
+    return max(int(((away > gate_m) & (trust >= 0.5)).sum()), int((trust == 1).sum()) - len(LANDMARKS))
 
 
 def _trust(views: np.ndarray) -> np.ndarray:
