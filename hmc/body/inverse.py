@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hmc.body.joints import N_DOF
-from hmc.body.kinematics import dof_masks, joint_twists
+from hmc.body.kinematics import dof_masks, joint_twists, point_motions
 from hmc.body.model import BodyModel
 from hmc.body.proportions import landmark_segments
 from hmc.search.gauss_newton import Damping, GaussNewtonSettings, LeastSquares, gauss_newton_init, gauss_newton_run
@@ -43,12 +43,7 @@ class _Misses:
 
     def pulls(self) -> tuple[slice, np.ndarray]:
         """All residuals, and how they change with the state, shape (3 k, 33)."""
-        # axis x (p - centre) for all points and angles, coordinate by coordinate: `numpy.cross` takes several times as long.
-        (x, y, z), (u, v, w) = self.axes.T, (self.places[:, None] - self.centres).transpose(2, 0, 1)
-        jacobian = np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=1)
-        jacobian[:, :, :3] = np.eye(3)
-        jacobian *= self.masks
-        return slice(None), jacobian.reshape(-1, N_DOF)
+        return slice(None), point_motions(self.axes, self.centres, self.places, self.masks).reshape(-1, N_DOF)
 
 
 def fit_landmarks(
@@ -75,7 +70,7 @@ def fit_landmarks(
         Root mean squared distance of the known landmarks, metres.
     """
     known = np.isfinite(points).all(1)
-    target, segments, tips, masks = points[known], _SEGMENTS[known], body.tips[known, :, None], _MASKS[known][:, None]
+    target, segments, tips, masks = points[known], _SEGMENTS[known], body.tips[known, :, None], _MASKS[known]
 
     def misses(state: np.ndarray, near: None) -> _Misses:
         axes, centres, rotations, positions = joint_twists(body, state)

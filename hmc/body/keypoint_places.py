@@ -13,7 +13,7 @@ from hmc.body.model import PART_OF_SEGMENT, BodyModel
 from hmc.body.proportions import landmark_segments
 from hmc.landmarks import LANDMARKS
 
-__all__ = ["BODY_KEYPOINTS", "KEYPOINT_PART", "KEYPOINT_SEGMENTS", "MIRRORED", "keypoint_places"]
+__all__ = ["BODY_KEYPOINTS", "KEYPOINT_PART", "KEYPOINT_SEGMENTS", "MIRRORED", "keypoint_places", "place_keypoints"]
 
 _JOINTS = tuple(f"{side}_{joint}" for side in "lr" for joint in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle"))
 #: On the head's segment, over stature: forward, to the left, and up from the base of the neck. A nose is about 13 cm below the crown and
@@ -47,3 +47,16 @@ def keypoint_places(body: BodyModel) -> np.ndarray:
     """Where each of `BODY_KEYPOINTS` is on its segment, shape (15, 3), metres."""
     face = np.array(list(_FACE.values())) * body.height_m
     return np.concatenate([np.where(_BEGINS[:, None], body.offsets[_AFTER], body.tips[_ENDS]), face])
+
+
+def place_keypoints(rotations: np.ndarray, positions: np.ndarray, local: np.ndarray) -> np.ndarray:
+    """Keypoints in the world, shape (..., 15, 3), metres.
+
+    Parameters
+    ----------
+    rotations, positions : ndarray, shape (..., 14, 3, 3) and (..., 14, 3)
+        As from `hmc.body.kinematics.segment_transforms`.
+    local : ndarray, shape (15, 3)
+        On their segments: `keypoint_places`, or what lies beside them.
+    """
+    return positions[..., KEYPOINT_SEGMENTS, :] + (rotations[..., KEYPOINT_SEGMENTS, :, :] @ local[..., None])[..., 0]

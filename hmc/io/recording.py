@@ -22,7 +22,7 @@ from hmc.io.calibration import build_camera, read_entries
 from hmc.io.footage import Footage, find_footage, number_images, read_footage, starting_at
 from hmc.io.settings import read_settings
 
-__all__ = ["Frame", "Recording", "background_frames", "iterate_frames", "open_recording"]
+__all__ = ["Frame", "Recording", "background_frames", "iterate_frames", "open_recording", "spread_frames"]
 
 logger = logging.getLogger("hmc")
 
@@ -395,3 +395,8 @@ def wrong_units(rig: Rig) -> list[str]:
 
 def _by(size: tuple[int, int]) -> str:
     return f"{size[0]} x {size[1]}"
+
+
+def spread_frames(frames: np.ndarray, most: int) -> list[int]:
+    """So many of these frames at most, well spread: ndarray of int, shape (n,), rising, to a list."""
+    return frames[np.unique(np.linspace(0, len(frames) - 1, min(most, len(frames))).round().astype(int))].tolist()

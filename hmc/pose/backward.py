@@ -27,10 +27,10 @@ from hmc.body.model import BodyModel
 from hmc.body.proportions import make_bodies
 from hmc.io.journal import append_journal, open_journal
 from hmc.io.masks import kept_frames
-from hmc.io.recording import Recording
+from hmc.io.recording import Recording, spread_frames
 from hmc.io.results import PoseStates, TrackTable
 from hmc.pose.follow import FollowOptions, PosedPeople
-from hmc.pose.keypoint_cues import beside_body, learn_beside, spread_frames, with_keypoints
+from hmc.pose.keypoint_cues import beside_body, learn_beside, with_keypoints
 from hmc.pose.method import SURFACE_POINTS, Capture, PoseMethod, Subject, make_subject
 from hmc.pose.mixtures import N_MIXTURES, BackwardSettings, choose_path, mixed_poses, mixture
 from hmc.pose.objectives.objective import Objective
@@ -209,13 +209,14 @@ def _bodies(pass_: _Pass, people: PosedPeople, fitted: np.ndarray) -> dict[int, 
     chosen = {number: choose_frames(people.costs[person.rows], settings.body_frames) for number, person in persons.items()}
     wanted = {number: {int(people.frames[persons[number].rows[k]]) for part in parts for k in part} for number, parts in chosen.items()}
     poses: dict[int, dict[int, tuple[Objective, np.ndarray]]] = {number: {} for number in persons}
-    for frame, views in pass_.views(sorted(set().union(*wanted.values()))):
+    # By the hulls alone: where a detector's keypoints lie on this body is not known yet.
+    hulls_alone = replace(pass_, options=replace(pass_.options, keypoints=None))
+    for frame, views in hulls_alone.views(sorted(set().union(*wanted.values()))):
         for number, person in persons.items():
             view = views[number] if frame in wanted[number] and number in views else None
             if view is not None and shows_enough(view.target):
                 k = person.row_of[frame]
-                # Where a detector's keypoints lie on this body is not known yet.
-                objective = fine_objective(pass_.rng(number, frame), person.subject, replace(view, keypoints=None), settings.polish)
+                objective = fine_objective(pass_.rng(number, frame), person.subject, view, settings.polish)
                 poses[number][k] = objective, refine(objective, person.own[k], settings.polish.refine)[0]
     for number, person in persons.items():
         picks, held_out = ([k for k in part if k in poses[number]] for part in chosen[number])

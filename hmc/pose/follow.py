@@ -190,7 +190,7 @@ def _views_from(
 ) -> Iterator[dict[int, PersonView]]:
     """What each frame shows of every person, from the first that one still needs to the end of the selection."""
     end = recording.start + recording.n_frames
-    cues = options.keypoints if method.keypoints or "keypoints" in method.needs else None
+    cues = options.keypoints if method.keypoints else None
     if not method.needs_hulls:
         frames: Iterable = range(first, end)
         for frame in run.progress(frames, end - first) if run.progress else frames:

@@ -16,14 +16,14 @@ from hmc.body.keypoint_places import BODY_KEYPOINTS, KEYPOINT_SEGMENTS, keypoint
 from hmc.body.kinematics import segment_transforms
 from hmc.body.model import BodyModel
 from hmc.camera.model import Rig
-from hmc.io.keypoints.layouts import KEYPOINTS
 from hmc.io.keypoints.source import KeypointSource
+from hmc.io.recording import spread_frames
 from hmc.io.results import TrackTable
 from hmc.pose.objectives.keypoints import BESIDE_M, Beside
-from hmc.pose.views.keypoints import SCATTER_M, SeenKeypoints, see_keypoints
+from hmc.pose.views.keypoints import SCATTER_M, SeenKeypoints, body_detections, see_keypoints
 from hmc.pose.views.person_view import PersonView
 
-__all__ = ["KeypointCues", "beside_body", "learn_beside", "learn_scatter", "spread_frames", "with_keypoints"]
+__all__ = ["KeypointCues", "beside_body", "learn_beside", "learn_scatter", "with_keypoints"]
 
 #: Frames from which scatter is learnt, at most, well spread.
 LEARNING_FRAMES = 120
@@ -37,7 +37,6 @@ LEARNT_M = 0.008
 HULL_COST_M2, WORTH_RANGE = 1e-4, (0.5, 4.0)
 #: Frames one after the other that tell as much as one.
 ALIKE = 3
-_OF_BODY = [KEYPOINTS.index(name) for name in BODY_KEYPOINTS]
 
 
 @dataclass(frozen=True)
@@ -76,7 +75,7 @@ def with_keypoints(views: Mapping[int, PersonView], rig: Rig, tracks: TrackTable
 def _seen(rig: Rig, tracks: TrackTable, cues: KeypointCues, frame: int) -> dict[int, SeenKeypoints]:
     rows = np.flatnonzero(tracks.frames == frame)
     people = dict(zip(tracks.persons[rows].tolist(), tracks.positions[rows], strict=True))
-    return see_keypoints(rig, [given[:, _OF_BODY] for given in cues.source.frame(frame)], people, cues.scatter_m)
+    return see_keypoints(rig, body_detections(cues.source, frame), people, cues.scatter_m)
 
 
 def learn_scatter(rig: Rig, tracks: TrackTable, source: KeypointSource) -> KeypointCues:
@@ -96,7 +95,7 @@ def learn_scatter(rig: Rig, tracks: TrackTable, source: KeypointSource) -> Keypo
     missed: list[list[list[float]]] = [[[] for _ in BODY_KEYPOINTS] for _ in rig]
     for frame in spread_frames(np.unique(tracks.frames), LEARNING_FRAMES):
         for seen in _seen(rig, tracks, cues, frame).values():
-            off = np.einsum("kij,kj->ki", seen.across, seen.points[seen.keypoint] - seen.centre)
+            off = seen.missed(seen.points)
             cameras = np.bincount(seen.keypoint, minlength=len(BODY_KEYPOINTS))[seen.keypoint]
             # The point was fitted to the line too: it is as much nearer as one of so many lines pulls it.
             squared = (off**2).sum(axis=1) / np.maximum(1 - 1.5 / np.maximum(cameras, 2), 0.25)
@@ -151,8 +150,3 @@ def learn_beside(found: Sequence[np.ndarray], hull_costs: Sequence[float]) -> Be
     deviation = np.sqrt(believed * error**2 + (1 - believed) * BESIDE_M**2)
     deviation = np.minimum(np.hypot(deviation, np.maximum(scatter, LEARNT_M)), 2 * BESIDE_M)
     return Beside(believed[:, None] * middle, np.where(told > 0, deviation, BESIDE_M), worth)
-
-
-def spread_frames(frames: np.ndarray, most: int) -> list[int]:
-    """So many frames at most, well spread."""
-    return frames[np.unique(np.linspace(0, len(frames) - 1, min(most, len(frames))).round().astype(int))].tolist()

@@ -10,13 +10,12 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from hmc.body.keypoint_places import BODY_KEYPOINTS
 from hmc.io.journal import append_journal, open_journal
-from hmc.io.keypoints.layouts import KEYPOINTS
 from hmc.io.keypoints.source import KeypointSource
 from hmc.io.recording import Recording
 from hmc.io.results import TrackTable
 from hmc.pose.views.keypoint_groups import find_people
+from hmc.pose.views.keypoints import body_detections
 from hmc.tracking.tracks import fill_gaps, renumber
 from hmc.voxels.run_options import RunOptions
 
@@ -26,7 +25,6 @@ __all__ = ["link_people", "tracks_of_keypoints"]
 ERROR_M, SPEED_M_S = 0.3, 4.0
 #: A person who is not found for longer is another one afterwards; who is there for less is nobody. Seconds.
 GAP_S, LEAST_S = 1.0, 0.5
-_OF_BODY = [KEYPOINTS.index(name) for name in BODY_KEYPOINTS]
 
 
 def tracks_of_keypoints(recording: Recording, source: KeypointSource, run: RunOptions | None = None) -> TrackTable:
@@ -58,7 +56,7 @@ def tracks_of_keypoints(recording: Recording, source: KeypointSource, run: RunOp
     first, end = recording.start + len(records), recording.start + recording.n_frames
     frames: Iterable = range(first, end)
     for frame in run.progress(frames, end - first) if run.progress and first < end else frames:
-        found = find_people(recording.rig, [given[:, _OF_BODY] for given in source.frame(frame)], room, recording.persons)
+        found = find_people(recording.rig, body_detections(source, frame), room, recording.persons)
         records.append({"frame": frame, "positions": found.positions.tolist(), "heads": found.heads.tolist()})
         if run.journal is not None:
             append_journal(run.journal, records[-1])

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hmc.body.keypoint_places import BODY_KEYPOINTS, KEYPOINT_SEGMENTS, keypoint_places
+from hmc.body.keypoint_places import BODY_KEYPOINTS, keypoint_places, place_keypoints
 from hmc.body.kinematics import segment_transforms
 from hmc.body.model import BodyModel
 from hmc.body.proportions import make_bodies
@@ -53,8 +53,7 @@ def agreeing_cameras(body: BodyModel, state: np.ndarray, seen: SeenKeypoints) ->
         In the order of `hmc.landmarks.LANDMARKS`.
     """
     rotations, positions = segment_transforms(body, state)
-    places = positions[KEYPOINT_SEGMENTS] + np.einsum("kij,kj->ki", rotations[KEYPOINT_SEGMENTS], keypoint_places(body))
-    missed = np.einsum("kij,kj->ki", seen.across, places[seen.keypoint] - seen.centre)
+    missed = seen.missed(place_keypoints(rotations, positions, keypoint_places(body)))
     agrees = np.linalg.norm(missed, axis=1) < MEET * np.hypot(seen.deviation_m, BESIDE_M[seen.keypoint])
     cameras = np.bincount(seen.keypoint[agrees], minlength=len(BODY_KEYPOINTS))
     return np.array(

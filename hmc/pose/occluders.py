@@ -22,6 +22,7 @@ from hmc.body.kinematics import segment_transforms
 from hmc.body.proportions import make_bodies
 from hmc.camera.model import Camera, Rig
 from hmc.io.masks import MaskStep, kept_frames
+from hmc.io.recording import spread_frames
 from hmc.io.results import PoseStates
 from hmc.voxels.carving import pixel_of_voxel
 from hmc.voxels.grid import VoxelGrid
@@ -122,10 +123,9 @@ def learn_hidden_places(rig: Rig, grid: VoxelGrid, run: RunOptions, states: Pose
         None where nothing is hidden, as far as these poses tell.
     """
     posed = np.isfinite(states.states).all(axis=1)
-    frames = np.unique(states.frames[posed])
-    frames = frames[np.unique(np.linspace(0, len(frames) - 1, min(MOST_FRAMES, len(frames))).round().astype(int))]
-    steps = kept_frames(run.masks or "", run.key, frames.tolist())
-    if steps is None or not len(frames):
+    frames = spread_frames(np.unique(states.frames[posed]), MOST_FRAMES)
+    steps = kept_frames(run.masks or "", run.key, frames)
+    if steps is None or not frames:
         return None
     bodies = make_bodies(states.bodies)
     skin = {}

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from hmc.body.joints import N_DOF
-from hmc.body.keypoint_places import BODY_KEYPOINTS, KEYPOINT_PART, KEYPOINT_SEGMENTS, keypoint_places
-from hmc.body.kinematics import dof_masks, joint_twists, segment_transforms
+from hmc.body.keypoint_places import BODY_KEYPOINTS, KEYPOINT_PART, KEYPOINT_SEGMENTS, keypoint_places, place_keypoints
+from hmc.body.kinematics import dof_masks, joint_twists, point_motions, segment_transforms
 from hmc.body.model import PARTS, BodyModel
 from hmc.pose.views.keypoints import SCATTER_M, SeenKeypoints
 
@@ -77,10 +77,7 @@ class _MissesAt:
 
     def pulls(self) -> tuple[np.ndarray, np.ndarray]:
         """All residuals, and how they change with the state, shape (2 n, 33)."""
-        (x, y, z), (u, v, w) = self.axes.T, (self.places[:, None] - self.centres).transpose(2, 0, 1)
-        moves = np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=1)
-        moves[:, :, :3] = np.eye(3)
-        moves *= _MASKS[:, None]
+        moves = point_motions(self.axes, self.centres, self.places, _MASKS)
         return np.arange(len(self.residuals)), (self.directions @ moves[self.keypoint]).reshape(-1, N_DOF)
 
 
@@ -112,8 +109,8 @@ class KeypointCost:
     def linearise(self, state: np.ndarray, near: Any = None) -> _MissesAt:
         """Residuals at one state (33,), two a line."""
         axes, centres, rotations, positions = joint_twists(self.body, state)
-        places = _placed(rotations, positions, self._local())
-        missed = np.einsum("kij,kj->ki", self.seen.across, places[self.seen.keypoint] - self.seen.centre)
+        places = place_keypoints(rotations, positions, self._local())
+        missed = self.seen.missed(places)
         deviation, wide2 = self._deviation(), self.settings.wide**2
         squared = np.maximum((missed**2).sum(axis=1) / deviation**2, 1e-12)
         # The gradient of the cost is that of these residuals with these jacobians; what a miss's weight changes is left out.
@@ -144,13 +141,7 @@ class KeypointCost:
 
     def _by_line(self, states: np.ndarray) -> np.ndarray:
         rotations, positions = segment_transforms(self.body, states)
-        places = _placed(rotations, positions, self._local())
-        missed = np.einsum("kij,nkj->nki", self.seen.across, places[:, self.seen.keypoint] - self.seen.centre)
+        places = place_keypoints(rotations, positions, self._local())
+        missed = self.seen.missed(places)
         wide2 = self.settings.wide**2
         return wide2 * np.log1p((missed**2).sum(axis=-1) / self._deviation() ** 2 / wide2)
-
-
-def _placed(rotations: np.ndarray, positions: np.ndarray, local: np.ndarray) -> np.ndarray:
-    """Keypoints in the world, shape (..., 15, 3)."""
-    turned = (rotations[..., KEYPOINT_SEGMENTS, :, :] @ local[..., None])[..., 0]
-    return positions[..., KEYPOINT_SEGMENTS, :] + turned

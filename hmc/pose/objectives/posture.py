@@ -12,11 +12,11 @@ import numpy as np
 
 from hmc.body.cone_maps import cone_maps
 from hmc.body.joints import N_DOF
-from hmc.body.kinematics import dof_masks, joint_twists, segment_transforms
+from hmc.body.kinematics import dof_masks, joint_twists, point_motions, segment_transforms
 from hmc.body.model import PART_OF_DOF, PART_OF_SEGMENT, PARTS, BodyModel
 from hmc.body.penetration import AxisPoints, penetration_depth, penetration_rows
 from hmc.body.prior import POSTURE, posture_spread
-from hmc.pose.objectives.symmetric import BodyPoints
+from hmc.pose.objectives.symmetric import BodyPoints, SymmetricSettings
 
 __all__ = ["PostureCost", "PostureSettings"]
 
@@ -25,7 +25,7 @@ _MASKS = dof_masks().astype(float)
 
 @dataclass(frozen=True)
 class PostureSettings:
-    """Weights of the posture's cost.
+    """Weights of the posture's cost; those of the symmetric one by default.
 
     Parameters
     ----------
@@ -35,8 +35,8 @@ class PostureSettings:
         Weight of parts that reach into one another.
     """
 
-    posture_weight: float = 3e-6
-    overlap_weight: float = 2.0
+    posture_weight: float = SymmetricSettings.posture_weight
+    overlap_weight: float = SymmetricSettings.overlap_weight
 
 
 @dataclass(frozen=True)
@@ -90,11 +90,9 @@ class PostureCost:
         weight, angle = np.sqrt(self.settings.overlap_weight / len(depth)), np.sqrt(self.settings.posture_weight)
         spread = posture_spread(state)
         deep = np.flatnonzero(depth)
-        moves = np.cross(axes, points[deep][:, None] - centres)
-        moves[:, :3] = np.eye(3)
         # What carries both parts leaves them where they are to one another.
-        relative = _MASKS[segment[deep]] - _MASKS[other[deep]]
-        pushed = -weight * np.einsum("ndi,ni->nd", moves, outward[deep]) * relative
+        moves = point_motions(axes, centres, points[deep], _MASKS[segment[deep]] - _MASKS[other[deep]])
+        pushed = -weight * np.einsum("nid,ni->nd", moves, outward[deep])
         return _PostureAt(
             np.concatenate([weight * depth, angle * (state - POSTURE[0]) / spread]),
             np.concatenate([pushed, np.diag(angle / spread)]),

@@ -17,8 +17,10 @@ from scipy.optimize import linear_sum_assignment
 from hmc.body.keypoint_places import BODY_KEYPOINTS, MIRRORED
 from hmc.camera.epipolar import undistorted_pixels
 from hmc.camera.model import Camera, Rig, project
+from hmc.io.keypoints.layouts import KEYPOINTS
+from hmc.io.keypoints.source import KeypointSource
 
-__all__ = ["MEET", "SCATTER_M", "SeenKeypoints", "lines_of", "meeting_points", "see_keypoints", "sight_lines"]
+__all__ = ["MEET", "SCATTER_M", "SeenKeypoints", "body_detections", "lines_of", "meeting_points", "see_keypoints", "sight_lines"]
 
 N_KEYPOINTS = len(BODY_KEYPOINTS)
 #: Standard deviation of a detection across its line of sight before anything was learnt, metres.
@@ -32,6 +34,7 @@ MEET = 3.0
 #: A camera is turned, left for right, where that lowers its distances from the others' points to this share.
 TURN_SHARE = 0.5
 _TRUNK = [BODY_KEYPOINTS.index(name) for name in ("l_shoulder", "r_shoulder", "l_hip", "r_hip")]
+_OF_BODY = [KEYPOINTS.index(name) for name in BODY_KEYPOINTS]
 
 
 @dataclass(frozen=True)
@@ -59,6 +62,10 @@ class SeenKeypoints:
     deviation_m: np.ndarray
     points: np.ndarray
 
+    def missed(self, places: np.ndarray) -> np.ndarray:
+        """How far each line passes its keypoint by, in the two directions across it, metres: (..., 15, 3) to (..., n, 2)."""
+        return np.einsum("kij,...kj->...ki", self.across, places[..., self.keypoint, :] - self.centre)
+
     def of(self, chosen: np.ndarray) -> SeenKeypoints:
         """Some of the lines, by a bool array of shape (n,)."""
         return replace(
@@ -69,6 +76,11 @@ class SeenKeypoints:
             across=self.across[chosen],
             deviation_m=self.deviation_m[chosen],
         )
+
+
+def body_detections(source: KeypointSource, frame: int) -> list[np.ndarray]:
+    """A frame's detections of what a body can say the place of, one array a camera, shape (n_people, 15, 3)."""
+    return [given[:, _OF_BODY] for given in source.frame(frame)]
 
 
 def sight_lines(camera: Camera, uv: np.ndarray) -> np.ndarray:
@@ -103,7 +115,7 @@ def see_keypoints(
         for person, k in _assigned(camera, given, people).items():
             own[person][c] = given[k]
     scatter = np.full((len(rig), N_KEYPOINTS), SCATTER_M) if scatter_m is None else scatter_m
-    seen = {person: _seen(rig, given, people[person], scatter) for person, given in own.items()}
+    seen = {person: _seen(rig, given, scatter) for person, given in own.items()}
     return {person: one for person, one in seen.items() if one is not None}
 
 
@@ -132,7 +144,7 @@ def _middle(one: np.ndarray) -> np.ndarray:
     return one[told, :2].mean(axis=0) if told.any() else np.full(2, np.nan)
 
 
-def _seen(rig: Rig, given: Sequence[np.ndarray | None], place: np.ndarray, scatter: np.ndarray) -> SeenKeypoints | None:
+def _seen(rig: Rig, given: Sequence[np.ndarray | None], scatter: np.ndarray) -> SeenKeypoints | None:
     """One person's detections as lines of sight, turned where left and right are exchanged."""
     lines = [lines_of(camera, one) for camera, one in zip(rig, given, strict=True)]
     directions = np.array([line[0] for line in lines])
