@@ -57,6 +57,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     # FFmpeg's own complaints about a damaged video would bury the one line that says which; OpenCV reads these on its first use.
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
     os.environ.setdefault("OPENCV_LOG_LEVEL", "ERROR")
+    # Matrices are small here: threads of linear algebra would wait for one another, and results would depend on how many there are.
+    for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
     argv = list(sys.argv[1:] if argv is None else argv)
     parser = make_parser(argv[0] if argv else None)
     args = parser.parse_args(argv)

@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 __all__ = [
     "add_plugin_option",
     "add_selection_options",
+    "add_workers_option",
     "camera_names",
     "gather_problems",
     "load_given_plugins",
@@ -19,6 +20,7 @@ __all__ = [
     "print_problems",
     "progress",
     "recording_source",
+    "selected_workers",
     "was_finished",
     "whole_number",
 ]
@@ -47,6 +49,24 @@ def add_selection_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--frames", type=whole_number, default=None, metavar="N", help="how many frames (default: all)")
     parser.add_argument("--cameras", type=camera_names, default=None, metavar="A,B,...", help="use these cameras only (default: all)")
     parser.add_argument("--quiet", action="store_true", help="no progress bar")
+
+
+def add_workers_option(parser: argparse.ArgumentParser) -> None:
+    """Add ``--workers``."""
+    parser.add_argument(
+        "--workers",
+        type=whole_number,
+        default=0,
+        metavar="N",
+        help="processes, which share the work (default: as many as there are processors); the result does not depend on it",
+    )
+
+
+def selected_workers(args: argparse.Namespace) -> int:
+    """How many processes ``--workers`` asks for."""
+    from hmc.processes import available_processors
+
+    return args.workers or available_processors()
 
 
 def add_plugin_option(parser: argparse.ArgumentParser) -> None:

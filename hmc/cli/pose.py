@@ -9,6 +9,7 @@ from typing import Any
 from hmc.cli.common import (
     add_plugin_option,
     add_selection_options,
+    add_workers_option,
     gather_problems,
     load_given_plugins,
     open_selected,
@@ -16,6 +17,7 @@ from hmc.cli.common import (
     print_problems,
     progress,
     recording_source,
+    selected_workers,
     was_finished,
     whole_number,
 )
@@ -47,6 +49,7 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
         "when it is started again; a finished one is not repeated unless the recording or a parameter changed.",
     )
     add_selection_options(parser)
+    add_workers_option(parser)
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the result")
     parser.add_argument(
         "--method",
@@ -171,7 +174,13 @@ def run(args: argparse.Namespace) -> int:
         """The run of a stage; the tracker leaves its silhouettes for the poses."""
         masks = args.out / MASKS if hulls else None
         return RunOptions(
-            frontend, args.out / journal, masks, key, problems.append, lambda steps, total: progress(steps, total, what, args.quiet)
+            frontend,
+            args.out / journal,
+            masks,
+            key,
+            problems.append,
+            lambda steps, total: progress(steps, total, what, args.quiet),
+            selected_workers(args),
         )
 
     tracks = None

@@ -9,6 +9,7 @@ from typing import Any
 from hmc.cli.common import (
     add_plugin_option,
     add_selection_options,
+    add_workers_option,
     gather_problems,
     load_given_plugins,
     open_selected,
@@ -16,6 +17,7 @@ from hmc.cli.common import (
     print_problems,
     progress,
     recording_source,
+    selected_workers,
     was_finished,
     whole_number,
 )
@@ -36,6 +38,7 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
         "unless the recording or a parameter changed.",
     )
     add_selection_options(parser)
+    add_workers_option(parser)
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the result")
     add_tracker_options(parser)
     add_plugin_option(parser)
@@ -138,6 +141,7 @@ def run(args: argparse.Namespace) -> int:
         key=key,
         on_problem=problems.append,
         progress=lambda steps, total: progress(steps, total, "track", args.quiet),
+        workers=selected_workers(args),
     )
     table = track_recording(recording, args.voxel, tracker, args.seed, run, timings.append)
     write_tracks(tracks_path, table)

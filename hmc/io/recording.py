@@ -10,7 +10,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +22,7 @@ from hmc.io.calibration import build_camera, read_entries
 from hmc.io.footage import Footage, find_footage, number_images, read_footage, starting_at
 from hmc.io.settings import read_settings
 
-__all__ = ["Frame", "Recording", "background_frames", "iterate_frames", "open_recording", "spread_frames"]
+__all__ = ["Frame", "Recording", "background_frames", "iterate_frames", "only_cameras", "open_recording", "spread_frames"]
 
 logger = logging.getLogger("hmc")
 
@@ -250,6 +250,15 @@ def iterate_frames(
         for reader in readers:
             if hasattr(reader, "close"):
                 reader.close()
+
+
+def only_cameras(recording: Recording, cameras: Sequence[int]) -> Recording:
+    """The same selection of some cameras alone, by their places in ``recording.rig``; room and frames stay."""
+    footage, silhouettes, background = (
+        tuple(views[c] for c in cameras) for views in (recording._footage, recording._silhouettes, recording._background)
+    )
+    rig = Rig(tuple(recording.rig[c] for c in cameras))
+    return replace(recording, rig=rig, _footage=footage, _silhouettes=silhouettes, _background=background)
 
 
 def to_mask(image: np.ndarray, view: Footage) -> np.ndarray:

@@ -16,7 +16,7 @@ The second and the third go on where they were when a run was stopped; the other
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -44,6 +44,7 @@ from hmc.pose.steps.proposal import shows_enough
 from hmc.pose.steps.refine import refine
 from hmc.pose.views.keypoint_pose import keypoint_pose
 from hmc.pose.views.person_view import PersonView, views_of
+from hmc.processes import each_ahead
 from hmc.tracking.resumable import person_grid
 from hmc.voxels.hulls import stream_hulls
 from hmc.voxels.run_options import RunOptions
@@ -149,8 +150,11 @@ class _Pass:
     bodies: Mapping[int, BodyModel]
     places: HiddenPlaces | None
 
-    def views(self, frames: Iterable[int]) -> Iterator[tuple[int, dict[int, PersonView]]]:
+    def views(self, frames: Sequence[int]) -> Iterator[tuple[int, dict[int, PersonView]]]:
         """What some frames show of all people, in any order, by what the first pass tells of the scene and of the others' poses."""
+        return each_ahead(self._views, frames, self.run.workers)
+
+    def _views(self, frames: Sequence[int]) -> Iterator[tuple[int, dict[int, PersonView]]]:
         grid = person_grid(self.recording, self.options.voxel_size_m)
         masks = kept_frames(self.run.masks or "", self.run.key, frames)
         for hull in stream_hulls(self.recording, grid, self.run.frontend, masks=masks):

@@ -17,7 +17,7 @@ from hmc.body.joints import DOF_NAMES
 from hmc.body.kinematics import landmark_masks, landmarks
 from hmc.errors import InputError
 from hmc.io.detections import DetectionTable
-from hmc.io.masks import keep_masks
+from hmc.io.masks import MaskStep, keep_masks
 from hmc.io.recording import Recording
 from hmc.io.results import PoseStates, PoseTable, TrackTable, write_joints, write_pose
 from hmc.landmarks import LANDMARKS
@@ -27,10 +27,10 @@ from hmc.pose.person import DecidedFrames, PersonState, PersonTrack, PoseTask, p
 from hmc.pose.records import keep_decided, kept_decided
 from hmc.pose.views.markers import marker_views, seen_in_frame
 from hmc.pose.views.person_view import IMAGES_FOR, PersonView, check_needs, views_of
+from hmc.processes import ahead
 from hmc.tracking.resumable import WARM_UP_FRAMES, kept_silhouettes, person_grid
 from hmc.tracking.tracks import velocities
-from hmc.voxels.grid import VoxelGrid
-from hmc.voxels.hulls import HullStep, stream_hulls
+from hmc.voxels.hulls import stream_hulls, stream_masks
 from hmc.voxels.run_options import RunOptions
 
 __all__ = ["FollowOptions", "PosedPeople", "follow", "only_person", "persons_of", "unfitted_notes"]
@@ -199,17 +199,21 @@ def _views_from(
             yield _with_markers(blank, recording, method, options)
         return
     grid = person_grid(recording, options.voxel_size_m)
-    hulls: Iterable = _hulls_from(recording, grid, run, first, bool(method.needs & IMAGES_FOR))
-    for hull in run.progress(hulls, end - first) if run.progress else hulls:
-        views = with_keypoints(views_of(recording, grid, tracks, hull, method.needs), recording.rig, tracks, cues)
-        yield _with_markers(views, recording, method, options)
+
+    def seen(masks: Iterable[MaskStep]) -> Iterator[dict[int, PersonView]]:
+        for hull in stream_hulls(recording, grid, run.frontend, masks=masks):
+            views = with_keypoints(views_of(recording, grid, tracks, hull, method.needs), recording.rig, tracks, cues)
+            yield _with_markers(views, recording, method, options)
+
+    kept = kept_silhouettes(recording, run, first, bool(method.needs & IMAGES_FOR))
+    views = seen(_new_masks(recording, run, first)) if kept is None else ahead(lambda: seen(kept), run.workers)
+    yield from run.progress(views, end - first) if run.progress else views
 
 
-def _hulls_from(recording: Recording, grid: VoxelGrid, run: RunOptions, first: int, images: bool) -> Iterator[HullStep]:
-    """Hulls from a frame on, of the silhouettes that were kept, where they were; otherwise these are kept now."""
-    kept = kept_silhouettes(recording, run, first, images)
-    stream = stream_hulls(recording, grid, run.frontend, first=first, warm_up=WARM_UP_FRAMES, masks=kept, on_problem=run.on_problem)
-    return stream if kept is not None or run.masks is None else keep_masks(run.masks, run.key, first, stream, run.on_problem)
+def _new_masks(recording: Recording, run: RunOptions, first: int) -> Iterator[MaskStep]:
+    """Silhouettes from a frame on, made now and kept where they are to be."""
+    stream = stream_masks(recording, run.frontend, first=first, warm_up=WARM_UP_FRAMES, on_problem=run.on_problem, workers=run.workers)
+    return stream if run.masks is None else keep_masks(run.masks, run.key, first, stream, run.on_problem)
 
 
 def _with_markers(views: dict[int, PersonView], recording: Recording, method: PoseMethod, options: FollowOptions) -> dict[int, PersonView]:

@@ -89,7 +89,9 @@ def track_recording(
         run.on_problem("one camera does not tell how far away people are; two at least are needed to find them, better four")
     end = recording.start + recording.n_frames
     first, kept = done.next_frame, kept_silhouettes(recording, run, done.next_frame, tracker.color)
-    stream = stream_hulls(recording, grid, run.frontend, first=first, warm_up=WARM_UP_FRAMES, masks=kept, on_problem=note)
+    stream = stream_hulls(
+        recording, grid, run.frontend, first=first, warm_up=WARM_UP_FRAMES, masks=kept, on_problem=note, workers=run.workers
+    )
     if run.masks is not None and kept is None:
         stream = keep_masks(run.masks, run.key, first, stream, note)
     hulls: Iterable[HullStep] = stream if done.next_frame < end else ()

@@ -24,7 +24,7 @@ from hmc.camera.segmentation import BackgroundModel, light_gain
 from hmc.voxels.carving import carve, pixels_at
 from hmc.voxels.completion import CompletionTables, doubted_floor, shown
 
-__all__ = ["cut_filled_shadows", "cut_floor_shadows"]
+__all__ = ["cut_filled_shadows", "cut_floor_shadows", "floor_darkness"]
 
 #: Shares of the empty floor's light: from the first on a spot is bare, below the second it is no shadow but something dark.
 BARE, DARKEST = 0.93, 0.5
@@ -81,10 +81,7 @@ def cut_filled_shadows(
 
 
 def cut_floor_shadows(
-    tables: CompletionTables,
-    images: Sequence[np.ndarray | None],
-    models: Sequence[BackgroundModel | None],
-    masks: Sequence[np.ndarray | None],
+    tables: CompletionTables, darkness: Sequence[np.ndarray | None], masks: Sequence[np.ndarray | None]
 ) -> tuple[np.ndarray | None, ...]:
     """Silhouettes without the shadows on the floor.
 
@@ -92,10 +89,8 @@ def cut_floor_shadows(
     ----------
     tables : CompletionTables
         Of the room and the rig.
-    images : sequence of ndarray of uint8, shape (height, width, 3), or None
-        BGR, one a camera.
-    models : sequence of BackgroundModel or None
-        What is known of the empty scene; None of a camera that has other silhouettes.
+    darkness : sequence of ndarray of float32, shape (height, width), or None
+        As from `floor_darkness`, one a camera; None of a camera that does not know the empty scene.
     masks : sequence of ndarray of bool, shape (height, width), or None
 
     Returns
@@ -103,15 +98,11 @@ def cut_floor_shadows(
     tuple of ndarray of bool, shape (height, width), or None
         Each within the mask it came from. With fewer than two cameras that know the empty floor, the masks as they are.
     """
-    darkness = {
-        c: _darkness(image, model, mask)
-        for c, (image, model, mask) in enumerate(zip(images, models, masks, strict=True))
-        if image is not None and model is not None and mask is not None
-    }
-    if len(darkness) < 2:
+    told = {c: values for c, values in enumerate(darkness) if values is not None and masks[c] is not None}
+    if len(told) < 2:
         return tuple(masks)
-    spots, dark = _shadowed(tables, darkness), {}
-    for c, values in darkness.items():
+    spots, dark = _shadowed(tables, told), {}
+    for c, values in told.items():
         pixels = np.flatnonzero(np.asarray(masks[c]))
         pixels = pixels[spots[c].take(tables.pixel_cells[c].ravel().take(pixels))]
         share = values.ravel().take(pixels)
@@ -127,8 +118,22 @@ def cut_floor_shadows(
     return tuple(cut)
 
 
-def _darkness(image: np.ndarray, model: BackgroundModel, mask: np.ndarray) -> np.ndarray:
-    """Logarithm of the share of the empty scene's light that each pixel has, float32; `_OTHER` where it has another color as well."""
+def floor_darkness(image: np.ndarray, model: BackgroundModel, mask: np.ndarray) -> np.ndarray:
+    """How dark each pixel is against the empty scene.
+
+    Parameters
+    ----------
+    image : ndarray of uint8, shape (height, width, 3)
+        BGR.
+    model : BackgroundModel
+    mask : ndarray of bool, shape (height, width)
+        The silhouette: how bright the whole image is, is told beside it.
+
+    Returns
+    -------
+    ndarray of float32, shape (height, width)
+        Logarithm of the share of the empty scene's light; 9 where the pixel has another color as well.
+    """
     color = cv2.GaussianBlur(cv2.cvtColor(image, cv2.COLOR_BGR2YCrCb), (3, 3), 0).astype(np.float32)
     share = np.maximum(color[..., 0], 1) / model.mean[..., 0]
     share /= light_gain(image, model.mean, mask)  # exposure, flicker

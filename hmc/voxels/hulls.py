@@ -15,75 +15,27 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
-from typing import TypeVar
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hmc.camera.segmentation import BackgroundModel, SegmentationSettings, segment_views, train_background
+from hmc.camera.segmentation import BackgroundModel
 from hmc.errors import InputError
 from hmc.io.masks import MaskStep, Report
-from hmc.io.recording import Frame, Recording, background_frames, iterate_frames
+from hmc.io.recording import Recording
 from hmc.voxels.background_initialisation import UnseenPlaces, learn_from_people, with_unseen_places
 from hmc.voxels.carving import CarvingTables, carve_levels, make_tables
 from hmc.voxels.completion import CompletionTables, complete_masks, doubtful_hull, make_completion_tables
 from hmc.voxels.floor_shadows import cut_filled_shadows, cut_floor_shadows
+from hmc.voxels.frontend_settings import FrontendSettings
 from hmc.voxels.grid import VoxelGrid
+from hmc.voxels.looks import Look, look_at
 
 __all__ = ["FrontendSettings", "HullStep", "stream_hulls", "stream_masks"]
 
 logger = logging.getLogger("hmc")
-
-T = TypeVar("T")
-
-SOURCES = ("auto", "silhouettes", "background", "median")
-
-
-@dataclass(frozen=True)
-class FrontendSettings:
-    """Parameters of the chain from images to hulls.
-
-    Attributes
-    ----------
-    segmentation : SegmentationSettings
-    source : {"auto", "silhouettes", "background", "median"}
-        Where the silhouettes come from; a source other than "auto" must be there.
-    background_frames : int
-        At most this many frames of the empty scene are learnt from.
-    median_frames, median_span : int
-        Images of which the median is taken, and the number of frames, around the selection, over which they are spread.
-    complete : bool
-        Whether cameras decide one another's doubtful pixels (`hmc.voxels.completion`).
-    cut_shadows : bool
-        Whether shadows on the floor, on which cameras agree, leave the silhouettes (`hmc.voxels.floor_shadows`).
-    tolerance : int
-        Cameras that may miss a voxel of the tolerant hull. Used where four cameras or more have a silhouette; with fewer, the tolerant
-        hull is the strict one.
-    outside : {"ignore", "carve", "keep"}
-        What a camera says of a voxel that it does not see (`hmc.voxels.carving`).
-    min_views : int, optional
-        Cameras that must see a voxel (`hmc.voxels.carving.carve`).
-    threads : int
-        Threads over which cameras are spread; 0: as many as there are processors. The result does not depend on it.
-    """
-
-    segmentation: SegmentationSettings = field(default_factory=SegmentationSettings)
-    source: str = "auto"
-    background_frames: int = 200
-    median_frames: int = 20
-    median_span: int = 1800
-    complete: bool = True
-    cut_shadows: bool = True
-    tolerance: int = 1
-    outside: str = "ignore"
-    min_views: int | None = None
-    threads: int = 0
-
-    def __post_init__(self) -> None:
-        if self.source not in SOURCES:
-            raise InputError(f"`source` must be one of {', '.join(SOURCES)}; got {self.source!r}")
 
 
 @dataclass(frozen=True)
@@ -113,6 +65,7 @@ def stream_hulls(
     warm_up: int = 0,
     masks: Iterable[MaskStep] | None = None,
     on_problem: Report | None = None,
+    workers: int = 1,
 ) -> Iterator[HullStep]:
     """Silhouettes and hulls of the selected frames, in order.
 
@@ -121,7 +74,7 @@ def stream_hulls(
     recording : Recording
     grid : VoxelGrid
     settings : FrontendSettings, optional
-    first, last, warm_up, on_problem
+    first, last, warm_up, on_problem, workers
         As for `stream_masks`.
     masks : iterable of MaskStep, optional
         Silhouettes that were made before (`hmc.io.masks`), of the frames that are wanted; made here where left out.
@@ -133,7 +86,7 @@ def stream_hulls(
     settings = settings or FrontendSettings()
     tables = make_tables(grid, recording.rig)
     if masks is None:
-        masks = stream_masks(recording, settings, first=first, last=last, warm_up=warm_up, on_problem=on_problem)
+        masks = stream_masks(recording, settings, first=first, last=last, warm_up=warm_up, on_problem=on_problem, workers=workers)
     for step in masks:
         yield HullStep(step.index, step.images, step.masks, step.doubtful, *_hulls(tables, step, settings))
 
@@ -146,6 +99,7 @@ def stream_masks(
     last: int | None = None,
     warm_up: int = 0,
     on_problem: Report | None = None,
+    workers: int = 1,
 ) -> Iterator[MaskStep]:
     """Silhouettes of the selected frames, in order.
 
@@ -160,6 +114,8 @@ def stream_masks(
         reaches the start of the selection, the silhouettes are exactly those of a run from there.
     on_problem : callable, optional
         Called with one line for everything that was survived. By default the line is a warning of the logger "hmc".
+    workers : int
+        Processes; cameras are spread over so many more than this one (`hmc.voxels.looks`). The result does not depend on it.
 
     Yields
     ------
@@ -174,43 +130,67 @@ def stream_masks(
     report = on_problem or logger.warning
     first = recording.start if first is None else first
     start = max(recording.start, first - warm_up)
-    models, places = _learn(recording, settings, report)
+    scene = _empty_scene(recording, settings, report)
     names = recording.rig.names
-    decided_together = (settings.complete or settings.cut_shadows) and any(models)
+    decided_together = (settings.complete or settings.cut_shadows) and any(scene.known)
     tables = make_completion_tables(recording.room, recording.rig) if decided_together else None
     changed: dict[int, int] = {}  # camera whose whole image changed -> the frame in which that began
-    with ThreadPoolExecutor(settings.threads or os.cpu_count() or 1) as pool, ThreadPoolExecutor(1) as reader:
-        for frame in _read_ahead(iterate_frames(recording, start, last, report), reader):
-            masks, models = _segment(frame, models, settings, pool)
-            for c, (image, mask) in enumerate(zip(frame.images, masks, strict=True)):
-                gone = models[c] is not None and image is not None and mask is None
+    with ThreadPoolExecutor(settings.threads or os.cpu_count() or 1) as pool:
+        for look in look_at(recording, scene.models, scene.background, settings, start, last, workers, pool):
+            for line in look.lines:
+                report(line)
+            for c, (image, mask) in enumerate(zip(look.images, look.masks, strict=True)):
+                gone = scene.known[c] and image is not None and mask is None
                 if gone:
-                    changed.setdefault(c, frame.index)
+                    changed.setdefault(c, look.index)
                 elif c in changed:
-                    report(_say_changed(names[c], changed.pop(c), frame.index - 1))
-            if frame.index >= first:
-                if places is not None:
-                    masks = with_unseen_places(places, frame.images, masks, pool)
-                masks, doubtful = _settle(tables, frame, models, masks, settings)
-                yield MaskStep(frame.index, frame.images, masks, doubtful)
+                    report(_say_changed(names[c], changed.pop(c), look.index - 1))
+            if look.index >= first:
+                masks = look.masks
+                if scene.places is not None:
+                    masks = with_unseen_places(scene.places, look.images, masks, pool)
+                masks, doubtful = _settle(tables, replace(look, masks=masks), settings)
+                yield MaskStep(look.index, look.images, masks, doubtful)
         for c, began in changed.items():
-            report(_say_changed(names[c], began, frame.index))
+            report(_say_changed(names[c], began, look.index))
 
 
-def _learn(recording: Recording, settings: FrontendSettings, report: Report) -> tuple[tuple, UnseenPlaces | None]:
-    """What is known of the empty scene, and what of the places where it was never seen; the latter only for cameras that need it."""
+@dataclass(frozen=True)
+class _EmptyScene:
+    """What is known of the empty scene before the first frame.
+
+    Parameters
+    ----------
+    models : mapping of int to BackgroundModel
+        By camera, of those whose scene was learnt from the recording itself.
+    background : frozenset of int
+        Cameras with frames of the empty scene, which are yet to be learnt from.
+    known : tuple of bool
+        Of each camera, whether it is one of these.
+    places : UnseenPlaces or None
+        Where the scene was never seen; only for cameras that need it.
+    """
+
+    models: Mapping[int, BackgroundModel]
+    background: frozenset[int]
+    known: tuple[bool, ...]
+    places: UnseenPlaces | None
+
+
+def _empty_scene(recording: Recording, settings: FrontendSettings, report: Report) -> _EmptyScene:
+    """Where each camera's empty scene is to be learnt from, and what the recording itself tells of it."""
     names, source = recording.rig.names, settings.source
     given = set(range(len(names))) if recording.has_silhouettes and source in ("auto", "silhouettes") else set()
     if source == "silhouettes" and not given:
         raise InputError(f"{recording.path}: there is no folder silhouettes/; put masks there or choose another source")
     models: dict[int, BackgroundModel] = {}
-    places = None
+    places, background = None, set()
     for c in set(range(len(names))) - given if source != "median" else ():
         if recording.n_background_frames[c]:
-            models[c] = train_background(background_frames(recording, c, settings.background_frames), settings.segmentation)
+            background.add(c)
         elif source == "background":
             raise InputError(f"{recording.path}: camera '{names[c]}' has no background frames; add them or choose another source")
-    left = [c for c in range(len(names)) if c not in models and c not in given]
+    left = [c for c in range(len(names)) if c not in background and c not in given]
     if left:
         if not recording.has_images:
             raise InputError(f"{recording.path}: there are no images to find people in; add videos/ or images/")
@@ -219,11 +199,11 @@ def _learn(recording: Recording, settings: FrontendSettings, report: Report) -> 
             "so people who stay where they are may be missed"
         )
         with ThreadPoolExecutor(settings.threads or os.cpu_count() or 1) as pool:
-            learnt, places = learn_from_people(recording, left, settings.segmentation, settings.median_frames, settings.median_span, pool)
-        models |= learnt
+            models, places = learn_from_people(recording, left, settings.segmentation, settings.median_frames, settings.median_span, pool)
         for line in _say_still(places):
             report(line)
-    return tuple(models.get(c) for c in range(len(names))), places
+    known = tuple(c in background or c in models for c in range(len(names)))
+    return _EmptyScene(models, frozenset(background), known, places)
 
 
 def _hulls(tables: CarvingTables, step: MaskStep, settings: FrontendSettings) -> tuple[np.ndarray, ...]:
@@ -238,45 +218,19 @@ def _hulls(tables: CarvingTables, step: MaskStep, settings: FrontendSettings) ->
     return hulls
 
 
-def _segment(frame: Frame, models: tuple, settings: FrontendSettings, pool: ThreadPoolExecutor) -> tuple[tuple, tuple]:
-    """Masks of all cameras and the models after them; ready-made masks where a camera has no model."""
-    ready = frame.silhouettes or (None,) * len(models)
-    ours = [c for c, model in enumerate(models) if model is not None]
-    found, after = segment_views([models[c] for c in ours], [frame.images[c] for c in ours], settings.segmentation, pool)
-    masks, models = list(ready), tuple(models)
-    for c, mask in zip(ours, found, strict=True):
-        masks[c] = mask
-    new = dict(zip(ours, after, strict=True))
-    return tuple(masks), tuple(new.get(c) for c in range(len(models)))
-
-
-def _settle(tables: CompletionTables | None, frame: Frame, models: tuple, masks: tuple, settings: FrontendSettings) -> tuple[tuple, tuple]:
+def _settle(tables: CompletionTables | None, look: Look, settings: FrontendSettings) -> tuple[tuple, tuple]:
     """Silhouettes after the cameras settled one another's doubts, and the doubts of frames in which much is left to doubt."""
+    masks, doubtful = look.masks, look.doubtful
     none, much = (None,) * len(masks), False
     if tables is None:
         return masks, none
-    doubtful = tuple(None if model is None else model.doubtful for model in models)
     if settings.cut_shadows:
-        filled = tuple(None if model is None else model.filled for model in models)
-        masks = cut_filled_shadows(tables, masks, filled, doubtful)
+        masks = cut_filled_shadows(tables, masks, look.filled, doubtful)
     if settings.complete:
         masks, much = complete_masks(tables, masks, doubtful)
     if much:  # people who look like what is around them: what is dark on the floor there may be their shoes
         return masks, doubtful
-    return cut_floor_shadows(tables, frame.images, models, masks) if settings.cut_shadows else masks, none
-
-
-def _read_ahead(items: Iterable[T], reader: ThreadPoolExecutor) -> Iterator[T]:
-    """Pass items on, with the next one being read meanwhile."""
-    iterator = iter(items)
-    done = object()
-    coming = reader.submit(next, iterator, done)
-    try:
-        while (item := coming.result()) is not done:
-            coming = reader.submit(next, iterator, done)
-            yield item  # type: ignore[misc]
-    finally:
-        coming.cancel()
+    return cut_floor_shadows(tables, look.darkness, masks) if settings.cut_shadows else masks, none
 
 
 def _say_still(places: UnseenPlaces) -> Iterator[str]:

@@ -30,6 +30,8 @@ class RunOptions:
         Called with one line for everything that was survived.
     progress : callable, optional
         ``progress(steps, total)`` passes the frames on and may show how far they are.
+    workers : int
+        Processes over which the work is spread, where they may be forked (`hmc.processes`). The result does not depend on it.
     """
 
     frontend: FrontendSettings | None = None
@@ -38,3 +40,4 @@ class RunOptions:
     key: str = ""
     on_problem: Callable[[str], None] = field(default=logging.getLogger("hmc").warning)
     progress: Callable[[Iterable, int], Iterable] | None = None
+    workers: int = 1

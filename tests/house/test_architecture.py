@@ -19,7 +19,7 @@ MAX_LINES = 500
 BASE = {"errors", "landmarks"}
 CAMERA = BASE | {"camera"}
 IO = CAMERA | {"io"}
-VOXELS = IO | {"voxels"}
+VOXELS = IO | {"processes", "voxels"}
 TRACKING = VOXELS | {"search", "tracking"}
 BODY = CAMERA | {"search", "body"}
 VIEWS = TRACKING | BODY | {"pose.spectral", "pose.views"}
@@ -72,6 +72,7 @@ MAY_IMPORT = {
     "view": VIEW | {"callable_package"},
     "synthetic": IO | BODY | {"synthetic"},
     "plugins": BASE,
+    "processes": set(),
     "experiments": EVERYTHING,
     "api": EVERYTHING,
     "callable_package": set(),  # finds `api` by its name, once it is called

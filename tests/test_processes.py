@@ -1,0 +1,157 @@
+"""Generators that run ahead in a process, and tasks that are shared out: the same items as without, and ends that leave nothing behind."""
+
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from hmc import processes
+from hmc.errors import InputError
+from hmc.processes import ahead, available_processors, may_fork, share_out
+
+pytestmark = pytest.mark.skipif(not may_fork(), reason="processes are forked on Linux alone")
+
+
+def drawn(n=20):
+    rng = np.random.default_rng(1)
+    for k in range(n):
+        yield {"k": k, "mask": rng.random((30, 40)) > 0.5, "none": None, "empty": np.zeros((0, 3)), "turned": rng.random((5, 4)).T}
+
+
+def same(one, other):
+    return all(np.array_equal(one[name], other[name]) if isinstance(one[name], np.ndarray) else one[name] == other[name] for name in one)
+
+
+@pytest.mark.parametrize("item_bytes", [1 << 20, 1000, 16])
+def test_items_are_the_same_whether_they_fit_into_shared_memory_or_not(item_bytes):
+    found = 0
+    for one, other in zip(drawn(), ahead(drawn, item_bytes=item_bytes), strict=True):
+        assert same(one, other)
+        found += 1
+    assert found == 20
+    assert not multiprocessing.active_children()
+
+
+def test_items_are_made_in_another_process_and_with_one_worker_in_this():
+    assert next(iter(ahead(lambda: iter([os.getpid()])))) != os.getpid()
+    assert list(ahead(lambda: iter([os.getpid()]), workers=1)) == [os.getpid()]
+
+
+def test_no_more_items_wait_than_there_is_room_for():
+    made = multiprocessing.get_context("fork").Value("q", 0)
+
+    def count():
+        for k in range(50):
+            made.value = k + 1
+            yield np.full(1000, k)
+
+    taken = ahead(count)
+    for k in range(10):
+        assert next(taken)[0] == k
+        time.sleep(0.01)
+        assert made.value <= k + 1 + processes.DEPTH
+    taken.close()
+    assert not multiprocessing.active_children()
+
+
+def test_what_is_raised_there_is_raised_here():
+    def wrong():
+        yield 1
+        raise InputError("cam_00.mp4: no frame")
+
+    taken = ahead(wrong)
+    assert next(taken) == 1
+    with pytest.raises(InputError, match=r"cam_00\.mp4: no frame"):
+        next(taken)
+    with pytest.raises(InputError, match="third"):
+        share_out([lambda: 1, lambda: 2, lambda: (_ for _ in ()).throw(InputError("third"))])
+
+
+def test_an_exception_that_cannot_be_sent_is_told_by_its_words():
+    class Odd(Exception):
+        pass
+
+    def wrong():
+        raise Odd("unheard of")
+        yield
+
+    with pytest.raises(RuntimeError, match="Odd: unheard of"):
+        list(ahead(wrong))
+
+
+def test_a_worker_that_is_killed_is_told():
+    def gone():
+        yield 1
+        os.kill(os.getpid(), signal.SIGKILL)
+        yield 2
+
+    with pytest.raises(ChildProcessError, match="exit code -9"):
+        list(ahead(gone))
+    with pytest.raises(ChildProcessError, match="exit code -9"):
+        here = os.getpid()
+        share_out([lambda: time.sleep(0.05) if os.getpid() == here else os.kill(os.getpid(), signal.SIGKILL)] * 8)
+
+
+@pytest.mark.parametrize("workers", [1, 2, 5])
+def test_results_come_in_the_order_of_the_tasks(workers):
+    tasks = [lambda k=k: (k, np.full(40_000, k)) for k in range(9)]
+    for k, (number, values) in enumerate(share_out(tasks, workers)):
+        assert number == k and (values == k).all()
+    assert share_out([], workers) == []
+
+
+def test_workers_do_not_fork_again():
+    assert share_out([lambda: may_fork()] * 2, 2)[0] in (True, False)
+    assert list(ahead(lambda: iter([may_fork()]))) == [False]
+    # What would be shared out there is done there.
+    assert list(ahead(lambda: iter(share_out([os.getpid, os.getpid], 2)))) != [os.getpid(), os.getpid()]
+
+
+def test_opencv_and_linear_algebra_go_on_on_both_sides_of_a_fork():
+    image = np.random.default_rng(0).integers(0, 255, (1200, 1600, 3)).astype(np.uint8)
+    square = np.random.default_rng(0).random((400, 400))
+    before, threads = cv2.GaussianBlur(image, (9, 9), 0), cv2.getNumThreads()
+    product = square @ square
+
+    def blurred():
+        yield cv2.GaussianBlur(image, (9, 9), 0), square @ square
+
+    for there, there_product in ahead(blurred):
+        assert np.array_equal(there, before) and np.allclose(there_product, product)
+    assert np.array_equal(cv2.GaussianBlur(image, (9, 9), 0), before)
+    assert cv2.getNumThreads() == threads
+
+
+def test_workers_end_when_the_process_that_asked_is_killed(tmp_path: Path):
+    script = tmp_path / "asks.py"
+    script.write_text(
+        "import os, sys, time\n"
+        "from hmc.processes import ahead\n"
+        "def endless():\n"
+        "    while True:\n"
+        "        yield os.getpid()\n"
+        "print(next(ahead(endless)), flush=True)\n"
+        "time.sleep(60)\n"
+    )
+    # The generator is kept by a name, or it would be closed.
+    script.write_text(script.read_text().replace("print(next(ahead(endless))", "taken = ahead(endless)\nprint(next(taken)"))
+    with subprocess.Popen([sys.executable, str(script)], stdout=subprocess.PIPE, text=True) as asking:
+        worker = int(asking.stdout.readline())
+        asking.kill()
+    for _ in range(100):
+        if not Path(f"/proc/{worker}").exists() or "Z" in Path(f"/proc/{worker}/stat").read_text().split()[2]:
+            return
+        time.sleep(0.05)
+    os.kill(worker, signal.SIGKILL)
+    raise AssertionError("the worker was left behind")
+
+
+def test_as_many_processors_as_this_process_may_use():
+    assert 1 <= available_processors() <= (os.cpu_count() or 1)
