@@ -104,9 +104,9 @@ def each_ahead(make: Callable[[Sequence[K]], Iterable[T]], keys: Sequence[K], wo
         Gives an item of each key that it is given, in order; an item depends on its own key alone.
     keys : sequence
     workers : int
-        Processes, at most, this one among them, which makes none itself where there are others.
+        Processes that make items, at most; this one, which takes them, mostly waits for them.
     """
-    n = max(1, min(workers - 1, len(keys)))
+    n = max(1, min(workers, len(keys)))
     with ExitStack() as stack:
         parts = [stack.enter_context(closing(ahead(partial(make, keys[k::n]), workers))) for k in range(n)]  # type: ignore[type-var]
         for k in range(len(keys)):

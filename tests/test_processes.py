@@ -14,7 +14,7 @@ import pytest
 
 from hmc import processes
 from hmc.errors import InputError
-from hmc.processes import ahead, available_processors, may_fork, share_out
+from hmc.processes import ahead, available_processors, each_ahead, may_fork, share_out
 
 pytestmark = pytest.mark.skipif(not may_fork(), reason="processes are forked on Linux alone")
 
@@ -56,7 +56,7 @@ def test_no_more_items_wait_than_there_is_room_for():
     for k in range(10):
         assert next(taken)[0] == k
         time.sleep(0.01)
-        assert made.value <= k + 1 + processes.DEPTH
+        assert made.value <= k + 2 + processes.DEPTH
     taken.close()
     assert not multiprocessing.active_children()
 
@@ -105,6 +105,26 @@ def test_results_come_in_the_order_of_the_tasks(workers):
     for k, (number, values) in enumerate(share_out(tasks, workers)):
         assert number == k and (values == k).all()
     assert share_out([], workers) == []
+
+
+@pytest.mark.parametrize("workers", [1, 2, 3, 9])
+def test_items_come_in_the_order_of_their_keys(workers):
+    keys = range(30, 23, -1)
+    found = list(each_ahead(lambda own: ((key, np.full(100, key)) for key in own), keys, workers))
+    assert [key for key, _ in found] == list(keys)
+    assert all((values == key).all() for key, values in found)
+    assert list(each_ahead(lambda own: iter(own), [], workers)) == []
+
+
+def test_items_that_are_kept_stay_as_they_were_and_lent_ones_do_not_cost_a_copy():
+    def squares():
+        for k in range(12):
+            yield np.full(2000, k)
+
+    kept = list(ahead(squares, item_bytes=1 << 16))
+    assert [int(values[0]) for values in kept] == list(range(12))
+    for k, values in enumerate(ahead(squares, item_bytes=1 << 16, lend=True)):
+        assert (values == k).all() and not values.flags.owndata
 
 
 def test_workers_do_not_fork_again():

@@ -17,7 +17,7 @@ from hmc.body.joints import DOF_NAMES
 from hmc.body.kinematics import landmark_masks, landmarks
 from hmc.errors import InputError
 from hmc.io.detections import DetectionTable
-from hmc.io.masks import MaskStep, keep_masks
+from hmc.io.masks import MaskStep, keep_masks, kept_frames
 from hmc.io.recording import Recording
 from hmc.io.results import PoseStates, PoseTable, TrackTable, write_joints, write_pose
 from hmc.landmarks import LANDMARKS
@@ -27,7 +27,7 @@ from hmc.pose.person import DecidedFrames, PersonState, PersonTrack, PoseTask, p
 from hmc.pose.records import keep_decided, kept_decided
 from hmc.pose.views.markers import marker_views, seen_in_frame
 from hmc.pose.views.person_view import IMAGES_FOR, PersonView, check_needs, views_of
-from hmc.processes import ahead
+from hmc.processes import ahead, each_ahead
 from hmc.tracking.resumable import WARM_UP_FRAMES, kept_silhouettes, person_grid
 from hmc.tracking.tracks import velocities
 from hmc.voxels.hulls import stream_hulls, stream_masks
@@ -205,8 +205,16 @@ def _views_from(
             views = with_keypoints(views_of(recording, grid, tracks, hull, method.needs), recording.rig, tracks, cues)
             yield _with_markers(views, recording, method, options)
 
-    kept = kept_silhouettes(recording, run, first, bool(method.needs & IMAGES_FOR))
-    views = seen(_new_masks(recording, run, first)) if kept is None else ahead(lambda: seen(kept), run.workers)
+    def kept(frames: Sequence[int]) -> Iterator[dict[int, PersonView]]:
+        return seen(kept_frames(run.masks or "", run.key, frames) or ())
+
+    if method.needs & IMAGES_FOR:  # videos are read in order
+        masks = kept_silhouettes(recording, run, first, images=True)
+        views = seen(_new_masks(recording, run, first)) if masks is None else ahead(lambda: seen(masks), run.workers)
+    elif kept_silhouettes(recording, run, first) is None:
+        views = seen(_new_masks(recording, run, first))
+    else:
+        views = each_ahead(kept, range(first, end), run.workers)
     yield from run.progress(views, end - first) if run.progress else views
 
 
