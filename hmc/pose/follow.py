@@ -163,7 +163,7 @@ def follow(
     if "keypoints" in needs and options.keypoints is None:
         raise InputError(f"method {method.name} needs keypoints of a 2-D detector (hmc.io.keypoints.open_keypoints)")
     tracks = only_person(recording) if tracks is None else tracks
-    capture = Capture(recording.fps, options.voxel_size_m, recording.room, recording.rig, options.drift)
+    capture = Capture(recording.fps, options.voxel_size_m, recording.room, recording.rig, options.drift, workers=run.workers)
     task, persons = PoseTask(method, capture, options.seed, options.height_m), persons_of(recording, tracks)
     states = dict.fromkeys(persons, PersonState())
     done: list[DecidedFrames] = []

@@ -70,6 +70,8 @@ class Capture:
         everyday motion (`hmc.pose.steps.presets.drift`).
     beside : Beside
         Where a detector's keypoints lie beside the body's.
+    workers : int
+        Processes that may share a start's work (`hmc.processes`). The result does not depend on it.
     """
 
     fps: float = 30.0
@@ -78,6 +80,7 @@ class Capture:
     rig: Rig | None = None
     drift: np.ndarray | None = None
     beside: Beside = field(default_factory=Beside)
+    workers: int = 1
 
     @property
     def floor_z(self) -> float:

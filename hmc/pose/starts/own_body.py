@@ -78,7 +78,9 @@ def own_body(
     if not picks or not held_out:
         return subject
     objectives, states = zip(*(poses[k] for k in picks), strict=True)
-    body, _, _ = fit_body(objectives, np.array(states), surface_coordinates(subject.body, surface_samples), settings)
+    body, _, _ = fit_body(
+        objectives, np.array(states), surface_coordinates(subject.body, surface_samples), settings, subject.capture.workers
+    )
     fitted = equip(body)
     tried = [poses[k] for k in held_out]
     before, after = (

@@ -8,8 +8,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -33,6 +34,7 @@ from hmc.pose.steps.refine import refine
 from hmc.pose.views.hull_target import HullTarget
 from hmc.pose.views.keypoint_pose import keypoint_pose
 from hmc.pose.views.person_view import PersonView
+from hmc.processes import share_out
 from hmc.search.filters import AnnealedSettings
 
 __all__ = [
@@ -183,7 +185,7 @@ class WindowStart:
         if preset.fit_body is None:
             return started
         # What the body's dimensions are fitted to need not be the last word on the poses.
-        path = walk(window.frame_rng, quick_step(preset), started.subject, started.state, started.anchor, window.views)
+        path = walk(window.frame_rng, quick_step(preset), started.subject, started.state, started.anchor, window.views, capture.workers)
         subject = _fit(started.subject, window, path, self, height_m is not None)
         return replace(started, subject=subject, state=path[started.anchor][0].state)
 
@@ -222,6 +224,7 @@ def walk(
     state: np.ndarray | Tracked,
     anchor: int,
     views: Sequence[PersonView],
+    workers: int = 1,
 ) -> list[tuple[Tracked, StepInfo]]:
     """A pose tracked from one frame backwards to the first and forwards to the last.
 
@@ -235,6 +238,8 @@ def walk(
         Pose in the frame `anchor`.
     anchor : int
     views : sequence of PersonView
+    workers : int
+        With two or more, forwards and backwards at once.
 
     Returns
     -------
@@ -243,14 +248,18 @@ def walk(
     """
     n = len(views)
     start = state if isinstance(state, Tracked) else begin_tracking(subject, state)
-    found = {anchor: step(frame_rng(anchor), start, views[anchor])}
-    for order in (range(anchor + 1, n), range(anchor - 1, -1, -1)):
-        current = replace(found[anchor][0], velocity=np.zeros_like(start.state))
+    first = step(frame_rng(anchor), start, views[anchor])
+
+    def onwards(order: Iterable[int]) -> list[tuple[Tracked, StepInfo]]:
+        found, current = [], replace(first[0], velocity=np.zeros_like(start.state))
         for k in order:
-            found[k] = step(frame_rng(k), current, views[k])
-            current = found[k][0]
+            found.append(step(frame_rng(k), current, views[k]))
+            current = found[-1][0]
+        return found
+
     # Backwards, the velocity is that of time reversed; only the last frame's is used again, and that one is forward.
-    return [found[k] for k in range(n)]
+    after, before = share_out([partial(onwards, order) for order in (range(anchor + 1, n), range(anchor - 1, -1, -1))], workers)
+    return [*before[::-1], first, *after]
 
 
 def quick_step(preset: PosePreset) -> PoseStep:
@@ -299,9 +308,9 @@ def _best_hypothesis(subject: Subject, window: _Window, preset: PosePreset, sett
     """The frame and pose to start from, and the mean costs of all that were followed."""
     usable, velocities, body = window.usable, window.velocities, subject.body
     anchors = sorted({usable[round(q * (len(usable) - 1))] for q in np.linspace(0.1, 0.9, settings.anchors)})
-    pool = []
-    for anchor in anchors:
-        states, costs = candidates(window.frame_rng(anchor), subject, window.views[anchor], preset)
+    pool, workers = [], window.capture.workers
+    found = share_out([partial(candidates, window.frame_rng(anchor), subject, window.views[anchor], preset) for anchor in anchors], workers)
+    for anchor, (states, costs) in zip(anchors, found, strict=True):
         costs = costs * walk_factor(states[:, 3], velocities[anchor], settings)
         pool += [(cost, anchor, state) for cost, state in zip(costs, states, strict=True)]
     pool.sort(key=lambda entry: entry[0])
@@ -319,7 +328,8 @@ def _best_hypothesis(subject: Subject, window: _Window, preset: PosePreset, sett
         if len(chosen) == settings.candidates:
             break
     if preset.search is not None:
-        chosen = [search_all(window.frame_rng(anchor), objective, state, preset.polish)[0] for state in chosen]
+        searches = [partial(search_all, window.frame_rng(anchor), objective, state, preset.polish) for state in chosen]
+        chosen = [state for state, _ in share_out(searches, workers)]
     scores = _followed_costs(subject, window, preset, settings, anchor, chosen)
     order = np.argsort(scores)
     return StartPose(subject, anchor, chosen[order[0]], costs=np.array(scores)[order])
@@ -329,13 +339,14 @@ def _followed_costs(subject, window, preset, settings, anchor, chosen) -> list[f
     """Mean cost of every candidate over the frames around that in which they were found."""
     reach = max(2, round(settings.follow_s * window.capture.fps))
     first, last = max(0, anchor - reach), min(len(window.views), anchor + reach + 1)
-    scores = []
-    for state in chosen:
+
+    def score(state: np.ndarray) -> float:
         path = walk(lambda k: window.frame_rng(first + k), quick_step(preset), subject, state, anchor - first, window.views[first:last])
         followed = np.array([info.cost for _, info in path])
         headings = np.array([one.state[3] for one, _ in path])
-        scores.append(np.nanmean(followed * walk_factor(headings, window.velocities[first:last], settings)))
-    return scores
+        return float(np.nanmean(followed * walk_factor(headings, window.velocities[first:last], settings)))
+
+    return share_out([partial(score, state) for state in chosen], window.capture.workers)
 
 
 def search_all(rng: np.random.Generator, objective: Objective, state: np.ndarray, settings: PolishSettings) -> tuple[np.ndarray, float]:
