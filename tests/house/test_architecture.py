@@ -29,7 +29,7 @@ STEPS = METHOD | {"pose.steps"}
 STARTS = STEPS | {"pose.starts"}
 PERSON = STARTS | {"pose.legs", "pose.person"}
 MIXTURES = STEPS | {"pose.legs", "pose.mixtures"}
-FOLLOWING = PERSON | {"pose.records", "pose.follow", "pose.keypoint_cues"}
+FOLLOWING = PERSON | {"pose.records", "pose.follow", "pose.keypoint_cues", "pose.keypoint_sides"}
 METHODS = STARTS | MIXTURES | {"pose.recovery", "pose.methods"}
 POSE = METHODS | FOLLOWING | {"pose.backward", "pose.clear_views", "pose.keypoint_tracks", "pose.occluders", "pose.registry"}
 POSE |= {"pose.keypoint_views", "pose.smoothing"}
@@ -56,7 +56,8 @@ MAY_IMPORT = {
     "pose.person": PERSON,
     "pose.records": PERSON | {"pose.records"},
     "pose.follow": FOLLOWING,
-    "pose.keypoint_cues": OBJECTIVES,
+    "pose.keypoint_cues": OBJECTIVES | {"pose.keypoint_sides"},
+    "pose.keypoint_sides": VIEWS,
     "pose.keypoint_tracks": VIEWS,
     "pose.keypoint_views": FOLLOWING | {"pose.clear_views"},
     "pose.mixtures": MIXTURES,
