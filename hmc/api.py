@@ -249,7 +249,11 @@ def pose(
         elif tracks is None and method.needs_hulls:
             tracks = _tracked(recording, "sparse", seed, TRACK_VOXEL_M, masks)
         run = RunOptions(masks=masks, key=_KEY, progress=counted)
-        cues = None if keypoints is None or tracks is None or not method.keypoints else learn_scatter(recording.rig, tracks, keypoints, recording.fps)
+        cues = (
+            None
+            if keypoints is None or tracks is None or not method.keypoints
+            else learn_scatter(recording.rig, tracks, keypoints, recording.fps)
+        )
         options = FollowOptions(POSE_VOXEL_M, seed, height, detections, keypoints=cues)
         people = follow(recording, tracks, method, options, run)
         run = replace(run, progress=None)

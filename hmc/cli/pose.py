@@ -180,7 +180,9 @@ def run(args: argparse.Namespace) -> int:
     elif method.needs_tracks:
         tracks = tracks_of_keypoints(recording, source_of_keypoints, kept(JOURNAL, "track"))
     detections = None if markers is None else markers.table(args, key, problems)
-    cues = None if tracks is None or source_of_keypoints is None else learn_scatter(recording.rig, tracks, source_of_keypoints, recording.fps)
+    cues = (
+        None if tracks is None or source_of_keypoints is None else learn_scatter(recording.rig, tracks, source_of_keypoints, recording.fps)
+    )
     options = FollowOptions(args.voxel, args.seed, height, detections, keypoints=cues)
     people = follow(recording, tracks, method, options, kept(POSE_JOURNAL, "pose"))
     if markers is not None:

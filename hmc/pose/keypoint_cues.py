@@ -1,7 +1,8 @@
 """A detector's keypoints beside the hulls: read frame by frame, given to the people who are tracked, and what the recording tells of them.
 
-In which cameras left and right are exchanged is decided over all frames before anything is followed (`hmc.pose.keypoint_sides`). Two things
-of a detector are learnt, not assumed. How far it scatters: by how far cameras agree, before anything is followed too (`learn_scatter`). And what it takes for a hip, say, against what the body's hip is: in the second pass, from the first one's poses
+In which cameras left and right are exchanged is decided over all frames before anything is followed (`hmc.pose.keypoint_sides`). Two
+things of a detector are learnt, not assumed. How far it scatters: by how far cameras agree, before anything is followed too
+(`learn_scatter`). And what it takes for a hip, say, against what the body's hip is: in the second pass, from the first one's poses
 (`learn_beside`). A detector's landmark is not a joint's centre, but it is so in the same way all through a recording.
 """
 
@@ -82,7 +83,7 @@ def _seen(rig: Rig, tracks: TrackTable, cues: KeypointCues, frame: int) -> dict[
 
 
 def learn_scatter(rig: Rig, tracks: TrackTable, source: KeypointSource, fps: float) -> KeypointCues:
-    """Which cameras exchange left and right, and how far each one's detections of each keypoint are from where the other cameras' lines meet.
+    """Which cameras exchange left and right, and how far each one's detections of each keypoint are from where the others' lines meet.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """In which cameras, and when, a detector took a person's left for the right: decided over all frames, before anything is followed.
 
-One frame tells which cameras are the other way round than the rest (`hmc.pose.views.exchanged_sides`), not which of both is right. Over time
-it is told by two things: a person's left and right do not exchange places from one frame to the next, and few detections are exchanged.
+One frame tells which cameras are the other way round than the rest (`hmc.pose.views.exchanged_sides`), not which of both is right. Over
+time two things tell it: a person's left and right do not exchange places from one frame to the next, and few detections are exchanged.
 Of all sequences of a frame's pattern or its complement the cheapest is taken (Viterbi, IEEE Transactions on Information Theory 13, 1967).
 """
 
@@ -109,9 +109,7 @@ def kept_or_exchanged(before: np.ndarray, after: np.ndarray, seconds: float) -> 
         Sums of squared deviations, capped; more time makes both alike.
     """
     deviation = np.hypot(WAY_M, WAY_M_S * seconds)
-    kept, exchanged = (
-        float(np.nansum(np.minimum(((after - sign * before) ** 2).sum(axis=-1) / deviation**2, MOST))) for sign in (1, -1)
-    )
+    kept, exchanged = (float(np.nansum(np.minimum(((after - sign * before) ** 2).sum(axis=-1) / deviation**2, MOST))) for sign in (1, -1))
     return kept, exchanged
 
 

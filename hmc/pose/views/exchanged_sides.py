@@ -90,7 +90,7 @@ def sides_of_frame(centres: np.ndarray, directions: np.ndarray, deviation: np.nd
 
 
 def patterns_of(cameras: int) -> np.ndarray:
-    """All patterns of so many cameras of which the first is not turned, bool, shape (2**(cameras - 1), cameras); that without turns first."""
+    """All patterns in which the first of so many cameras is not turned, bool, (2**(cameras - 1), cameras); that without turns first."""
     return (np.arange(2 ** (cameras - 1))[:, None] >> np.arange(cameras - 1, -1, -1) & 1).astype(bool)
 
 

@@ -14,9 +14,7 @@ MEET = 3.0
 LEAST_SINE = 0.05
 
 
-def between_lines(
-    centre: np.ndarray, one: np.ndarray, other_centre: np.ndarray, other: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def between_lines(centre: np.ndarray, one: np.ndarray, other_centre: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Where two lines of sight are nearest to one another, and how far they pass one another there.
 
     Parameters
