@@ -11,6 +11,7 @@ from hmc.cli.common import (
     add_selection_options,
     gather_problems,
     load_given_plugins,
+    open_given_keypoints,
     open_selected,
     positive_float,
     print_problems,
@@ -222,11 +223,9 @@ def _keypoints(cues: str | None, recording, method):
         raise InputError(f"--cues {cues}: this method has no use for keypoints; use the preset `default` of apf, smd or pso, say")
     if cues == CUES[0] or not (method.keypoints or alone):
         return None
-    found = open_keypoints(recording)
-    if found is None and (cues is not None or alone):
-        asked = f"--cues {cues}" if cues else f"--method {method.name}"
-        raise InputError(f"{asked}: {recording.path} has no keypoints; put a detector's into keypoints/CAMERA/ (docs/conventions.md)")
-    return found
+    if cues is None and not alone:
+        return open_keypoints(recording)
+    return open_given_keypoints(recording, f"--cues {cues}" if cues else f"--method {method.name}")
 
 
 def _pelvis_tracks(people):
