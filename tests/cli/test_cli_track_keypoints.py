@@ -113,10 +113,55 @@ def test_from_python_and_on_to_poses(clip, tmp_path):
         hmc.track(recording, "naive", keypoints=source)
 
 
+def pose(folder, tracks, out, *more):
+    return main(["pose", str(folder), "--tracks", str(tracks), "--out", str(out), "--frames", str(FRAMES), "--quiet", *more])
+
+
+def test_poses_of_given_tracks(clip, tmp_path, capsys, monkeypatch):
+    """They are those of a run that makes the same tracks; and another file is another run."""
+    file, ways = tmp_path / "tracks" / "tracks.csv", ["--cues", "keypoints"]
+    assert track(clip, file.parent) == 0
+    assert main(["pose", str(clip), "--out", str(tmp_path / "own"), "--frames", str(FRAMES), "--quiet", *ways]) == 0
+    with monkeypatch.context() as patch:
+        patch.setattr(keypoint_tracks, "find_people", None)  # nobody is looked for
+        assert pose(clip, file, tmp_path / "out", *ways) == 0
+        expected, found = (read_joints(tmp_path / name / "joints.csv") for name in ("own", "out"))
+        np.testing.assert_allclose(found.positions, expected.positions, atol=1e-4)
+        assert read_run(tmp_path / "out" / "run.toml")["tracks"] == str(file.resolve())
+        capsys.readouterr()
+        assert pose(clip, file, tmp_path / "out", *ways) == 0
+        assert "was finished before" in capsys.readouterr().out
+        file.write_text(file.read_text().replace(",0,", ",4,"))
+        assert pose(clip, file, tmp_path / "out", *ways) == 0
+    assert "starting anew" in capsys.readouterr().out
+    assert set(read_joints(tmp_path / "out" / "joints.csv").persons) == {4}
+
+
+@pytest.mark.parametrize(
+    ("more", "told"),
+    [
+        (["--method", "marker-apf"], "needs no tracks; leave one of both out"),
+        (["--tracker", "naive"], "--tracker naive would have nothing to do; leave one of both out"),
+        (["--start", "20"], "has nobody in these frames; choose others with --start and --frames"),
+    ],
+)
+def test_tracks_that_do_not_go_with_the_rest_are_one_line(clip, tmp_path, capsys, more, told):
+    assert track(clip, tmp_path / "tracks") == 0
+    capsys.readouterr()
+    file = tmp_path / "tracks" / "tracks.csv"
+    assert pose(clip, file, tmp_path / "out", *more) == 2
+    line = capsys.readouterr().err.strip()
+    assert told in line and "\n" not in line
+    assert pose(clip, file, file.parent) == 2 and "would overwrite" in capsys.readouterr().err
+    assert pose(clip, tmp_path / "none.csv", tmp_path / "out") == 2 and "none.csv" in capsys.readouterr().err
+
+
 @pytest.mark.slow
-def test_hulls_are_given_to_people_who_were_tracked_by_keypoints(clip):
-    recording = hmc.open_recording(clip, frames=6)
-    tracks = hmc.track(recording, keypoints=open_keypoints(recording))
-    people = hmc.pose(recording, tracks, hmc.pose_method("apf", passes=1))
-    truth = read_joints(clip / "truth" / "joints.csv").positions[people.frames]
-    assert len(people.frames) == 6 and np.linalg.norm(people.positions - truth, axis=-1).mean() < 0.06
+def test_hulls_are_given_to_people_who_were_tracked_by_keypoints(clip, tmp_path):
+    assert track(clip, tmp_path / "tracks") == 0
+    file, ways = tmp_path / "tracks" / "tracks.csv", ["--cues", "silhouettes", "--frames", "6"]
+    assert pose(clip, file, tmp_path / "out", *ways) == 0
+    found, run = read_joints(tmp_path / "out" / "joints.csv"), read_run(tmp_path / "out" / "run.toml")
+    truth = read_joints(clip / "truth" / "joints.csv").positions[found.frames]
+    assert found.frames.tolist() == list(range(6)) and np.linalg.norm(found.positions - truth, axis=-1).mean() < 0.06
+    assert "tracker" not in run["parameters"] and run["parameters"]["back"]  # both passes
