@@ -16,6 +16,7 @@ strict visual hull, 1 the tolerant one, which keeps limbs that one silhouette lo
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -26,7 +27,7 @@ from hmc.camera.model import Camera, Rig, distort, project
 from hmc.errors import InputError
 from hmc.voxels.grid import VoxelGrid, check_memory
 
-__all__ = ["CarvingTables", "carve", "carve_levels", "make_tables", "pixel_of_voxel", "pixels_at"]
+__all__ = ["CarvingTables", "carve", "carve_levels", "make_tables", "pixel_of_voxel", "pixels_at", "shared_tables"]
 
 #: Side of a block of voxels, which is judged as a whole where it can be.
 BLOCK = 8
@@ -121,6 +122,31 @@ def make_tables(grid: VoxelGrid, rig: Rig) -> CarvingTables:
     first = starts @ np.array([grid.shape[1] * grid.shape[2], grid.shape[2], 1])
     sticks_out = np.any(starts + BLOCK > grid.shape, axis=1)
     return CarvingTables(grid, rig, (nx, ny, nz), pixels, corners, areas, seen_whole, first, sticks_out)
+
+
+def shared_tables(grid: VoxelGrid, rig: Rig) -> CarvingTables:
+    """`make_tables`, or what it made last, where that was for the same grid and the same rig: the stages of a run share their tables.
+
+    Parameters
+    ----------
+    grid : VoxelGrid
+    rig : Rig
+        The same object, as a recording has one.
+
+    Returns
+    -------
+    CarvingTables
+        Not to be written to. Those of one grid and rig stay in memory, until others are asked for.
+    """
+    return _last_tables(tuple(grid.origin.tolist()), grid.voxel_size_m, grid.shape, rig)
+
+
+@functools.lru_cache(maxsize=1)
+def _last_tables(origin: tuple[float, ...], voxel_size_m: float, shape: tuple[int, int, int], rig: Rig) -> CarvingTables:
+    tables = make_tables(VoxelGrid(np.array(origin), voxel_size_m, shape), rig)
+    for array in (tables.pixels, tables.corners, tables.areas, tables.seen_whole, tables.first, tables.sticks_out):
+        array.setflags(write=False)
+    return tables
 
 
 def _in_parts(blocks: np.ndarray) -> Iterator[np.ndarray]:
