@@ -102,19 +102,26 @@ def hulls(recording: Recording, voxel_size_m: float = POSE_VOXEL_M, masks: Itera
 
 
 def track(
-    recording: Recording | str | Path, tracker: str | Tracker = "sparse", seed: int = 0, voxel_size_m: float = TRACK_VOXEL_M
+    recording: Recording | str | Path,
+    tracker: str | Tracker | None = None,
+    seed: int = 0,
+    voxel_size_m: float = TRACK_VOXEL_M,
+    keypoints: KeypointSource | None = None,
 ) -> TrackTable:
     """The track of every person: where each is in every frame.
 
     Parameters
     ----------
     recording : Recording or path
-    tracker : str or Tracker
-        A key of `hmc.TRACKERS`, or a tracker.
+    tracker : str or Tracker, optional
+        A key of `hmc.TRACKERS`, or a tracker; "sparse" by default.
     seed : int
         The same seed gives the same result.
     voxel_size_m : float
         Side of a voxel, metres.
+    keypoints : KeypointSource, optional
+        What a detector of 2-D keypoints saw (`hmc.io.keypoints.open_keypoints`): people are found by these alone then, without silhouettes,
+        voxels and a tracker.
 
     Returns
     -------
@@ -124,7 +131,7 @@ def track(
     Raises
     ------
     InputError
-        When the voxels are too coarse, or there is no such tracker.
+        When the voxels are too coarse, there is no such tracker, or one is given beside keypoints.
 
     Examples
     --------
@@ -133,7 +140,13 @@ def track(
     >>> sorted(set(tracks.persons.tolist())), tracks.positions.shape
     ([0], (8, 3))
     """
-    return _tracked(_opened(recording), tracker, seed, voxel_size_m)
+    if keypoints is None:
+        return _tracked(_opened(recording), tracker or "sparse", seed, voxel_size_m)
+    if tracker is not None:
+        raise InputError("track: keypoints have no use for a tracker; leave one of both out")
+    from hmc.pose.keypoint_tracks import tracks_of_keypoints
+
+    return tracks_of_keypoints(_opened(recording), keypoints)
 
 
 def views(
@@ -249,7 +262,11 @@ def pose(
         elif tracks is None and method.needs_hulls:
             tracks = _tracked(recording, "sparse", seed, TRACK_VOXEL_M, masks)
         run = RunOptions(masks=masks, key=_KEY, progress=counted)
-        cues = None if keypoints is None or tracks is None or not method.keypoints else learn_scatter(recording.rig, tracks, keypoints)
+        cues = (
+            None
+            if keypoints is None or tracks is None or not method.keypoints
+            else learn_scatter(recording.rig, tracks, keypoints, recording.fps)
+        )
         options = FollowOptions(POSE_VOXEL_M, seed, height, detections, keypoints=cues)
         people = follow(recording, tracks, method, options, run)
         run = replace(run, progress=None)

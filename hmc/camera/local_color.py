@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from sklearn.cluster import KMeans
 
 __all__ = ["Palette", "learn_palette", "looks_like_people", "looks_like_surroundings"]
 
@@ -57,6 +56,9 @@ def learn_palette(pixels: Sequence[np.ndarray]) -> Palette | None:
     Palette or None
         None for too few pixels.
     """
+    # Imported here: it takes longer than all of hmc, and only a scene that was never seen empty needs it.
+    from sklearn.cluster import KMeans
+
     colors = np.concatenate(pixels).astype(np.float32)
     if len(colors) < COLORS:
         return None

@@ -15,6 +15,7 @@ __all__ = [
     "camera_names",
     "gather_problems",
     "load_given_plugins",
+    "open_given_keypoints",
     "open_selected",
     "positive_float",
     "print_problems",
@@ -90,6 +91,29 @@ def open_selected(args: argparse.Namespace):
     from hmc.io.recording import open_recording
 
     return open_recording(args.recording, cameras=args.cameras, start=args.start, frames=args.frames)
+
+
+def open_given_keypoints(recording, asked: str):
+    """The keypoints of a recording, for an option that does not do without.
+
+    Parameters
+    ----------
+    recording : Recording
+    asked : str
+        The option, as it was given.
+
+    Raises
+    ------
+    InputError
+        When there are none.
+    """
+    from hmc.errors import InputError
+    from hmc.io.keypoints import open_keypoints
+
+    found = open_keypoints(recording)
+    if found is None:
+        raise InputError(f"{asked}: {recording.path} has no keypoints; put a detector's into keypoints/CAMERA/ (docs/conventions.md)")
+    return found
 
 
 def progress(iterable: Iterable[T], total: int | None = None, desc: str = "", quiet: bool = False) -> Iterator[T]:

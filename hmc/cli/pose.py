@@ -12,6 +12,7 @@ from hmc.cli.common import (
     add_workers_option,
     gather_problems,
     load_given_plugins,
+    open_given_keypoints,
     open_selected,
     positive_float,
     print_problems,
@@ -78,6 +79,9 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     )
     parser.add_argument("--voxel", type=positive_float, default=0.03, metavar="M", help="side of a voxel, metres (default: 0.03)")
     add_tracker_options(parser)
+    parser.add_argument(
+        "--tracks", type=Path, metavar="FILE", help="tracks.csv of these people, as `hmc track` writes it; made here where left out"
+    )
     parser.add_argument("--track-voxel", type=positive_float, default=0.05, metavar="M", help="the same for the tracker (default: 0.05)")
     parser.add_argument("--seed", type=whole_number, default=0, metavar="N", help="seed of the random numbers (default: 0)")
     parser.add_argument(
@@ -153,12 +157,17 @@ def run(args: argparse.Namespace) -> int:
     } | plugins
     if source_of_keypoints is not None:
         parameters["cues"] = CUES[1 if hulls else 2]
+    given = None if args.tracks is None else _given_tracks(args, method, recording)
     if hulls:
         person_grid(recording, args.voxel)  # voxels that will not do are refused before any work is done
         tracker = selected_tracker(args)
-        parameters |= {"voxel_size_m": args.voxel, "track_voxel_size_m": args.track_voxel}
-        parameters |= {"tracker": tracker.settings, "frontend": frontend}
+        parameters["voxel_size_m"] = args.voxel
+        if given is None:
+            parameters |= {"track_voxel_size_m": args.track_voxel, "tracker": tracker.settings}
+        parameters["frontend"] = frontend
     source, markers = recording_source(recording), None
+    if given is not None:
+        source |= {"tracks": args.tracks.resolve(), "tracks_changed": str(args.tracks.stat().st_mtime_ns)}
     if "detections" in method.needs:
         markers = read_markers(args, recording)
         parameters |= markers.parameters
@@ -183,13 +192,15 @@ def run(args: argparse.Namespace) -> int:
             selected_workers(args),
         )
 
-    tracks = None
-    if hulls:
+    tracks = given
+    if given is None and hulls:
         tracks = track_recording(recording, args.track_voxel, tracker, args.seed, kept(JOURNAL, "track"))
-    elif method.needs_tracks:
+    elif given is None and method.needs_tracks:
         tracks = tracks_of_keypoints(recording, source_of_keypoints, kept(JOURNAL, "track"))
     detections = None if markers is None else markers.table(args, key, problems)
-    cues = None if tracks is None or source_of_keypoints is None else learn_scatter(recording.rig, tracks, source_of_keypoints)
+    cues = (
+        None if tracks is None or source_of_keypoints is None else learn_scatter(recording.rig, tracks, source_of_keypoints, recording.fps)
+    )
     options = FollowOptions(args.voxel, args.seed, height, detections, keypoints=cues)
     people = follow(recording, tracks, method, options, kept(POSE_JOURNAL, "pose"))
     if markers is not None:
@@ -231,11 +242,27 @@ def _keypoints(cues: str | None, recording, method):
         raise InputError(f"--cues {cues}: this method has no use for keypoints; use the preset `default` of apf, smd or pso, say")
     if cues == CUES[0] or not (method.keypoints or alone):
         return None
-    found = open_keypoints(recording)
-    if found is None and (cues is not None or alone):
-        asked = f"--cues {cues}" if cues else f"--method {method.name}"
-        raise InputError(f"{asked}: {recording.path} has no keypoints; put a detector's into keypoints/CAMERA/ (docs/conventions.md)")
-    return found
+    if cues is None and not alone:
+        return open_keypoints(recording)
+    return open_given_keypoints(recording, f"--cues {cues}" if cues else f"--method {method.name}")
+
+
+def _given_tracks(args: argparse.Namespace, method, recording):
+    """The tracks of ``--tracks`` in the recording's selection."""
+    from hmc.errors import InputError
+    from hmc.io.results import read_tracks
+
+    if not method.needs_tracks:
+        raise InputError(f"--tracks {args.tracks}: method {method.name} needs no tracks; leave one of both out")
+    if args.tracker is not None:
+        raise InputError(f"--tracks {args.tracks}: --tracker {args.tracker} would have nothing to do; leave one of both out")
+    if args.tracks.resolve() == (args.out / "tracks.csv").resolve():
+        raise InputError(f"--tracks {args.tracks}: is what --out {args.out} would overwrite; choose another folder")
+    table = read_tracks(args.tracks)
+    table = table.where((table.frames >= recording.start) & (table.frames < recording.start + recording.n_frames))
+    if not len(table.frames):
+        raise InputError(f"--tracks {args.tracks}: has nobody in these frames; choose others with --start and --frames")
+    return table
 
 
 def _pelvis_tracks(people):

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from hmc.cli.common import (
     add_plugin_option,
@@ -12,6 +14,7 @@ from hmc.cli.common import (
     add_workers_option,
     gather_problems,
     load_given_plugins,
+    open_given_keypoints,
     open_selected,
     positive_float,
     print_problems,
@@ -22,10 +25,24 @@ from hmc.cli.common import (
     whole_number,
 )
 
+if TYPE_CHECKING:
+    from hmc.io.recording import Recording
+    from hmc.io.results import TrackTable
+    from hmc.tracking.resumable import Timing
+    from hmc.voxels.run_options import RunOptions
+
 __all__ = ["add_parser", "add_tracker_options", "run", "selected_frontend", "selected_tracker"]
 
 #: The journal of a run that is not finished.
 JOURNAL = ".track.journal"
+#: Side of a voxel where no other is said, metres.
+VOXEL_M = 0.04
+#: What `--cues` may say.
+CUES = ("silhouettes", "keypoints")
+#: Options of which keypoints alone make no use, with what they are where nothing is said.
+OF_SILHOUETTES = {
+    "tracker": None, "color": None, "particles": None, "track_preset": "default", "complete": True, "cut_shadows": True, "voxel": None,
+}  # fmt: skip
 
 
 def add_parser(subparsers) -> argparse.ArgumentParser:
@@ -42,8 +59,15 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the result")
     add_tracker_options(parser)
     add_plugin_option(parser)
-    parser.add_argument("--voxel", type=positive_float, default=0.04, metavar="M", help="side of a voxel, metres (default: 0.04)")
+    parser.add_argument("--voxel", type=positive_float, metavar="M", help=f"side of a voxel, metres (default: {VOXEL_M})")
     parser.add_argument("--seed", type=whole_number, default=0, metavar="N", help="seed of the random numbers (default: 0)")
+    parser.add_argument(
+        "--cues",
+        choices=CUES,
+        default=CUES[0],
+        help="what people are found by: silhouettes (default), or the keypoints that a 2-D detector left in the recording, without any "
+        "silhouette",
+    )
     return parser
 
 
@@ -106,28 +130,26 @@ def run(args: argparse.Namespace) -> int:
     from hmc.errors import InputError
     from hmc.io.files import to_toml
     from hmc.io.results import read_tracks, write_run, write_tracks
-    from hmc.tracking.resumable import Timing, track_recording
     from hmc.voxels.run_options import RunOptions
 
     plugins, recording = load_given_plugins(args), open_selected(args)
-    tracker, frontend = selected_tracker(args), selected_frontend(args)
+    work = _by_keypoints(args, recording) if args.cues == CUES[1] else _by_silhouettes(args, recording)
     tracks_path, run_path, journal = args.out / "tracks.csv", args.out / "run.toml", args.out / JOURNAL
     if args.out.is_file():
         raise InputError(f"--out {args.out}: is a file; give a folder")
     if (args.out / "joints.csv").exists() or (args.out / "pose.npz").exists():
         raise InputError(f"--out {args.out}: holds poses, whose tracks must stay as they are; choose another folder")
     parameters: dict[str, Any] = {
-        "voxel_size_m": args.voxel,
         "start": recording.start,
         "frames": recording.n_frames,
         "cameras": list(recording.rig.names),
         "room_m": recording.room,
         "fps": recording.fps,
-        "tracker": tracker.settings,
-        "frontend": frontend,
-    } | plugins
+        **work.parameters,
+        **plugins,
+    }
     source = recording_source(recording)
-    depends_on = {"method": tracker.name, "seed": args.seed, **source, "parameters": parameters}
+    depends_on = {"method": work.method, "seed": args.seed, **source, "parameters": parameters}
     key = to_toml(depends_on)
     if was_finished([tracks_path], run_path, depends_on):
         print(_summary(read_tracks(tracks_path), recording.n_frames))
@@ -136,17 +158,17 @@ def run(args: argparse.Namespace) -> int:
     problems: list[str] = [*recording.problems]
     timings: list[Timing] = []
     run = RunOptions(
-        frontend,
+        selected_frontend(args),
         journal,
         key=key,
         on_problem=problems.append,
         progress=lambda steps, total: progress(steps, total, "track", args.quiet),
         workers=selected_workers(args),
     )
-    table = track_recording(recording, args.voxel, tracker, args.seed, run, timings.append)
+    table = work.track(run, timings.append)
     write_tracks(tracks_path, table)
     speed = {name: value for timing in timings for name, value in _speed(timing, recording.fps).items()}
-    write_run(run_path, tracker.name, parameters, args.seed, **source, problems=gather_problems(problems), speed=speed)
+    write_run(run_path, work.method, parameters, args.seed, **source, problems=gather_problems(problems), speed=speed)
     journal.unlink(missing_ok=True)
     print(_summary(table, recording.n_frames))
     if speed:
@@ -157,6 +179,35 @@ def run(args: argparse.Namespace) -> int:
     print(f"wrote {tracks_path}")
     print_problems(problems)
     return 0
+
+
+@dataclass(frozen=True)
+class _Work:
+    """What is to be done: the method's name and parameters, and a function from a run and what takes its timing to the tracks."""
+
+    method: str
+    parameters: Mapping[str, Any]
+    track: Callable[[RunOptions, Callable[[Timing], None]], TrackTable]
+
+
+def _by_silhouettes(args: argparse.Namespace, recording: Recording) -> _Work:
+    from hmc.tracking.resumable import track_recording
+
+    voxel, tracker = args.voxel or VOXEL_M, selected_tracker(args)
+    parameters = {"voxel_size_m": voxel, "tracker": tracker.settings, "frontend": selected_frontend(args)}
+    return _Work(tracker.name, parameters, lambda run, timed: track_recording(recording, voxel, tracker, args.seed, run, timed))
+
+
+def _by_keypoints(args: argparse.Namespace, recording: Recording) -> _Work:
+    from hmc.errors import InputError
+    from hmc.pose.keypoint_tracks import tracks_of_keypoints
+
+    said = {name: getattr(args, name) for name, unsaid in OF_SILHOUETTES.items() if getattr(args, name) != unsaid}
+    given = ["--" + ("no-" if value is False else "") + name.replace("_", "-") for name, value in said.items()]
+    if given:
+        raise InputError(f"--cues {args.cues}: has no use for {', '.join(given)}; leave {'it' if len(given) == 1 else 'them'} out")
+    source = open_given_keypoints(recording, f"--cues {args.cues}")
+    return _Work("keypoints", {"cues": args.cues}, lambda run, timed: tracks_of_keypoints(recording, source, run))
 
 
 def _speed(timing, fps: float) -> dict[str, float]:

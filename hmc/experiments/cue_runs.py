@@ -184,7 +184,7 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
     people, cues = followed(parameters, inputs, recording), None
     if needs_keypoints:
         source = with_fault(_keypoints(inputs, parameters["recording"], recording), recording, truth, fault, seed)
-        cues = learn_scatter(recording.rig, people.tracks, source)
+        cues = learn_scatter(recording.rig, people.tracks, source, recording.fps)
     poses = way(parameters, Footage(recording, people, cues))
     return scored_poses(recording, poses, truth) | {"faulty": [] if fault == NO_FAULT else list(fault_frames(recording, fault, seed))}
 

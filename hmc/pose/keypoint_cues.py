@@ -1,6 +1,7 @@
 """A detector's keypoints beside the hulls: read frame by frame, given to the people who are tracked, and what the recording tells of them.
 
-Two things of a detector are learnt, not assumed. How far it scatters: by how far cameras agree, before anything is followed
+In which cameras left and right are exchanged is decided over all frames before anything is followed (`hmc.pose.keypoint_sides`). Two
+things of a detector are learnt, not assumed. How far it scatters: by how far cameras agree, before anything is followed too
 (`learn_scatter`). And what it takes for a hip, say, against what the body's hip is: in the second pass, from the first one's poses
 (`learn_beside`). A detector's landmark is not a joint's centre, but it is so in the same way all through a recording.
 """
@@ -8,7 +9,7 @@ Two things of a detector are learnt, not assumed. How far it scatters: by how fa
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from hmc.camera.model import Rig
 from hmc.io.keypoints.source import KeypointSource
 from hmc.io.recording import spread_frames
 from hmc.io.results import TrackTable
+from hmc.pose.keypoint_sides import Turned, exchanged_sides, people_at
 from hmc.pose.objectives.keypoints import BESIDE_M, Beside
 from hmc.pose.views.keypoints import SCATTER_M, SeenKeypoints, body_detections, see_keypoints
 from hmc.pose.views.person_view import PersonView
@@ -48,10 +50,13 @@ class KeypointCues:
     source : KeypointSource
     scatter_m : ndarray, shape (n_cameras, 15)
         Standard deviation of a sure detection across its line of sight, metres.
+    turned : mapping of int to mapping of int to ndarray of bool, shape (n_cameras,)
+        By frame and person, cameras that have exchanged left and right; those without any are left out.
     """
 
     source: KeypointSource
     scatter_m: np.ndarray
+    turned: Turned = field(default_factory=dict)
 
 
 def with_keypoints(views: Mapping[int, PersonView], rig: Rig, tracks: TrackTable, cues: KeypointCues | None) -> dict[int, PersonView]:
@@ -73,25 +78,27 @@ def with_keypoints(views: Mapping[int, PersonView], rig: Rig, tracks: TrackTable
 
 
 def _seen(rig: Rig, tracks: TrackTable, cues: KeypointCues, frame: int) -> dict[int, SeenKeypoints]:
-    rows = np.flatnonzero(tracks.frames == frame)
-    people = dict(zip(tracks.persons[rows].tolist(), tracks.positions[rows], strict=True))
-    return see_keypoints(rig, body_detections(cues.source, frame), people, cues.scatter_m)
+    detections = body_detections(cues.source, frame)
+    return see_keypoints(rig, detections, people_at(tracks, frame), cues.scatter_m, cues.turned.get(frame, {}))
 
 
-def learn_scatter(rig: Rig, tracks: TrackTable, source: KeypointSource) -> KeypointCues:
-    """How far each camera's detections of each keypoint are from where the other cameras' lines meet.
+def learn_scatter(rig: Rig, tracks: TrackTable, source: KeypointSource, fps: float) -> KeypointCues:
+    """Which cameras exchange left and right, and how far each one's detections of each keypoint are from where the others' lines meet.
 
     Parameters
     ----------
     rig : Rig
     tracks : TrackTable
     source : KeypointSource
+    fps : float
+        Frames a second.
 
     Returns
     -------
     KeypointCues
     """
-    cues = KeypointCues(source, np.full((len(rig), len(BODY_KEYPOINTS)), SCATTER_M))
+    scatter = np.full((len(rig), len(BODY_KEYPOINTS)), SCATTER_M)
+    cues = KeypointCues(source, scatter, exchanged_sides(rig, tracks, source, fps))
     missed: list[list[list[float]]] = [[[] for _ in BODY_KEYPOINTS] for _ in rig]
     for frame in spread_frames(np.unique(tracks.frames), LEARNING_FRAMES):
         for seen in _seen(rig, tracks, cues, frame).values():

@@ -21,7 +21,8 @@ from hmc.landmarks import LANDMARKS
 from hmc.pose.clear_views import guess_notes
 from hmc.pose.keypoint_cues import KeypointCues, with_keypoints
 from hmc.pose.objectives.keypoints import BESIDE_M
-from hmc.pose.views.keypoints import MEET, SeenKeypoints
+from hmc.pose.views.keypoints import SeenKeypoints
+from hmc.pose.views.line_meeting import MEET
 from hmc.pose.views.person_view import PersonView
 
 if TYPE_CHECKING:

@@ -10,7 +10,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.signal import savgol_filter
 
 from hmc.body.inverse import fit_landmarks
 from hmc.body.joints import JointLimits
@@ -42,6 +41,9 @@ def smooth_landmarks(frames: np.ndarray, positions: np.ndarray, fps: float, wind
     ndarray, shape (n, k, 3)
         Stretches shorter than the window, and all where the window has fewer than five frames, are as they were.
     """
+    # Imported here: it brings scipy.stats along, and most runs smooth nothing.
+    from scipy.signal import savgol_filter
+
     out = np.array(positions, float)
     window = 2 * round(window_s * fps / 2) + 1
     if window < DEGREE + 2:

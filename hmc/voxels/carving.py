@@ -16,23 +16,32 @@ strict visual hull, 1 the tolerant one, which keeps limbs that one silhouette lo
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import functools
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
-from hmc.camera.model import Camera, Rig, project
+from hmc.camera.model import Camera, Rig, distort, project
 from hmc.errors import InputError
 from hmc.voxels.grid import VoxelGrid, check_memory
 
-__all__ = ["CarvingTables", "carve", "carve_levels", "make_tables", "pixel_of_voxel", "pixels_at"]
+__all__ = ["CarvingTables", "carve", "carve_levels", "make_tables", "pixel_of_voxel", "pixels_at", "shared_tables"]
 
 #: Side of a block of voxels, which is judged as a whole where it can be.
 BLOCK = 8
 BLOCK_VOXELS = BLOCK**3
 #: A voxel must be voted on by this many cameras unless fewer have a mask.
 DEFAULT_MIN_VIEWS = 3
+#: Blocks that are projected at once.
+PART = 32
+#: Places (i, j, k) of a block's voxels in it, shape (512, 3), and which of them are its corners.
+WITHIN = np.stack(np.unravel_index(np.arange(BLOCK_VOXELS), (BLOCK,) * 3), axis=-1)
+CORNERS = np.flatnonzero(np.isin(WITHIN, (0, BLOCK - 1)).all(axis=1))
+#: What is this near to a limit (pixels, and pixels times metres) is told with all digits; rounding is a thousandth of it at most where
+#: the depth is above the second, metres.
+CLEAR, CLEAR_M = 1e-6, 0.01
 OUTSIDE_RULES = ("ignore", "carve", "keep")
 
 
@@ -93,32 +102,129 @@ def make_tables(grid: VoxelGrid, rig: Rig) -> CarvingTables:
     check_memory(np.array(grid.shape) * grid.voxel_size_m, grid.voxel_size_m, len(rig))
     nx, ny, nz = (-(-n // BLOCK) for n in grid.shape)
     n_blocks = nx * ny * nz
-    within = np.stack(np.unravel_index(np.arange(BLOCK_VOXELS), (BLOCK,) * 3), axis=-1)
     starts = np.stack(np.unravel_index(np.arange(n_blocks), (nx, ny, nz)), axis=-1) * BLOCK
     pixels = np.empty((len(rig), n_blocks, BLOCK_VOXELS), np.int32)
     corners = np.zeros((len(rig), 4, n_blocks), np.int32)
     areas = np.zeros((len(rig), n_blocks), np.int32)
     seen_whole = np.zeros((len(rig), n_blocks), bool)
-    for start in range(0, n_blocks, 256):
-        part = slice(start, min(start + 256, n_blocks))
-        points = grid.centres(starts[part, None, :] + within)
-        for c, camera in enumerate(rig):
-            column, row, seen = pixel_of_voxel(camera, points)
-            width, height = camera.size
-            pixels[c, part] = np.where(seen, row * width + column, width * height)
-            seen_whole[c, part] = seen.all(axis=1)
-            left = np.where(seen, column, width).min(axis=1)
-            right = np.where(seen, column, -1).max(axis=1) + 1
-            top = np.where(seen, row, height).min(axis=1)
-            bottom = np.where(seen, row, -1).max(axis=1) + 1
-            some = seen.any(axis=1)
-            areas[c, part] = np.where(some, (right - left) * (bottom - top), 0)
-            stride = width + 1  # of the integral image
-            places = [bottom * stride + right, top * stride + left, top * stride + right, bottom * stride + left]
-            corners[c, :, part] = np.where(some, places, 0)
+    for c, camera in enumerate(rig):
+        width, height = camera.size
+        unseen, across = _sort_blocks(grid, camera, starts)
+        pixels[c, unseen] = width * height
+        asked, left_over = np.flatnonzero(~unseen & ~across), [np.flatnonzero(across)]
+        tables = pixels[c], corners[c], areas[c], seen_whole[c]
+        for part in _in_parts(asked):
+            column, row, seen, unsure = _pixels_quickly(grid, camera, starts[part])
+            _enter(tables, camera.size, part, column, row, seen)
+            left_over.append(part[unsure])
+        for part in _in_parts(np.concatenate(left_over)):
+            _enter(tables, camera.size, part, *pixel_of_voxel(camera, grid.centres(starts[part, None, :] + WITHIN)))
     first = starts @ np.array([grid.shape[1] * grid.shape[2], grid.shape[2], 1])
     sticks_out = np.any(starts + BLOCK > grid.shape, axis=1)
     return CarvingTables(grid, rig, (nx, ny, nz), pixels, corners, areas, seen_whole, first, sticks_out)
+
+
+def shared_tables(grid: VoxelGrid, rig: Rig) -> CarvingTables:
+    """`make_tables`, or what it made last, where that was for the same grid and the same rig: the stages of a run share their tables.
+
+    Parameters
+    ----------
+    grid : VoxelGrid
+    rig : Rig
+        The same object, as a recording has one.
+
+    Returns
+    -------
+    CarvingTables
+        Not to be written to. Those of one grid and rig stay in memory, until others are asked for.
+    """
+    return _last_tables(tuple(grid.origin.tolist()), grid.voxel_size_m, grid.shape, rig)
+
+
+@functools.lru_cache(maxsize=1)
+def _last_tables(origin: tuple[float, ...], voxel_size_m: float, shape: tuple[int, int, int], rig: Rig) -> CarvingTables:
+    tables = make_tables(VoxelGrid(np.array(origin), voxel_size_m, shape), rig)
+    for array in (tables.pixels, tables.corners, tables.areas, tables.seen_whole, tables.first, tables.sticks_out):
+        array.setflags(write=False)
+    return tables
+
+
+def _in_parts(blocks: np.ndarray) -> Iterator[np.ndarray]:
+    """So many blocks that what is told of their voxels stays in the second-level cache."""
+    return (blocks[start : start + PART] for start in range(0, len(blocks), PART))
+
+
+def _enter(tables: tuple[np.ndarray, ...], size: tuple[int, int], blocks: np.ndarray, column, row, seen) -> None:
+    """Set pixels, corners, areas and `seen_whole` of some blocks of one camera, from what `pixel_of_voxel` tells, shape (n, 512)."""
+    pixels, corners, areas, seen_whole = tables
+    width, height = size
+    pixels[blocks] = np.where(seen, row * np.int32(width) + column, np.int32(width * height))
+    seen_whole[blocks] = seen.all(axis=1)
+    low, high = (np.where(seen, places, np.int32(beyond)) for places, beyond in ((column, width), (column, -1)))
+    left, right = low.min(axis=1), high.max(axis=1) + 1
+    low, high = (np.where(seen, places, np.int32(beyond)) for places, beyond in ((row, height), (row, -1)))
+    top, bottom = low.min(axis=1), high.max(axis=1) + 1
+    some = right > 0
+    areas[blocks] = np.where(some, (right - left) * (bottom - top), 0)
+    stride = width + 1  # of the integral image
+    places = [bottom * stride + right, top * stride + left, top * stride + right, bottom * stride + left]
+    corners[:, blocks] = np.where(some, places, 0)
+
+
+def _sort_blocks(grid: VoxelGrid, camera: Camera, starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Blocks of which a camera sees no voxel, by their corners alone; and those that reach across the plane in which it lies.
+
+    What a camera without distortion sees is a pyramid; of others it is only told what is behind them.
+    """
+    width, height = camera.size
+    points = grid.centres(starts[:, None, :] + WITHIN[CORNERS])
+    u, v, depth = (points @ row[:3] + row[3] for row in _pinhole(camera))
+    unseen = (depth < -CLEAR_M).all(axis=1)
+    if not camera.distortions.any():
+        for beyond in (-u, -v, u - width * depth, v - height * depth):  # pixels times metres
+            unseen |= (beyond > CLEAR).all(axis=1)
+    return unseen, ~unseen & (depth < CLEAR_M).any(axis=1)
+
+
+def _pinhole(camera: Camera) -> np.ndarray:
+    """World to (u + .5) w, (v + .5) w and w = depth, shape (3, 4), without distortion: its quotients, rounded down, are pixels."""
+    matrix = np.vstack([camera.matrix[:2], [0.0, 0.0, 1.0]])
+    matrix[:2, 2] += 0.5
+    return matrix @ np.column_stack([camera.rotation, camera.translation])
+
+
+def _pixels_quickly(grid: VoxelGrid, camera: Camera, starts: np.ndarray) -> tuple[np.ndarray, ...]:
+    """`pixel_of_voxel` of all voxels of blocks before a camera, shape (n, 512), and of which blocks not to believe it, shape (n,).
+
+    What is linear in a voxel's place is a sum of what belongs to x, to y and to z. Its last digits are others than those of
+    `pixel_of_voxel`, and what is within `CLEAR` of a limit may be rounded otherwise.
+    """
+    x, y, z = np.moveaxis(grid.centres(starts[:, None, :] + np.arange(BLOCK)[:, None]), -1, 0)
+    distorted, shape = bool(camera.distortions.any()), (len(starts), BLOCK_VOXELS)
+    matrix = np.column_stack([camera.rotation, camera.translation]) if distorted else _pinhole(camera)
+    u, v, depth = (
+        (((a * x + d)[:, :, None] + (b * y)[:, None, :])[..., None] + (c * z)[:, None, None, :]).reshape(shape) for a, b, c, d in matrix
+    )
+    u /= depth
+    v /= depth
+    seen, unsure = np.ones(shape, bool), np.zeros(len(starts), bool)
+    if distorted:
+        r2, most = u * u + v * v, camera.max_radius**2
+        if np.isfinite(most):
+            seen = r2 < most
+            unsure = (np.abs(r2 - most) < CLEAR).any(axis=1)
+        xy = distort(camera, np.stack([u, v], axis=-1))
+        (a, b, c), (d, e, f) = camera.matrix[:2]
+        u, v = a * xy[..., 0] + b * xy[..., 1] + (c + 0.5), d * xy[..., 0] + e * xy[..., 1] + (f + 0.5)
+    pixel = []
+    for values, size in ((u, camera.size[0]), (v, camera.size[1])):
+        np.clip(values, -0.5, size + 0.5, out=values)
+        seen &= (values >= 0) & (values < size)
+        pixel.append(values.astype(np.int32))
+        values -= pixel[-1]
+        np.abs(values, out=values)
+        unsure |= (values.min(axis=1) < CLEAR) | (values.max(axis=1) > 1 - CLEAR)
+    return pixel[0], pixel[1], seen, unsure
 
 
 def pixel_of_voxel(camera: Camera, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -319,12 +425,11 @@ def _number_voxels(blocks: np.ndarray, places: np.ndarray) -> np.ndarray:
 def _mark(hull: np.ndarray, tables: CarvingTables, voxels: np.ndarray) -> None:
     """Set voxels, given as block * 512 + place in the block, in the volume; those beyond the grid are dropped."""
     _, ny, nz = hull.shape
-    within = np.stack(np.unravel_index(np.arange(BLOCK_VOXELS), (BLOCK,) * 3), axis=-1)
     block, place = voxels // BLOCK_VOXELS, voxels % BLOCK_VOXELS
-    flat = tables.first.take(block) + (within @ np.array([ny * nz, nz, 1])).take(place)
+    flat = tables.first.take(block) + (WITHIN @ np.array([ny * nz, nz, 1])).take(place)
     suspects = np.flatnonzero(tables.sticks_out.take(block))
     if suspects.size:
         corner = np.stack(np.unravel_index(block[suspects], tables.blocks), axis=-1) * BLOCK
-        beyond = (corner + within[place[suspects]] >= hull.shape).any(axis=1)
+        beyond = (corner + WITHIN[place[suspects]] >= hull.shape).any(axis=1)
         flat = np.delete(flat, suspects[beyond])
     hull.ravel()[flat] = True

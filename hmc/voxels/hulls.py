@@ -26,7 +26,7 @@ from hmc.errors import InputError
 from hmc.io.masks import MaskStep, Report
 from hmc.io.recording import Recording
 from hmc.voxels.background_initialisation import UnseenPlaces, learn_from_people, with_unseen_places
-from hmc.voxels.carving import CarvingTables, carve_levels, make_tables
+from hmc.voxels.carving import CarvingTables, carve_levels, shared_tables
 from hmc.voxels.completion import CompletionTables, complete_masks, doubtful_hull, make_completion_tables
 from hmc.voxels.floor_shadows import cut_filled_shadows, cut_floor_shadows
 from hmc.voxels.frontend_settings import FrontendSettings
@@ -84,7 +84,7 @@ def stream_hulls(
     HullStep
     """
     settings = settings or FrontendSettings()
-    tables = make_tables(grid, recording.rig)
+    tables = shared_tables(grid, recording.rig)
     if masks is None:
         masks = stream_masks(recording, settings, first=first, last=last, warm_up=warm_up, on_problem=on_problem, workers=workers)
     for step in masks:

@@ -29,7 +29,7 @@ STEPS = METHOD | {"pose.steps"}
 STARTS = STEPS | {"pose.starts"}
 PERSON = STARTS | {"pose.legs", "pose.person"}
 MIXTURES = STEPS | {"pose.legs", "pose.mixtures"}
-FOLLOWING = PERSON | {"pose.records", "pose.follow", "pose.keypoint_cues"}
+FOLLOWING = PERSON | {"pose.records", "pose.follow", "pose.keypoint_cues", "pose.keypoint_sides"}
 METHODS = STARTS | MIXTURES | {"pose.recovery", "pose.methods"}
 POSE = METHODS | FOLLOWING | {"pose.backward", "pose.clear_views", "pose.keypoint_tracks", "pose.occluders", "pose.registry"}
 POSE |= {"pose.keypoint_views", "pose.smoothing"}
@@ -56,7 +56,8 @@ MAY_IMPORT = {
     "pose.person": PERSON,
     "pose.records": PERSON | {"pose.records"},
     "pose.follow": FOLLOWING,
-    "pose.keypoint_cues": OBJECTIVES,
+    "pose.keypoint_cues": OBJECTIVES | {"pose.keypoint_sides"},
+    "pose.keypoint_sides": VIEWS,
     "pose.keypoint_tracks": VIEWS,
     "pose.keypoint_views": FOLLOWING | {"pose.clear_views"},
     "pose.mixtures": MIXTURES,
@@ -84,6 +85,10 @@ MAY_IMPORT = {
 #: What draws; only this may need what a server lacks.
 DRAWING = ("hmc.view.plots", "hmc.experiments")
 UNWANTED = ("matplotlib", "mpl_toolkits", "pandas", "tqdm")
+
+#: What takes long to import and few runs need, and what all of them need but a command that only explains itself.
+SLOW = ("sklearn", "scipy.stats", "scipy.signal", *UNWANTED)
+NUMBERS = ("scipy", "cv2")
 
 #: Loading what these wrote can run code.
 UNSAFE_MODULES = {"pickle", "cPickle", "dill", "cloudpickle", "shelve", "marshal"}
@@ -181,6 +186,19 @@ for name in {names!r}:
 """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=PACKAGE.parent)
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize(
+    "program",
+    ["from hmc.cli import main; main(['--help'])", "import hmc.cli.pose, hmc.pose.backward, hmc.pose.smoothing, hmc.tracking.resumable"],
+    ids=["help", "run"],
+)
+def test_what_is_slow_to_import_is_not_before_it_is_used(program):
+    slow = SLOW + (NUMBERS if "--help" in program else ())
+    program = f"import sys\ntry:\n    {program}\nexcept SystemExit:\n    pass\nprint(*(name for name in {slow!r} if name in sys.modules))"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=PACKAGE.parent)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines()[-1] == "", done.stdout.splitlines()[-1]
 
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))

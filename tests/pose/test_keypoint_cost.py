@@ -24,7 +24,8 @@ from hmc.pose.keypoint_cues import beside_body, learn_beside, learn_scatter, wit
 from hmc.pose.objectives.keypoints import BESIDE_M, Beside, KeypointCost, KeypointSettings
 from hmc.pose.objectives.objective import Sum
 from hmc.pose.views.keypoint_pose import keypoint_pose, landmarks_seen
-from hmc.pose.views.keypoints import SeenKeypoints, meeting_points, see_keypoints, sight_lines
+from hmc.pose.views.keypoints import SeenKeypoints, see_keypoints, sight_lines
+from hmc.pose.views.line_meeting import meeting_points
 from hmc.pose.views.person_view import PersonView
 
 BODY = default_body(1.75)
@@ -218,7 +219,7 @@ def test_the_scatter_of_a_detector_is_learnt(ring):
     rig = ring.select(ring.names[: len(noise)])
     frames = [one[: len(rig)] for one in frames]
     tracks = TrackTable(np.arange(60), np.zeros(60, int), np.array([state[:3] for state in states]))
-    cues = learn_scatter(rig, tracks, Stored(frames))
+    cues = learn_scatter(rig, tracks, Stored(frames), 30)
     metres = [px * np.linalg.norm(camera.centre - [0, 0, 1]) / camera.matrix[0, 0] for camera, px in zip(rig, noise, strict=False)]
     found = np.median(cues.scatter_m, axis=1)
     expected = np.maximum(metres, 0.008)

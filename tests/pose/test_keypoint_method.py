@@ -115,7 +115,7 @@ def test_cameras_agree_with_a_pose_until_it_is_moved(clip):
     source = open_keypoints(recording)
     people = hmc.pose(recording, method="keypoints", keypoints=source)
     tracks = tracks_of_keypoints(recording, source)
-    cues = learn_scatter(recording.rig, tracks, source)
+    cues = learn_scatter(recording.rig, tracks, source, recording.fps)
     arm = people.states.states.copy()
     arm[:, dof_index("l_elbow_z")] -= 1.5
     moved = with_keypoint_views(replace(people, states=replace(people.states, states=arm)), recording, tracks, cues)
@@ -172,7 +172,7 @@ def test_a_stopped_run_goes_on_and_ends_as_if_it_had_not_been(clip, tmp_path, st
 
     def work(run, track_run):
         tracks = tracks_of_keypoints(recording, source, track_run)
-        options = FollowOptions(keypoints=learn_scatter(recording.rig, tracks, source))
+        options = FollowOptions(keypoints=learn_scatter(recording.rig, tracks, source, recording.fps))
         return tracks, follow(recording, tracks, method, options, run)
 
     tracks, whole = work(RunOptions(), RunOptions())

@@ -16,7 +16,8 @@ from hmc.camera.model import Rig, look_at, project
 from hmc.io.keypoints import KEYPOINTS
 from hmc.pose.keypoint_tracks import link_people
 from hmc.pose.views.keypoint_groups import find_people
-from hmc.pose.views.keypoints import lines_of, meeting_points
+from hmc.pose.views.keypoints import lines_of
+from hmc.pose.views.line_meeting import meeting_points
 from hmc.synthetic.keypoints import body_keypoints
 
 OF_BODY = [KEYPOINTS.index(name) for name in BODY_KEYPOINTS]

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hmc.camera.model import Camera, Rig, backproject, look_at
+from hmc.camera.model import Camera, Rig, backproject, look_at, project
 from hmc.errors import InputError
-from hmc.voxels.carving import carve, carve_levels, make_tables, pixel_of_voxel, pixels_at
+from hmc.voxels.carving import carve, carve_levels, make_tables, pixel_of_voxel, pixels_at, shared_tables
 from hmc.voxels.grid import VoxelGrid
 
 ROOM = [[-1.0, -0.8, 0.0], [1.0, 0.8, 1.3]]
@@ -159,6 +159,29 @@ def test_a_sphere_comes_back_as_itself():
     inside = np.linalg.norm(grid.centres() - centre, axis=-1) < radius - 0.01
     assert not np.any(inside & ~hull)
     assert inside.sum() < hull.sum() < 1.35 * inside.sum()
+
+
+@pytest.mark.parametrize("lens", [(0, 0, 0, 0), (-0.3, 0.1, 0.001, -0.002), (0.2, 0, 0, 0)])
+@pytest.mark.parametrize("place", [(2.6, 0.3, 1.8), (0.2, 0.1, 0.6), (0, -3, 0.5)])
+def test_tables_hold_the_pixel_of_every_voxel(place, lens):
+    """But for centres that fall on an edge between pixels, of which many do where a camera looks along an axis: there rounding decides."""
+    camera = look_at("c", (160, 120), place, [0, 0, 0.5], 2 * np.degrees(np.arctan(0.5)), lens)
+    grid = VoxelGrid.from_room(ROOM, 0.05)
+    voxels = np.stack(np.unravel_index(np.arange(grid.n_voxels), grid.shape), axis=-1)
+    column, row, seen = pixel_of_voxel(camera, grid.centres(voxels))
+    uv, valid = project(camera, grid.centres(voxels))
+    clear = ~valid | (np.abs(uv % 1 - 0.5).min(axis=1) > 1e-9)
+    assert seen.any() and clear.mean() > 0.9
+    expected = np.where(seen, row * 160 + column, 160 * 120)
+    np.testing.assert_array_equal(pixels_at(make_tables(grid, Rig((camera,))), voxels)[0, clear], expected[clear])
+
+
+def test_tables_are_made_once_for_a_grid_and_a_rig(ring):
+    grids = [VoxelGrid.from_room(ROOM, size) for size in (0.1, 0.1, 0.2)]
+    first, again, other = (shared_tables(grid, ring) for grid in grids)
+    assert again is first and other.grid.shape == grids[2].shape
+    np.testing.assert_array_equal(other.pixels, make_tables(grids[2], ring).pixels)
+    assert shared_tables(grids[2], Rig(ring.cameras[:2])).pixels.shape[0] == 2
 
 
 def test_a_voxel_behind_a_camera_is_not_voted_down_by_it():

@@ -9,7 +9,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.interpolate import BSpline
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
@@ -102,6 +101,8 @@ def curve_through(points: np.ndarray, sites: np.ndarray, settings: SkeletonSetti
     ndarray, shape (nodes, 3)
         In the order of rising site values.
     """
+    from scipy.interpolate import BSpline
+
     settings = settings or SkeletonSettings()
     order = np.argsort(sites, kind="stable")
     s, x = sites[order], points[order]

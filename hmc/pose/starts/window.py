@@ -8,7 +8,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -41,6 +41,8 @@ __all__ = [
     "StartSettings", "WindowStart", "candidates", "estimate_height", "possible_heights", "quick_step", "search_all", "walk", "walk_factor",
 ]  # fmt: skip
 
+#: Frames of a window and how a pose was followed through them.
+_Path = dict[int, tuple[Tracked, StepInfo]]
 #: Fewer surface voxels are too little of a person to start from.
 LEAST_START_SURFACE = 50
 #: The window's frames are thinned out to about so many a second before body and first pose are decided.
@@ -176,16 +178,18 @@ class WindowStart:
         make = {"default": default_body, "stiff": stiff_body, "canton": canton_body}[preset.body]
         bodies = [make(height) for height in heights]
         subjects = [annealed_subject(body, capture, preset) for body in bodies]
+        known: _Path = {}
         if preset.start == "neutral":
             started = StartPose(subjects[0], window.usable[0], _neutral_start(bodies[0], window))
         else:
             starts = [_best_hypothesis(one, window, preset, self.settings) for one in subjects]
-            child = int(len(starts) > 1 and starts[1].costs[0] < CHILD_GAIN * starts[0].costs[0])
-            started = starts[child]
+            child = int(len(starts) > 1 and starts[1][0].costs[0] < CHILD_GAIN * starts[0][0].costs[0])
+            started, known = starts[child]
         if preset.fit_body is None:
             return started
         # What the body's dimensions are fitted to need not be the last word on the poses.
-        path = walk(window.frame_rng, quick_step(preset), started.subject, started.state, started.anchor, window.views, capture.workers)
+        frames = window.frame_rng, quick_step(preset), started.subject, started.state, started.anchor, window.views
+        path = walk(*frames, known, capture.workers)
         subject = _fit(started.subject, window, path, self, height_m is not None)
         return replace(started, subject=subject, state=path[started.anchor][0].state)
 
@@ -224,6 +228,7 @@ def walk(
     state: np.ndarray | Tracked,
     anchor: int,
     views: Sequence[PersonView],
+    known: Mapping[int, tuple[Tracked, StepInfo]] | None = None,
     workers: int = 1,
 ) -> list[tuple[Tracked, StepInfo]]:
     """A pose tracked from one frame backwards to the first and forwards to the last.
@@ -238,6 +243,8 @@ def walk(
         Pose in the frame `anchor`.
     anchor : int
     views : sequence of PersonView
+    known : mapping of int to (Tracked, StepInfo), optional
+        Frames around the anchor that were followed before, from the same pose with the same step and random numbers.
     workers : int
         With two or more, forwards and backwards at once.
 
@@ -246,14 +253,14 @@ def walk(
     list of (Tracked, StepInfo)
         One a frame.
     """
-    n = len(views)
+    n, known = len(views), known or {}
     start = state if isinstance(state, Tracked) else begin_tracking(subject, state)
-    first = step(frame_rng(anchor), start, views[anchor])
+    first = known[anchor] if anchor in known else step(frame_rng(anchor), start, views[anchor])
 
     def onwards(order: Iterable[int]) -> list[tuple[Tracked, StepInfo]]:
         found, current = [], replace(first[0], velocity=np.zeros_like(start.state))
         for k in order:
-            found.append(step(frame_rng(k), current, views[k]))
+            found.append(known[k] if k in known else step(frame_rng(k), current, views[k]))
             current = found[-1][0]
         return found
 
@@ -304,8 +311,8 @@ def candidates(rng: np.random.Generator, subject: Subject, view: PersonView, pre
     return np.array([state for state, _ in refined]), np.array([info.cost_after for _, info in refined])
 
 
-def _best_hypothesis(subject: Subject, window: _Window, preset: PosePreset, settings: StartSettings) -> StartPose:
-    """The frame and pose to start from, and the mean costs of all that were followed."""
+def _best_hypothesis(subject: Subject, window: _Window, preset: PosePreset, settings: StartSettings) -> tuple[StartPose, _Path]:
+    """The frame and pose to start from, the mean costs of all that were followed, and how the best went."""
     usable, velocities, body = window.usable, window.velocities, subject.body
     anchors = sorted({usable[round(q * (len(usable) - 1))] for q in np.linspace(0.1, 0.9, settings.anchors)})
     pool, workers = [], window.capture.workers
@@ -330,23 +337,25 @@ def _best_hypothesis(subject: Subject, window: _Window, preset: PosePreset, sett
     if preset.search is not None:
         searches = [partial(search_all, window.frame_rng(anchor), objective, state, preset.polish) for state in chosen]
         chosen = [state for state, _ in share_out(searches, workers)]
-    scores = _followed_costs(subject, window, preset, settings, anchor, chosen)
+    scores, paths = _followed(subject, window, preset, settings, anchor, chosen)
     order = np.argsort(scores)
-    return StartPose(subject, anchor, chosen[order[0]], costs=np.array(scores)[order])
+    return StartPose(subject, anchor, chosen[order[0]], costs=np.array(scores)[order]), paths[order[0]]
 
 
-def _followed_costs(subject, window, preset, settings, anchor, chosen) -> list[float]:
-    """Mean cost of every candidate over the frames around that in which they were found."""
+def _followed(subject, window, preset, settings, anchor, chosen) -> tuple[list[float], list[_Path]]:
+    """Every candidate over the frames around that in which they were found: its mean cost, and its poses."""
     reach = max(2, round(settings.follow_s * window.capture.fps))
     first, last = max(0, anchor - reach), min(len(window.views), anchor + reach + 1)
 
-    def score(state: np.ndarray) -> float:
+    def follow(state: np.ndarray) -> tuple[float, _Path]:
         path = walk(lambda k: window.frame_rng(first + k), quick_step(preset), subject, state, anchor - first, window.views[first:last])
         followed = np.array([info.cost for _, info in path])
         headings = np.array([one.state[3] for one, _ in path])
-        return float(np.nanmean(followed * walk_factor(headings, window.velocities[first:last], settings)))
+        score = np.nanmean(followed * walk_factor(headings, window.velocities[first:last], settings))
+        return float(score), dict(enumerate(path, first))
 
-    return share_out([partial(score, state) for state in chosen], window.capture.workers)
+    scores, paths = zip(*share_out([partial(follow, state) for state in chosen], window.capture.workers), strict=True)
+    return list(scores), list(paths)
 
 
 def search_all(rng: np.random.Generator, objective: Objective, state: np.ndarray, settings: PolishSettings) -> tuple[np.ndarray, float]:

@@ -14,7 +14,9 @@ import numpy as np
 
 from hmc.body.keypoint_places import BODY_KEYPOINTS, MIRRORED
 from hmc.camera.model import Rig
-from hmc.pose.views.keypoints import SCATTER_M, lines_of, meeting_points
+from hmc.pose.views.exchanged_sides import TURN_SHARE
+from hmc.pose.views.keypoints import SCATTER_M, lines_of
+from hmc.pose.views.line_meeting import between_lines, meeting_points
 
 __all__ = ["FoundPeople", "find_people"]
 
@@ -24,8 +26,6 @@ CAP_M = 0.3
 GATE_M = 0.15
 #: Fewer shared keypoints do not tell whether detections are of one person.
 LEAST_SHARED = 4
-#: Lines of sight that meet at a smaller angle (its sine) do not tell where.
-LEAST_SINE = 0.05
 #: From the middle of the shoulders to that of the hips, metres, smallest and largest.
 TRUNK_M = (0.3, 0.8)
 #: People are within the room, and by so much beyond its walls, its floor and its ceiling, metres.
@@ -34,8 +34,6 @@ BEYOND_M = 0.5
 SAME_M = 0.2
 #: The crown over nose and ears, metres, and over the shoulders in lengths of the trunk (`hmc.body.proportions`).
 CROWN_M, CROWN_OVER_TRUNK = 0.13, 0.8
-#: A detection is turned, left for right, where that lowers its distances to this share.
-TURN_SHARE = 0.5
 _SHOULDERS, _HIPS, _FACE = (
     [k for k, name in enumerate(BODY_KEYPOINTS) if name.endswith(ends)] for ends in ("shoulder", "hip", ("nose", "ear"))
 )
@@ -139,17 +137,7 @@ def _hypotheses(lines: _Lines) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def _between(lines: _Lines, i: np.ndarray, j: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Places between the lines of pairs of detections, (m, 15, 3), and how far the lines pass one another, (m, 15); NaN where they do not
     meet in front of both cameras."""
-    one, other = lines.directions[i], lines.directions[j]
-    way = (lines.centre[j] - lines.centre[i])[:, None]
-    normal = np.cross(one, other)
-    squared = (normal**2).sum(axis=-1)
-    with np.errstate(all="ignore"):
-        along = (np.cross(way, other) * normal).sum(axis=-1) / squared
-        beyond = (np.cross(way, one) * normal).sum(axis=-1) / squared
-        gap = np.abs((normal * way).sum(axis=-1)) / np.sqrt(squared)
-        good = (squared > LEAST_SINE**2) & (along > 0) & (beyond > 0)
-    ends = lines.centre[i][:, None] + along[..., None] * one + lines.centre[j][:, None] + beyond[..., None] * other
-    return np.where(good[..., None], ends / 2, np.nan), np.where(good, gap, np.nan)
+    return between_lines(lines.centre[i][:, None], lines.directions[i], lines.centre[j][:, None], lines.directions[j])
 
 
 def _mean_miss(places: np.ndarray, centre: np.ndarray, directions: np.ndarray) -> np.ndarray:
