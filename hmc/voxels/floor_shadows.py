@@ -183,11 +183,13 @@ def _shadowed(tables: CompletionTables, floors: dict[int, _Floor], asked: dict[i
     square = np.ones((SPOT, SPOT), np.uint8)
     spots = {}
     for k, c in enumerate(floors):
-        others = dark.copy()
+        candidates = np.flatnonzero(most & dark[k])
+        others = dark.take(candidates, axis=1)
         others[k] = False
-        agree = (others & (np.abs(seen - seen[k]) < AGREE)).sum(axis=0)
+        there = seen.take(candidates, axis=1)
+        agree = (others & (np.abs(there - there[k]) < AGREE)).sum(axis=0)
         found = np.zeros(n_cells, np.uint8)
-        found[cells] = most & dark[k] & (agree >= np.maximum(1, AGREE_SHARE * others.sum(axis=0)))
+        found[cells.take(candidates)] = agree >= np.maximum(1, AGREE_SHARE * others.sum(axis=0))
         spot = cv2.morphologyEx(found.reshape(tables.cells), cv2.MORPH_OPEN, square)
         spots[c] = np.append(cv2.morphologyEx(spot, cv2.MORPH_CLOSE, square).ravel() > 0, False)
     return spots
@@ -210,7 +212,8 @@ def _beside_people(tables: CompletionTables, masks: Sequence[np.ndarray | None],
 
 def _around(pixels: np.ndarray, size: tuple[int, ...], margin: int) -> tuple[tuple[slice, slice], np.ndarray]:
     """The part of an image that holds some flat pixels and what is so near to them, and their flat places in it."""
-    rows, columns = np.divmod(pixels, size[1])
+    rows = pixels // size[1]
+    columns = pixels - rows * size[1]  # much quicker than `divmod`
     top, left = max(0, int(rows.min()) - margin), max(0, int(columns.min()) - margin)
     right = min(size[1], int(columns.max()) + margin + 1)
     box = slice(top, int(rows.max()) + margin + 1), slice(left, right)
@@ -221,6 +224,8 @@ def _without(mask: np.ndarray, pixels: np.ndarray) -> np.ndarray:
     """A mask without some pixels, and without the specks that are left around them."""
     left = mask.copy()
     left.ravel()[pixels] = False
-    opened = cv2.morphologyEx(left.view(np.uint8), cv2.MORPH_OPEN, np.ones((SPECK, SPECK), np.uint8))
-    changed = cv2.dilate((mask & ~left).view(np.uint8), np.ones((AROUND, AROUND), np.uint8))
-    return np.where(changed > 0, opened > 0, left)
+    box, _ = _around(pixels, mask.shape, AROUND // 2 + SPECK - 1)
+    opened = cv2.morphologyEx(left[box].view(np.uint8), cv2.MORPH_OPEN, np.ones((SPECK, SPECK), np.uint8))
+    changed = cv2.dilate((mask[box] & ~left[box]).view(np.uint8), np.ones((AROUND, AROUND), np.uint8))
+    left[box] = np.where(changed > 0, opened > 0, left[box])
+    return left
