@@ -186,8 +186,8 @@ def _shadowed(tables: CompletionTables, floors: dict[int, _Floor], asked: dict[i
         candidates = np.flatnonzero(most & dark[k])
         others = dark.take(candidates, axis=1)
         others[k] = False
-        there = seen.take(candidates, axis=1)
-        agree = (others & (np.abs(there - there[k]) < AGREE)).sum(axis=0)
+        shares = seen.take(candidates, axis=1)
+        agree = (others & (np.abs(shares - shares[k]) < AGREE)).sum(axis=0)
         found = np.zeros(n_cells, np.uint8)
         found[cells.take(candidates)] = agree >= np.maximum(1, AGREE_SHARE * others.sum(axis=0))
         spot = cv2.morphologyEx(found.reshape(tables.cells), cv2.MORPH_OPEN, square)
