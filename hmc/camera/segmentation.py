@@ -153,6 +153,8 @@ class BackgroundModel:
         Images are smoothed first by a Gaussian of this side, pixels, since this camera is noisy; 0: they are not.
     grey : bool
         The empty scene has no color: images without any may come from a monochrome camera.
+    changes : int
+        How often the mean has changed.
     """
 
     mixture: cv2.BackgroundSubtractorMOG2
@@ -167,6 +169,7 @@ class BackgroundModel:
     unseen: np.ndarray | None = None
     blur: int = 0
     grey: bool = False
+    changes: int = 0
 
 
 def train_background(
@@ -271,7 +274,7 @@ def segment(
     model.mixture.setShadowThreshold(settings.shadow_factor)
     if model.before is not None and _nearer(image, model.before, model.mean):  # it was a flash
         model.mean[...] = model.before
-        model = replace(model, before=None)
+        model = replace(model, before=None, changes=model.changes + 1)
     answer, found = _apply(model, image)
     if cv2.countNonZero(found) > SUSPECT_SHARE * found.size:
         image, answer, found = _level(model, image, answer, found)
@@ -290,6 +293,7 @@ def segment(
         rate = SETTLING_RATE if after.settling else settings.learning_rate
         people = mask if model.unseen is None else mask | model.unseen
         _learn(after, image, _hidden(people, answer, settings), rate, settings)
+        after = replace(after, changes=after.changes + 1)
     return mask, after
 
 
@@ -468,7 +472,7 @@ def _adapt_to_switch(model: BackgroundModel, image: np.ndarray, settings: Segmen
     empty = np.where(near[..., None] > 0, np.clip(old * gain, 0, 255), image).astype(np.uint8)
     model.mean[...] = _luma_chroma(empty)
     model.mixture.apply(empty, learningRate=SWITCH_RATE)
-    return replace(model, frame=model.frame + 1, settling=SETTLING_FRAMES, before=before)
+    return replace(model, frame=model.frame + 1, settling=SETTLING_FRAMES, before=before, changes=model.changes + 1)
 
 
 def _luma_chroma(image: np.ndarray) -> np.ndarray:

@@ -46,6 +46,7 @@ from hmc.pose.views.keypoint_pose import keypoint_pose
 from hmc.pose.views.person_view import PersonView, views_of
 from hmc.processes import each_ahead
 from hmc.tracking.resumable import person_grid
+from hmc.voxels.carving import shared_tables
 from hmc.voxels.hulls import stream_hulls
 from hmc.voxels.run_options import RunOptions
 
@@ -152,6 +153,7 @@ class _Pass:
 
     def views(self, frames: Sequence[int]) -> Iterator[tuple[int, dict[int, PersonView]]]:
         """What some frames show of all people, in any order, by what the first pass tells of the scene and of the others' poses."""
+        shared_tables(person_grid(self.recording, self.options.voxel_size_m), self.recording.rig)  # once, for all processes
         return each_ahead(self._views, frames, self.run.workers)
 
     def _views(self, frames: Sequence[int]) -> Iterator[tuple[int, dict[int, PersonView]]]:

@@ -30,6 +30,7 @@ from hmc.pose.views.person_view import IMAGES_FOR, PersonView, check_needs, view
 from hmc.processes import ahead, each_ahead
 from hmc.tracking.resumable import WARM_UP_FRAMES, kept_silhouettes, person_grid
 from hmc.tracking.tracks import velocities
+from hmc.voxels.carving import shared_tables
 from hmc.voxels.hulls import stream_hulls, stream_masks
 from hmc.voxels.run_options import RunOptions
 
@@ -214,6 +215,7 @@ def _views_from(
     elif kept_silhouettes(recording, run, first) is None:
         views = seen(_new_masks(recording, run, first))
     else:
+        shared_tables(grid, recording.rig)  # once, for all processes
         views = each_ahead(kept, range(first, end), run.workers)
     yield from run.progress(views, end - first) if run.progress else views
 

@@ -16,15 +16,16 @@ Measured by ``python -m hmc.experiments run repairs``.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
-from hmc.camera.segmentation import BackgroundModel, light_gain
+from hmc.camera.segmentation import light_gain
 from hmc.voxels.carving import carve, pixels_at
 from hmc.voxels.completion import CompletionTables, doubted_floor, shown
 
-__all__ = ["cut_filled_shadows", "cut_floor_shadows", "floor_darkness"]
+__all__ = ["Scene", "cut_filled_shadows", "cut_floor_shadows"]
 
 #: Shares of the empty floor's light: from the first on a spot is bare, below the second it is no shadow but something dark.
 BARE, DARKEST = 0.93, 0.5
@@ -40,6 +41,22 @@ SPOT, SPECK, AROUND = 3, 3, 5
 
 #: Of a pixel that tells nothing of the floor: no image, another color than the floor's.
 _UNKNOWN, _OTHER = np.float32(np.nan), np.float32(9)
+
+
+@dataclass(frozen=True)
+class Scene:
+    """The light of the empty scene, as one camera knows it.
+
+    Parameters
+    ----------
+    mean : ndarray of float32, shape (height, width, 3)
+        Luma and chroma (`hmc.camera.segmentation.BackgroundModel`).
+    unseen : ndarray of bool, shape (height, width), or None
+        Where it was never seen.
+    """
+
+    mean: np.ndarray
+    unseen: np.ndarray | None = None
 
 
 def cut_filled_shadows(
@@ -81,7 +98,10 @@ def cut_filled_shadows(
 
 
 def cut_floor_shadows(
-    tables: CompletionTables, darkness: Sequence[np.ndarray | None], masks: Sequence[np.ndarray | None]
+    tables: CompletionTables,
+    images: Sequence[np.ndarray | None],
+    scenes: Sequence[Scene | None],
+    masks: Sequence[np.ndarray | None],
 ) -> tuple[np.ndarray | None, ...]:
     """Silhouettes without the shadows on the floor.
 
@@ -89,8 +109,10 @@ def cut_floor_shadows(
     ----------
     tables : CompletionTables
         Of the room and the rig.
-    darkness : sequence of ndarray of float32, shape (height, width), or None
-        As from `floor_darkness`, one a camera; None of a camera that does not know the empty scene.
+    images : sequence of ndarray of uint8, shape (height, width, 3), or None
+        BGR, one a camera.
+    scenes : sequence of Scene or None
+        What is known of the empty scene; None of a camera that has other silhouettes.
     masks : sequence of ndarray of bool, shape (height, width), or None
 
     Returns
@@ -98,90 +120,128 @@ def cut_floor_shadows(
     tuple of ndarray of bool, shape (height, width), or None
         Each within the mask it came from. With fewer than two cameras that know the empty floor, the masks as they are.
     """
-    told = {c: values for c, values in enumerate(darkness) if values is not None and masks[c] is not None}
-    if len(told) < 2:
+    floors = {
+        c: _Floor(image, scene, light_gain(image, scene.mean, mask))
+        for c, (image, scene, mask) in enumerate(zip(images, scenes, masks, strict=True))
+        if image is not None and scene is not None and mask is not None
+    }
+    if len(floors) < 2:
         return tuple(masks)
-    spots, dark = _shadowed(tables, told), {}
-    for c, values in told.items():
-        pixels = np.flatnonzero(np.asarray(masks[c]))
-        pixels = pixels[spots[c].take(tables.pixel_cells[c].ravel().take(pixels))]
-        share = values.ravel().take(pixels)
-        dark[c] = pixels[(share > np.log(DARKEST)) & (share < 0)]
-    if not any(map(len, dark.values())):
+    n_cells = tables.cells[0] * tables.cells[1]
+    dark = {c: _dark_pixels(floor, np.asarray(masks[c]), tables.pixel_cells[c], n_cells) for c, floor in floors.items()}
+    spots = _shadowed(tables, floors, {c: cells for c, (_, cells) in dark.items()})
+    cut_out = {c: pixels[spots[c].take(cells)] for c, (pixels, cells) in dark.items()}
+    cut_out = {c: pixels for c, pixels in cut_out.items() if len(pixels)}
+    if not cut_out:
         return tuple(masks)
     cut = list(masks)
-    standing = _standing(tables, masks)
-    for c, pixels in dark.items():
-        pixels = pixels[standing[c].ravel().take(pixels) == 0]
+    for c, pixels in _beside_people(tables, masks, cut_out).items():
         if len(pixels):
             cut[c] = _without(np.asarray(masks[c]), pixels)
     return tuple(cut)
 
 
-def floor_darkness(image: np.ndarray, model: BackgroundModel, mask: np.ndarray) -> np.ndarray:
-    """How dark each pixel is against the empty scene.
+@dataclass(frozen=True)
+class _Floor:
+    """What a camera knows of the floor's light: its image, the empty scene, and how bright the image is as a whole."""
 
-    Parameters
-    ----------
-    image : ndarray of uint8, shape (height, width, 3)
-        BGR.
-    model : BackgroundModel
-    mask : ndarray of bool, shape (height, width)
-        The silhouette: how bright the whole image is, is told beside it.
+    image: np.ndarray
+    scene: Scene
+    gain: float
 
-    Returns
-    -------
-    ndarray of float32, shape (height, width)
-        Logarithm of the share of the empty scene's light; 9 where the pixel has another color as well.
-    """
-    color = cv2.GaussianBlur(cv2.cvtColor(image, cv2.COLOR_BGR2YCrCb), (3, 3), 0).astype(np.float32)
-    share = np.maximum(color[..., 0], 1) / model.mean[..., 0]
-    share /= light_gain(image, model.mean, mask)  # exposure, flicker
+
+def _darkness(floor: _Floor, pixels: np.ndarray) -> np.ndarray:
+    """Logarithm of the share of the empty scene's light that flat pixels have, float32; `_OTHER` where they have another color as well."""
+    if not len(pixels):
+        return np.zeros(0, np.float32)
+    box, places = _around(pixels, floor.image.shape, 1)  # the blur takes in one pixel more
+    part = cv2.GaussianBlur(cv2.cvtColor(floor.image[box], cv2.COLOR_BGR2YCrCb), (3, 3), 0)
+    color = part.reshape(-1, 3).take(places, axis=0).astype(np.float32)
+    luma, *chroma = (floor.scene.mean[..., k].reshape(-1).take(pixels) for k in range(3))
+    share = np.maximum(color[:, 0], 1) / luma
+    share /= floor.gain  # exposure, flicker
     lit = np.minimum(share, 1)  # chroma shrinks with the light
-    tint = np.maximum(*(np.abs(color[..., k] - 128 - lit * (model.mean[..., k] - 128)) for k in (1, 2)))
+    tint = np.maximum(*(np.abs(color[:, k] - 128 - lit * (mean - 128)) for k, mean in enumerate(chroma, start=1)))
     dark = np.where(tint < MOST_CHROMA, np.log(share), _OTHER)
-    return dark if model.unseen is None else np.where(model.unseen, _OTHER, dark)
+    return dark if floor.scene.unseen is None else np.where(floor.scene.unseen.ravel().take(pixels), _OTHER, dark)
 
 
-def _shadowed(tables: CompletionTables, darkness: dict[int, np.ndarray]) -> dict[int, np.ndarray]:
-    """By camera, the floor's cells that are in a shadow as it sees them; one more, beyond the floor, is not."""
-    seen = np.stack([np.append(dark.ravel(), _UNKNOWN).take(tables.cell_pixels[c]) for c, dark in darkness.items()])
+def _dark_pixels(floor: _Floor, mask: np.ndarray, pixel_cells: np.ndarray, n_cells: int) -> tuple[np.ndarray, np.ndarray]:
+    """A silhouette's flat pixels that may be floor in a shadow, and the cells on which they look."""
+    pixels = np.flatnonzero(mask)
+    cells = pixel_cells.ravel().take(pixels)
+    inside = cells < n_cells
+    pixels, cells = pixels[inside], cells[inside]
+    share = _darkness(floor, pixels)
+    some = (share > np.log(DARKEST)) & (share < 0)
+    return pixels[some], cells[some]
+
+
+def _shadowed(tables: CompletionTables, floors: dict[int, _Floor], asked: dict[int, np.ndarray]) -> dict[int, np.ndarray]:
+    """By camera, the floor's cells that are in a shadow as it sees them; one more, beyond the floor, is not.
+
+    Only told of the cells that are asked for, some of each camera's.
+    """
+    n_cells = tables.cells[0] * tables.cells[1]
+    near = np.zeros(n_cells, np.uint8)
+    for some in asked.values():
+        near[some] = 1
+    reach = np.ones((4 * (SPOT - 1) + 1,) * 2, np.uint8)  # as far as opening and closing look
+    cells = np.flatnonzero(cv2.dilate(near.reshape(tables.cells), reach))
+    seen = np.full((len(floors), len(cells)), _UNKNOWN)
+    for row, (c, floor) in zip(seen, floors.items(), strict=True):
+        pixels = tables.cell_pixels[c].take(cells)
+        there = np.flatnonzero(pixels < floor.scene.mean[..., 0].size)
+        row[there] = _darkness(floor, pixels.take(there))
     bare = ((seen > np.log(BARE)) & (seen < _OTHER)).sum(axis=0)
     dark = (seen <= np.log(BARE)) & (seen >= np.log(DARKEST))
     most = dark.sum(axis=0) > bare
     square = np.ones((SPOT, SPOT), np.uint8)
     spots = {}
-    for k, c in enumerate(darkness):
-        others = dark.copy()
+    for k, c in enumerate(floors):
+        candidates = np.flatnonzero(most & dark[k])
+        others = dark.take(candidates, axis=1)
         others[k] = False
-        agree = (others & (np.abs(seen - seen[k]) < AGREE)).sum(axis=0)
-        found = most & dark[k] & (agree >= np.maximum(1, AGREE_SHARE * others.sum(axis=0)))
-        cells = cv2.morphologyEx(found.view(np.uint8).reshape(tables.cells), cv2.MORPH_OPEN, square)
-        cells = cv2.morphologyEx(cells, cv2.MORPH_CLOSE, square)
-        spots[c] = np.append(cells.ravel() > 0, False)
+        shares = seen.take(candidates, axis=1)
+        agree = (others & (np.abs(shares - shares[k]) < AGREE)).sum(axis=0)
+        found = np.zeros(n_cells, np.uint8)
+        found[cells.take(candidates)] = agree >= np.maximum(1, AGREE_SHARE * others.sum(axis=0))
+        spot = cv2.morphologyEx(found.reshape(tables.cells), cv2.MORPH_OPEN, square)
+        spots[c] = np.append(cv2.morphologyEx(spot, cv2.MORPH_CLOSE, square).ravel() > 0, False)
     return spots
 
 
-def _standing(tables: CompletionTables, masks: Sequence[np.ndarray | None]) -> dict[int, np.ndarray]:
-    """By camera, where it looks at places above the floor at which all cameras see people, 1 or 0."""
+def _beside_people(tables: CompletionTables, masks: Sequence[np.ndarray | None], asked: dict[int, np.ndarray]) -> dict[int, np.ndarray]:
+    """By camera, those of some flat pixels that do not look at a place above the floor at which all cameras see people."""
     grid = tables.carving.grid
-    hull = carve(tables.carving, masks)
-    hull[..., : int(np.ceil(ABOVE_M / grid.voxel_size_m))] = False
-    voxels = np.argwhere(hull)
-    points, pixels = grid.centres(voxels), pixels_at(tables.carving, voxels).astype(np.int64)
-    standing = {}
-    for c, mask in enumerate(masks):
-        if mask is not None:
-            image, scale = shown(tables.carving.rig[c], points, pixels[c])
-            side = max(1, int(np.ceil(grid.voxel_size_m * scale)))
-            standing[c] = cv2.dilate(image, np.ones((side, side), np.uint8))
-    return standing
+    voxels = np.stack(np.unravel_index(np.flatnonzero(carve(tables.carving, masks)), grid.shape), axis=-1)
+    voxels = voxels[voxels[:, 2] >= int(np.ceil(ABOVE_M / grid.voxel_size_m))]
+    points, shown_at = grid.centres(voxels), pixels_at(tables.carving, voxels).astype(np.int64)
+    beside = {}
+    for c, pixels in asked.items():
+        image, scale = shown(tables.carving.rig[c], points, shown_at[c])
+        side = max(1, int(np.ceil(grid.voxel_size_m * scale)))
+        box, places = _around(pixels, image.shape, side)
+        beside[c] = pixels[cv2.dilate(image[box], np.ones((side, side), np.uint8)).ravel().take(places) == 0]
+    return beside
+
+
+def _around(pixels: np.ndarray, size: tuple[int, ...], margin: int) -> tuple[tuple[slice, slice], np.ndarray]:
+    """The part of an image that holds some flat pixels and what is so near to them, and their flat places in it."""
+    rows = pixels // size[1]
+    columns = pixels - rows * size[1]  # much quicker than `divmod`
+    top, left = max(0, int(rows.min()) - margin), max(0, int(columns.min()) - margin)
+    right = min(size[1], int(columns.max()) + margin + 1)
+    box = slice(top, int(rows.max()) + margin + 1), slice(left, right)
+    return box, (rows - top) * (right - left) + columns - left
 
 
 def _without(mask: np.ndarray, pixels: np.ndarray) -> np.ndarray:
     """A mask without some pixels, and without the specks that are left around them."""
     left = mask.copy()
     left.ravel()[pixels] = False
-    opened = cv2.morphologyEx(left.view(np.uint8), cv2.MORPH_OPEN, np.ones((SPECK, SPECK), np.uint8))
-    changed = cv2.dilate((mask & ~left).view(np.uint8), np.ones((AROUND, AROUND), np.uint8))
-    return np.where(changed > 0, opened > 0, left)
+    box, _ = _around(pixels, mask.shape, AROUND // 2 + SPECK - 1)
+    opened = cv2.morphologyEx(left[box].view(np.uint8), cv2.MORPH_OPEN, np.ones((SPECK, SPECK), np.uint8))
+    changed = cv2.dilate((mask[box] & ~left[box]).view(np.uint8), np.ones((AROUND, AROUND), np.uint8))
+    left[box] = np.where(changed > 0, opened > 0, left[box])
+    return left

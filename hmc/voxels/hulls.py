@@ -230,7 +230,7 @@ def _settle(tables: CompletionTables | None, look: Look, settings: FrontendSetti
         masks, much = complete_masks(tables, masks, doubtful)
     if much:  # people who look like what is around them: what is dark on the floor there may be their shoes
         return masks, doubtful
-    return cut_floor_shadows(tables, look.darkness, masks) if settings.cut_shadows else masks, none
+    return cut_floor_shadows(tables, look.images, look.scenes, masks) if settings.cut_shadows else masks, none
 
 
 def _say_still(places: UnseenPlaces) -> Iterator[str]:

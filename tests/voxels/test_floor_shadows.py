@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 from drawn import floor_patch, silhouette
 
-from hmc.camera.segmentation import train_background
-from hmc.voxels.completion import make_completion_tables
+from hmc.camera.segmentation import light_gain, train_background
+from hmc.voxels.carving import carve, pixels_at
+from hmc.voxels.completion import make_completion_tables, shown
 from hmc.voxels.floor_shadows import cut_filled_shadows, cut_floor_shadows
 
 ROOM = np.array([[-1.5, -1.5, 0.0], [1.5, 1.5, 2.2]])
@@ -146,3 +147,56 @@ def test_nothing_filled_changes_nothing_and_cameras_without_doubts_are_left(tabl
     masks = [person | patch for person, patch in zip(people, patches, strict=True)]
     done = cut_filled_shadows(tables, [masks[0], None, *masks[2:]], [None, *patches[1:]], [None, *masks[1:]])
     assert done[0] is masks[0] and done[1] is None and done[2].sum() < masks[2].sum()
+
+
+def cut_by_whole_images(tables, images, models, masks):
+    """The rule pixel by pixel and cell by cell, with nothing left out: whole images, all cells of the floor, all cameras."""
+    seen, cut = [], []
+    for image, model, mask in zip(images, models, masks, strict=True):
+        color = cv2.GaussianBlur(cv2.cvtColor(image, cv2.COLOR_BGR2YCrCb), (3, 3), 0).astype(np.float32)
+        share = np.maximum(color[..., 0], 1) / model.mean[..., 0]
+        share /= light_gain(image, model.mean, mask)
+        tint = np.abs(color[..., 1:] - 128 - np.minimum(share, 1)[..., None] * (model.mean[..., 1:] - 128)).max(axis=-1)
+        seen.append(np.where(tint < 6, np.log(share), np.float32(9)))
+    floor = np.stack([np.append(dark, np.float32(np.nan)).take(cells) for dark, cells in zip(seen, tables.cell_pixels, strict=True)])
+    bare = ((floor > np.log(0.93)) & (floor < 9)).sum(axis=0)
+    dark = (floor <= np.log(0.93)) & (floor >= np.log(0.5))
+    hull = carve(tables.carving, masks)
+    hull[..., : int(np.ceil(0.25 / tables.carving.grid.voxel_size_m))] = False
+    voxels = np.argwhere(hull)
+    points, at = tables.carving.grid.centres(voxels), pixels_at(tables.carving, voxels).astype(np.int64)
+    three = np.ones((3, 3), np.uint8)
+    for c, mask in enumerate(masks):
+        others = dark & (np.arange(len(masks)) != c)[:, None]
+        agree = (others & (np.abs(floor - floor[c]) < 0.18)).sum(axis=0)
+        found = (dark.sum(axis=0) > bare) & dark[c] & (agree >= np.maximum(1, 0.34 * others.sum(axis=0)))
+        found = cv2.morphologyEx(found.astype(np.uint8).reshape(tables.cells), cv2.MORPH_OPEN, three)
+        spots = np.append(cv2.morphologyEx(found, cv2.MORPH_CLOSE, three), 0)[tables.pixel_cells[c]] > 0
+        image, scale = shown(tables.carving.rig[c], points, at[c])
+        side = max(1, int(np.ceil(tables.carving.grid.voxel_size_m * scale)))
+        standing = cv2.dilate(image, np.ones((side, side), np.uint8)) > 0
+        gone = mask & spots & (seen[c] > np.log(0.5)) & (seen[c] < 0) & ~standing
+        opened = cv2.morphologyEx((mask & ~gone).astype(np.uint8), cv2.MORPH_OPEN, three) > 0
+        around = cv2.dilate(gone.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
+        cut.append(np.where(around, opened, mask & ~gone))
+    return cut
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_parts_of_images_and_of_the_floor_give_what_the_whole_gives(tables, scenes, ring, people, seed):
+    rng = np.random.default_rng(seed)
+    images, masks = (
+        filmed(scenes, people, [(floor_patch(camera), rng.uniform(0.45, 0.97)) for camera in ring], light=rng.uniform(0.8, 1)),
+        [],
+    )
+    for image, camera, person in zip(images, ring, people, strict=True):
+        spots = cv2.GaussianBlur(rng.normal(size=person.shape), (0, 0), 6)
+        image[spots > 0.09] = 0.7 * image[spots > 0.09]
+        if seed % 2:  # at the very rim of the image too
+            spots[: 1 + seed], spots[:, -1 - seed :] = 1, 1
+        masks.append((person | floor_patch(camera) | (spots > 0.08)) & (spots > -0.12))
+    found = cut(tables, scenes, images, masks)
+    expected = cut_by_whole_images(tables, images, [model for _, model in scenes], masks)
+    assert any((after != mask).any() for after, mask in zip(expected, masks, strict=True))
+    for after, whole in zip(found, expected, strict=True):
+        np.testing.assert_array_equal(after, whole)
