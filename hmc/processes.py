@@ -142,7 +142,8 @@ def share_out(tasks: Sequence[Callable[[], T]], workers: int = 2) -> list[T]:
                 return
             yield k, tasks[k]()
 
-    helpers = [_forked(lambda there: _run_ahead(done, there, None, 0)) for _ in range(n - 1)]
+    # Sent when all is done: a helper whose results wait to be taken would take no more tasks.
+    helpers = [_forked(lambda there: _run_ahead(lambda: list(done()), there, None, 0)) for _ in range(n - 1)]
     try:
         results = dict(done())
         for process, here in helpers:

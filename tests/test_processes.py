@@ -127,6 +127,15 @@ def test_items_that_are_kept_stay_as_they_were_and_lent_ones_do_not_cost_a_copy(
         assert (values == k).all() and not values.flags.owndata
 
 
+def test_large_results_do_not_keep_a_helper_from_its_next_task():
+    def task():
+        time.sleep(0.02)
+        return os.getpid(), np.zeros(1 << 17)
+
+    counts = np.unique([worker for worker, _ in share_out([task] * 12, 2)], return_counts=True)[1]
+    assert len(counts) == 2 and counts.min() >= 3
+
+
 def test_workers_do_not_fork_again():
     assert share_out([lambda: may_fork()] * 2, 2)[0] in (True, False)
     assert list(ahead(lambda: iter([may_fork()]))) == [False]

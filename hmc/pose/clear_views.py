@@ -7,7 +7,7 @@ posture and the frames before have put it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -20,10 +20,11 @@ from hmc.body.limbs import CHAIN_OF_PART, LIMBS
 from hmc.body.model import BodyModel, neutral_state
 from hmc.body.proportions import make_bodies
 from hmc.camera.model import Camera, Rig
-from hmc.io.masks import MaskStep, kept_masks
+from hmc.io.masks import MaskStep, kept_frames, kept_masks
 from hmc.io.recording import Recording
 from hmc.io.results import PoseStates, PoseTable
 from hmc.landmarks import ENOUGH_VIEWS, LANDMARKS
+from hmc.processes import each_ahead
 from hmc.tracking.views import cell_grid
 from hmc.voxels.carving import pixel_of_voxel
 from hmc.voxels.run_options import RunOptions
@@ -91,27 +92,48 @@ def clear_views(rig: Rig, steps: Iterable[MaskStep], states: PoseStates) -> Born
     -------
     BorneOut
     """
+    return _all_of(rig, _frames_borne_out(rig, steps, states), states)
+
+
+@dataclass(frozen=True)
+class _FrameBorneOut:
+    """Of one frame: its rows of the table, how many cameras show each row's landmarks, and pixels of each camera's silhouette that bodies
+    cover and that there are."""
+
+    rows: list[int]
+    views: np.ndarray
+    covered: np.ndarray
+    whole: np.ndarray
+
+
+def _frames_borne_out(rig: Rig, steps: Iterable[MaskStep], states: PoseStates) -> Iterator[_FrameBorneOut]:
     bodies = make_bodies(states.bodies)
     flesh = {person: _flesh_of(body) for person, body in bodies.items()}
-    views = np.zeros((len(states.frames), len(LANDMARKS)), int)
     posed = np.isfinite(states.states).any(axis=1)
-    covered, whole = np.zeros((2, len(rig)))
     for step in steps:
         rows = np.flatnonzero((states.frames == step.index) & posed).tolist()
-        whole += np.array([0 if mask is None else np.count_nonzero(mask) for mask in step.masks])
-        if not rows:
-            continue
+        whole = np.array([0 if mask is None else np.count_nonzero(mask) for mask in step.masks])
         people = [flesh[int(states.persons[row])] for row in rows]
         placed = []
         for row, one in zip(rows, people, strict=True):
             # What is not known of a limb is NaN, and so is where its flesh is: it falls on no pixel.
             transforms = segment_transforms(bodies[int(states.persons[row])], states.states[row])
             placed.append(place_points(*transforms, one.points, one.segment))
+        views, covered = np.zeros((len(rows), len(LANDMARKS)), int), np.zeros(len(rig))
         for k, (camera, mask) in enumerate(zip(rig, step.masks, strict=True)):
-            if mask is not None:
-                shown, covers = _shown_by(camera, mask, people, placed)
-                views[rows] += shown
-                covered[k] += covers
+            if rows and mask is not None:
+                shown, covered[k] = _shown_by(camera, mask, people, placed)
+                views += shown
+        yield _FrameBorneOut(rows, views, covered, whole)
+
+
+def _all_of(rig: Rig, frames: Iterable[_FrameBorneOut], states: PoseStates) -> BorneOut:
+    views = np.zeros((len(states.frames), len(LANDMARKS)), int)
+    covered, whole = np.zeros((2, len(rig)))
+    for frame in frames:
+        views[frame.rows] = frame.views
+        covered += frame.covered
+        whole += frame.whole
     return BorneOut(views, 1 - covered / np.where(whole > 0, whole, np.nan))
 
 
@@ -126,11 +148,14 @@ def with_clear_views(people: PosedPeople, recording: Recording, run: RunOptions)
         With the silhouettes that were kept; where they were not, the poses stay as they are.
     """
     first, end = recording.start, recording.start + recording.n_frames
-    steps: Iterable[MaskStep] | None = None if run.masks is None else kept_masks(run.masks, run.key, first, end)
-    if steps is None:
+    if run.masks is None or kept_masks(run.masks, run.key, first, end) is None:
         return people
-    steps = run.progress(steps, end - first) if run.progress else steps
-    found = clear_views(recording.rig, steps, people.states)
+
+    def borne_out(some: Sequence[int]) -> Iterator[_FrameBorneOut]:
+        return _frames_borne_out(recording.rig, kept_frames(run.masks or "", run.key, some) or (), people.states)
+
+    frames: Iterable[_FrameBorneOut] = each_ahead(borne_out, range(first, end), run.workers)
+    found = _all_of(recording.rig, run.progress(frames, end - first) if run.progress else frames, people.states)
     poses = replace(people.poses, views=found.views)
     notes = (*people.notes, *guess_notes(poses), *_uncovered_notes(recording.rig, found.uncovered))
     return replace(people, poses=poses, notes=notes)

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import cv2
 import numpy as np
@@ -24,6 +25,7 @@ from hmc.camera.model import Camera, Rig
 from hmc.io.masks import MaskStep, kept_frames
 from hmc.io.recording import spread_frames
 from hmc.io.results import PoseStates
+from hmc.processes import share_out
 from hmc.voxels.carving import pixel_of_voxel
 from hmc.voxels.grid import VoxelGrid
 from hmc.voxels.run_options import RunOptions
@@ -124,8 +126,7 @@ def learn_hidden_places(rig: Rig, grid: VoxelGrid, run: RunOptions, states: Pose
     """
     posed = np.isfinite(states.states).all(axis=1)
     frames = spread_frames(np.unique(states.frames[posed]), MOST_FRAMES)
-    steps = kept_frames(run.masks or "", run.key, frames)
-    if steps is None or not frames:
+    if not frames or kept_frames(run.masks or "", run.key, frames) is None:
         return None
     bodies = make_bodies(states.bodies)
     skin = {}
@@ -133,14 +134,30 @@ def learn_hidden_places(rig: Rig, grid: VoxelGrid, run: RunOptions, states: Pose
         flesh = flesh_points(body, PATCH_M)
         skin[person] = flesh.points[flesh.is_surface], flesh.segment[flesh.is_surface]
     depths = np.array([states.states[posed, :3] @ camera.rotation[2] + camera.translation[2] for camera in rig])
-    sightings = [no_sightings(camera, max(1.0, float(np.median(depth)))) for camera, depth in zip(rig, depths, strict=True)]
-    low, high = np.full(3, np.inf), np.full(3, -np.inf)
-    for step in steps:
-        people = [(int(states.persons[row]), states.states[row]) for row in np.flatnonzero((states.frames == step.index) & posed)]
-        points = np.concatenate([place_points(*segment_transforms(bodies[one], state), *skin[one]) for one, state in people])
-        low, high = np.minimum(low, points.min(axis=0)), np.maximum(high, points.max(axis=0))
-        count_bodies(sightings, rig, step, points)
-    return hidden_places(grid, rig, [blocked_from(one) for one in sightings], np.stack([low, high]))
+    away = np.maximum(1.0, np.median(depths, axis=1)).tolist()
+
+    def count(some: list[int]) -> tuple[list[Sightings], np.ndarray]:
+        sightings = [no_sightings(camera, depth) for camera, depth in zip(rig, away, strict=True)]
+        low, high = np.full(3, np.inf), np.full(3, -np.inf)
+        for step in kept_frames(run.masks or "", run.key, some) or ():
+            people = [(int(states.persons[row]), states.states[row]) for row in np.flatnonzero((states.frames == step.index) & posed)]
+            points = np.concatenate([place_points(*segment_transforms(bodies[one], state), *skin[one]) for one, state in people])
+            low, high = np.minimum(low, points.min(axis=0)), np.maximum(high, points.max(axis=0))
+            count_bodies(sightings, rig, step, points)
+        return sightings, np.stack([low, high])
+
+    parts = share_out([partial(count, frames[k :: run.workers]) for k in range(min(run.workers, len(frames)))], run.workers)
+    sightings = [_all_of(own) for own in zip(*(found for found, _ in parts), strict=True)]
+    corners = np.array([box for _, box in parts])
+    box = np.stack([corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)])
+    return hidden_places(grid, rig, [blocked_from(one) for one in sightings], box)
+
+
+def _all_of(parts: Sequence[Sightings]) -> Sightings:
+    """One camera's sightings in several lots of frames, together."""
+    shown = np.array([one.shown for one in parts]).sum(axis=0, dtype=np.uint16)
+    hidden = np.array([one.hidden for one in parts]).sum(axis=0, dtype=np.uint16)
+    return Sightings(parts[0].side, shown, hidden)
 
 
 def no_sightings(camera: Camera, depth_m: float) -> Sightings:

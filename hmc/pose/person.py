@@ -195,7 +195,8 @@ def _start(task: PoseTask, person: PersonTrack, state: PersonState) -> PersonSta
     if started is None:
         return None
     subject = method.equip(started.subject.body, task.capture)
-    path = walk(frame_rng, method.step, subject, begin_tracking(subject, started.state, memory=started.memory), started.anchor, views)
+    begun, workers = begin_tracking(subject, started.state, memory=started.memory), task.capture.workers
+    path = walk(frame_rng, method.step, subject, begun, started.anchor, views, workers=workers)
     if method.recover is not None:
         usual = method.recover.first(np.array([info.cost for _, info in path]))
         path = [(replace(tracked, memory={**tracked.memory, **usual}), info) for tracked, info in path]

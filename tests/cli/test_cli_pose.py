@@ -64,6 +64,13 @@ def test_a_run_leaves_its_four_files_and_nothing_else(finished):
     assert np.median(error) < 0.12
 
 
+@pytest.mark.parametrize("workers", ["1", "3"])
+def test_poses_are_the_same_bytes_whatever_the_number_of_processes(finished, tmp_path, workers):
+    assert pose(tmp_path / "out", "--frames", "5", "--voxel", "0.05", "--workers", workers) == 0
+    for name in ("joints.csv", "tracks.csv"):
+        assert (tmp_path / "out" / name).read_bytes() == (finished / name).read_bytes()
+
+
 def test_a_finished_run_is_not_repeated(finished, capsys, monkeypatch):
     before = {path.name: path.stat().st_mtime_ns for path in finished.iterdir()}
     monkeypatch.setattr(follow, "stream_hulls", None)

@@ -39,6 +39,12 @@ def test_tracks_are_where_people_were_drawn(folder, tmp_path, capsys):
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["run.toml", "tracks.csv"]
 
 
+def test_tracks_are_the_same_bytes_whatever_the_number_of_processes(folder, tmp_path):
+    for workers in ("1", "2", "3"):
+        assert track(folder, tmp_path / workers, "--workers", workers) == 0
+        assert (tmp_path / workers / "tracks.csv").read_bytes() == (tmp_path / "1" / "tracks.csv").read_bytes()
+
+
 @pytest.mark.parametrize("stop", [3, 14, 23])
 @pytest.mark.slow
 def test_a_stopped_run_goes_on_and_ends_as_if_it_had_not_been(folder, tmp_path, monkeypatch, stop):

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -20,7 +19,6 @@ from hmc.body.model import BodyModel
 from hmc.pose.objectives.objective import Objective
 from hmc.pose.objectives.residuals import residual_rows
 from hmc.pose.objectives.symmetric import body_points
-from hmc.processes import share_out
 from hmc.search.gauss_newton import damped, movable
 
 __all__ = ["WORTH_IT", "FitBodyInfo", "fit_body", "with_known_stature"]
@@ -66,7 +64,7 @@ def with_known_stature(settings: FitBodySettings, known: bool) -> FitBodySetting
 
 
 def fit_body(
-    objectives: Sequence[Objective], states: np.ndarray, coordinates: Coordinates, settings: FitBodySettings, workers: int = 1
+    objectives: Sequence[Objective], states: np.ndarray, coordinates: Coordinates, settings: FitBodySettings
 ) -> tuple[BodyModel, np.ndarray, FitBodyInfo]:
     """One person's body with dimensions fitted to several frames.
 
@@ -79,8 +77,6 @@ def fit_body(
     coordinates : tuple of ndarray
         Where the surface is sampled (`hmc.body.flesh.surface_coordinates`).
     settings : FitBodySettings
-    workers : int
-        Processes that share the frames (`hmc.processes`).
 
     Returns
     -------
@@ -105,13 +101,12 @@ def fit_body(
     def rows(shape, states):
         step = 0.01
         here, beside = with_shape(shape), [with_shape(shape + step * unit) for unit in np.eye(len(shape))]
-
-        def of_frame(k: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-            residual, jacobian = residual_rows(here[k], states[k])
-            by_shape = [other[k].linearise(states[k]).residuals for other in beside]
-            return residual, jacobian, (np.array(by_shape).T - residual[:, None]) / step
-
-        return share_out([partial(of_frame, k) for k in range(len(states))], workers)
+        out = []
+        for k, state in enumerate(states):
+            residual, jacobian = residual_rows(here[k], state)
+            by_shape = [other[k].linearise(state).residuals for other in beside]
+            out.append((residual, jacobian, (np.array(by_shape).T - residual[:, None]) / step))
+        return out
 
     def costs(shape, states):
         data = [one.linearise(state).residuals for one, state in zip(with_shape(shape), states, strict=True)]

@@ -78,9 +78,7 @@ def own_body(
     if not picks or not held_out:
         return subject
     objectives, states = zip(*(poses[k] for k in picks), strict=True)
-    body, _, _ = fit_body(
-        objectives, np.array(states), surface_coordinates(subject.body, surface_samples), settings, subject.capture.workers
-    )
+    body, _, _ = fit_body(objectives, np.array(states), surface_coordinates(subject.body, surface_samples), settings)
     fitted = equip(body)
     tried = [poses[k] for k in held_out]
     before, after = (

@@ -347,15 +347,20 @@ def _followed(subject, window, preset, settings, anchor, chosen) -> tuple[list[f
     reach = max(2, round(settings.follow_s * window.capture.fps))
     first, last = max(0, anchor - reach), min(len(window.views), anchor + reach + 1)
 
-    def follow(state: np.ndarray) -> tuple[float, _Path]:
-        path = walk(lambda k: window.frame_rng(first + k), quick_step(preset), subject, state, anchor - first, window.views[first:last])
+    def follow(state: np.ndarray, frames: range) -> list[tuple[Tracked, StepInfo]]:
+        begin, views = frames[0], window.views[frames[0] : frames[-1] + 1]
+        return walk(lambda k: window.frame_rng(begin + k), quick_step(preset), subject, state, anchor - begin, views)
+
+    halves = range(first, anchor + 1), range(anchor, last)
+    found = share_out([partial(follow, state, half) for state in chosen for half in halves], window.capture.workers)
+    scores, paths = [], []
+    for before, after in zip(found[::2], found[1::2], strict=True):
+        path = [*before, *after[1:]]
         followed = np.array([info.cost for _, info in path])
         headings = np.array([one.state[3] for one, _ in path])
-        score = np.nanmean(followed * walk_factor(headings, window.velocities[first:last], settings))
-        return float(score), dict(enumerate(path, first))
-
-    scores, paths = zip(*share_out([partial(follow, state) for state in chosen], window.capture.workers), strict=True)
-    return list(scores), list(paths)
+        scores.append(float(np.nanmean(followed * walk_factor(headings, window.velocities[first:last], settings))))
+        paths.append(dict(enumerate(path, first)))
+    return scores, paths
 
 
 def search_all(rng: np.random.Generator, objective: Objective, state: np.ndarray, settings: PolishSettings) -> tuple[np.ndarray, float]:
