@@ -1,6 +1,6 @@
 """Work in processes of its own: a generator that runs ahead, and tasks that are shared out.
 
-Processes are forked: what a task needs is there without being copied or pickled, and only what it gives comes back, large arrays through
+Processes are forked: what a task needs is there without being copied or sent, and only what it gives comes back, large arrays through
 memory that both share. Where that cannot be, on systems that do not fork safely and within a worker, the same is done in turn by the
 process that asks, so the result never depends on the number of processes.
 
@@ -13,26 +13,25 @@ from __future__ import annotations
 import mmap
 import multiprocessing
 import os
-import pickle
 import signal
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager, suppress
+from dataclasses import dataclass
 from functools import partial
 from multiprocessing.connection import Connection
 from typing import Any, TypeVar
 
 import cv2
+import numpy as np
 
-__all__ = ["ahead", "available_processors", "each_ahead", "may_fork", "share_out"]
+__all__ = ["ahead", "arrays_ahead", "available_processors", "each_ahead", "may_fork", "share_out"]
 
 T = TypeVar("T")
 K = TypeVar("K")
 
-#: Items that wait to be taken, at most.
+#: Items of arrays that wait to be taken, at most.
 DEPTH = 3
-#: Room for one item's arrays where nothing else is said, bytes. Memory is taken by what is written only.
-ITEM_BYTES = 64 << 20
 #: Arrays begin at multiples of this, bytes.
 ALIGNED = 64
 #: Of messages: an item, the end, an exception.
@@ -49,19 +48,15 @@ def may_fork() -> bool:
     return sys.platform == "linux" and not multiprocessing.current_process().daemon
 
 
-def ahead(make: Callable[[], Iterable[T]], workers: int = 2, item_bytes: int = ITEM_BYTES, lend: bool = False) -> Iterator[T]:
+def ahead(make: Callable[[], Iterable[T]], workers: int = 2) -> Iterator[T]:
     """Items of an iterable that is made, and runs ahead, in a process of its own.
 
     Parameters
     ----------
     make : callable
-        Gives the iterable; it is called there. Its items must be such as `pickle` takes.
+        Gives the iterable; it is called there. Its items must be such as can be sent to another process.
     workers : int
         With fewer than two all is done in this process.
-    item_bytes : int
-        How large an item's arrays may be, together, to come by way of shared memory; larger ones come too, more slowly.
-    lend : bool
-        If True, arrays are not copied out of the shared memory: they change when the next item is asked for.
 
     Yields
     ------
@@ -75,24 +70,81 @@ def ahead(make: Callable[[], Iterable[T]], workers: int = 2, item_bytes: int = I
     if workers < 2 or not may_fork():
         yield from make()
         return
-    arena = mmap.mmap(-1, DEPTH * item_bytes)
-    process, here = _forked(lambda there: _run_ahead(make, there, arena, item_bytes))
+    process, here = _forked(lambda there: _send_all(make(), there))
     try:
-        while True:
-            kind, slot, places, head = _received(process, here)
-            if kind != ITEM:
-                break
-            shared = memoryview(arena)
-            arrays = [shared[start:end] if end else bytearray(here.recv_bytes()) for start, end in places]
-            if lend:
-                yield pickle.loads(head, buffers=arrays)
-                _give_back(here, slot)
-            else:
-                arrays = [bytearray(array) for array in arrays]
-                _give_back(here, slot)
-                yield pickle.loads(head, buffers=arrays)
+        while (message := _received(process, here))[0] == ITEM:
+            yield message[1]
     finally:
         _ended(process, here)
+
+
+def arrays_ahead(
+    make: Callable[[], Iterable[tuple[Sequence[np.ndarray | None], T]]], workers: int, item_bytes: int
+) -> Iterator[tuple[list[np.ndarray | None], T]]:
+    """As `ahead`, of large arrays that come by way of memory that both processes share.
+
+    Parameters
+    ----------
+    make : callable
+        Gives the iterable: of each item its arrays, or None in their places, and the rest of it.
+    workers : int
+    item_bytes : int
+        How large an item's arrays may be, together; those that do not fit come as they do in `ahead`.
+
+    Yields
+    ------
+    arrays : list of ndarray or None
+        Lent: when the next item is asked for they change. Copy what is to be kept.
+    rest : T
+    """
+    if workers < 2 or not may_fork():
+        for arrays, rest in make():
+            yield list(arrays), rest
+        return
+    arena = mmap.mmap(-1, DEPTH * item_bytes)
+    process, here = _forked(lambda there: _send_all(_put(make(), there, arena, item_bytes), there))
+    try:
+        while (message := _received(process, here))[0] == ITEM:
+            slot, placed, rest = message[1]
+            yield [_taken(arena, one) for one in placed], rest
+            with suppress(OSError):  # the other side may have ended already
+                here.send(slot)
+    finally:
+        _ended(process, here)
+
+
+def _put(items: Iterable[tuple[Sequence[np.ndarray | None], T]], there: Connection, arena: mmap.mmap, item_bytes: int) -> Iterator[Any]:
+    """Items with the places of their arrays in shared memory, as far ahead as there is room."""
+    free = list(range(DEPTH))
+    for arrays, rest in items:
+        slot = free.pop() if free else there.recv()
+        while there.poll():
+            free.append(there.recv())
+        at, end = slot * item_bytes, (slot + 1) * item_bytes
+        placed: list[_Place | np.ndarray | None] = []
+        for array in arrays:
+            if array is None or not array.nbytes or at + array.nbytes > end:
+                placed.append(array)
+                continue
+            np.frombuffer(arena, array.dtype, array.size, at).reshape(array.shape)[...] = array
+            placed.append(_Place(at, array.shape, array.dtype.str))
+            at += -(-array.nbytes // ALIGNED) * ALIGNED
+        yield slot, placed, rest
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Where in shared memory an array is."""
+
+    start: int
+    shape: tuple[int, ...]
+    dtype: str
+
+
+def _taken(arena: mmap.mmap, placed: _Place | np.ndarray | None) -> np.ndarray | None:
+    if not isinstance(placed, _Place):
+        return placed
+    return np.frombuffer(arena, placed.dtype, int(np.prod(placed.shape)), placed.start).reshape(placed.shape)
 
 
 def each_ahead(make: Callable[[Sequence[K]], Iterable[T]], keys: Sequence[K], workers: int = 2) -> Iterator[T]:
@@ -119,7 +171,7 @@ def share_out(tasks: Sequence[Callable[[], T]], workers: int = 2) -> list[T]:
     Parameters
     ----------
     tasks : sequence of callable
-        Their results must be such as `pickle` takes.
+        Their results must be such as can be sent to another process.
     workers : int
         Processes, at most.
 
@@ -143,24 +195,16 @@ def share_out(tasks: Sequence[Callable[[], T]], workers: int = 2) -> list[T]:
             yield k, tasks[k]()
 
     # Sent when all is done: a helper whose results wait to be taken would take no more tasks.
-    helpers = [_forked(lambda there: _run_ahead(lambda: list(done()), there, None, 0)) for _ in range(n - 1)]
+    helpers = [_forked(lambda there: _send_all(list(done()), there)) for _ in range(n - 1)]
     try:
         results = dict(done())
         for process, here in helpers:
             while (message := _received(process, here))[0] == ITEM:
-                _, _, places, head = message
-                k, result = pickle.loads(head, buffers=[bytearray(here.recv_bytes()) for _ in places])
-                results[k] = result
+                k, results[k] = message[1]
     finally:
         for process, here in helpers:
             _ended(process, here)
     return [results[k] for k in range(len(tasks))]
-
-
-def _give_back(here: Connection, slot: int) -> None:
-    """Say that a slot may be written again."""
-    with suppress(OSError):  # the other side may have ended already
-        here.send(slot)
 
 
 def _forked(run: Callable[[Connection], None]) -> tuple[Any, Connection]:
@@ -175,7 +219,12 @@ def _forked(run: Callable[[Connection], None]) -> tuple[Any, Connection]:
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
         # The asking process is gone when its pipe is broken, and nobody is left to be told.
         with suppress(EOFError, BrokenPipeError, ConnectionResetError):
-            run(there)
+            try:
+                run(there)
+            except (EOFError, BrokenPipeError, ConnectionResetError):
+                raise
+            except BaseException as error:  # raised again by the process that asked
+                there.send((FAILED, _told(error)))
 
     process = context.Process(target=begin, daemon=True)
     with _one_thread():
@@ -195,55 +244,18 @@ def _one_thread() -> Iterator[None]:
         cv2.setNumThreads(threads)
 
 
-def _run_ahead(make: Callable[[], Iterable[Any]], there: Connection, arena: mmap.mmap | None, item_bytes: int) -> None:
-    """Make items and send them, as far ahead as there is room; without an arena as far as the pipe takes them."""
-    free = list(range(DEPTH))
-    try:
-        for item in make():
-            slot = 0
-            if arena is not None:
-                slot = free.pop() if free else there.recv()
-                while there.poll():
-                    free.append(there.recv())
-            arrays: list[pickle.PickleBuffer] = []
-            head = pickle.dumps(item, protocol=5, buffer_callback=arrays.append)
-            _send(there, slot, head, arrays, arena, item_bytes)
-        there.send((END, 0, (), b""))
-    except (EOFError, BrokenPipeError, ConnectionResetError):
-        raise
-    except BaseException as error:  # raised again by the process that asked
-        there.send((FAILED, 0, (), _told(error)))
+def _send_all(items: Iterable[Any], there: Connection) -> None:
+    for item in items:
+        there.send((ITEM, item))
+    there.send((END, None))
 
 
-def _send(there: Connection, slot: int, head: bytes, arrays: list[pickle.PickleBuffer], arena: mmap.mmap | None, item_bytes: int) -> None:
-    """An item: its head and what fits into its slot, then the arrays that do not."""
-    at, end = slot * item_bytes, (slot + 1) * item_bytes
-    places, left = [], []
-    for array in arrays:
-        flat = array.raw()
-        if arena is not None and at + len(flat) <= end and len(flat):
-            arena[at : at + len(flat)] = flat
-            places.append((at, at + len(flat)))
-            at += -(-len(flat) // ALIGNED) * ALIGNED
-        else:
-            places.append((0, 0))
-            left.append(flat)
-    there.send((ITEM, slot, places, head))
-    for flat in left:
-        there.send_bytes(flat)
+def _told(error: BaseException) -> BaseException:
+    """An exception that can be sent: itself, if it is of a kind that surely can."""
+    return error if type(error).__module__ in ("builtins", "hmc.errors") else RuntimeError(f"{type(error).__name__}: {error}")
 
 
-def _told(error: BaseException) -> bytes:
-    """An exception as it can be sent."""
-    try:
-        data = pickle.dumps(error)
-        pickle.loads(data)
-    except Exception:  # one of a kind that pickle cannot make again
-        return pickle.dumps(RuntimeError(f"{type(error).__name__}: {error}"))
-    return data
-
-
-def _received(process: Any, here: Connection) -> tuple[int, int, Sequence[tuple[int, int]], bytes]:
+def _received(process: Any, here: Connection) -> tuple[int, Any]:
     """The next message of a process; what it raised is raised."""
     try:
         message = here.recv()
@@ -251,7 +263,7 @@ def _received(process: Any, here: Connection) -> tuple[int, int, Sequence[tuple[
         process.join()
         raise ChildProcessError(f"a worker process ended by itself (exit code {process.exitcode}): is the memory exhausted?") from None
     if message[0] == FAILED:
-        raise pickle.loads(message[3])
+        raise message[1]
     return message
 
 

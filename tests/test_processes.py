@@ -14,7 +14,7 @@ import pytest
 
 from hmc import processes
 from hmc.errors import InputError
-from hmc.processes import ahead, available_processors, each_ahead, may_fork, share_out
+from hmc.processes import ahead, arrays_ahead, available_processors, each_ahead, may_fork, share_out
 
 pytestmark = pytest.mark.skipif(not may_fork(), reason="processes are forked on Linux alone")
 
@@ -29,11 +29,29 @@ def same(one, other):
     return all(np.array_equal(one[name], other[name]) if isinstance(one[name], np.ndarray) else one[name] == other[name] for name in one)
 
 
-@pytest.mark.parametrize("item_bytes", [1 << 20, 1000, 16])
-def test_items_are_the_same_whether_they_fit_into_shared_memory_or_not(item_bytes):
+def test_items_are_the_same():
     found = 0
-    for one, other in zip(drawn(), ahead(drawn, item_bytes=item_bytes), strict=True):
+    for one, other in zip(drawn(), ahead(drawn), strict=True):
         assert same(one, other)
+        found += 1
+    assert found == 20
+    assert not multiprocessing.active_children()
+
+
+def arrays_of():
+    for item in drawn():
+        yield [item[name] for name in ("mask", "none", "empty", "turned")], item["k"]
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.parametrize("item_bytes", [1 << 20, 1500, 1200, 16])
+def test_arrays_are_the_same_whether_they_fit_into_shared_memory_or_not(workers, item_bytes):
+    found = 0
+    for (arrays, k), (others, number) in zip(arrays_of(), arrays_ahead(arrays_of, workers, item_bytes), strict=True):
+        assert k == number and len(arrays) == len(others)
+        for one, other in zip(arrays, others, strict=True):
+            assert (one is None) == (other is None)
+            assert one is None or (one.dtype == other.dtype and np.array_equal(one, other))
         found += 1
     assert found == 20
     assert not multiprocessing.active_children()
@@ -44,19 +62,20 @@ def test_items_are_made_in_another_process_and_with_one_worker_in_this():
     assert list(ahead(lambda: iter([os.getpid()]), workers=1)) == [os.getpid()]
 
 
-def test_no_more_items_wait_than_there_is_room_for():
+def test_no_more_arrays_wait_than_there_is_room_for():
     made = multiprocessing.get_context("fork").Value("q", 0)
 
     def count():
         for k in range(50):
             made.value = k + 1
-            yield np.full(1000, k)
+            yield [np.full(1000, k)], k
 
-    taken = ahead(count)
+    taken = arrays_ahead(count, 2, 1 << 16)
     for k in range(10):
-        assert next(taken)[0] == k
+        arrays, number = next(taken)
         time.sleep(0.01)
-        assert made.value <= k + 2 + processes.DEPTH
+        assert (arrays[0] == k).all() and number == k
+        assert made.value <= k + 1 + processes.DEPTH
     taken.close()
     assert not multiprocessing.active_children()
 
@@ -116,15 +135,9 @@ def test_items_come_in_the_order_of_their_keys(workers):
     assert list(each_ahead(lambda own: iter(own), [], workers)) == []
 
 
-def test_items_that_are_kept_stay_as_they_were_and_lent_ones_do_not_cost_a_copy():
-    def squares():
-        for k in range(12):
-            yield np.full(2000, k)
-
-    kept = list(ahead(squares, item_bytes=1 << 16))
+def test_items_that_are_kept_stay_as_they_were():
+    kept = list(ahead(lambda: (np.full(2000, k) for k in range(12))))
     assert [int(values[0]) for values in kept] == list(range(12))
-    for k, values in enumerate(ahead(squares, item_bytes=1 << 16, lend=True)):
-        assert (values == k).all() and not values.flags.owndata
 
 
 def test_large_results_do_not_keep_a_helper_from_its_next_task():

@@ -5,10 +5,10 @@ Up to here no camera asks another, so cameras can be spread over processes: each
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import ExitStack, closing
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import TypeVar
 
@@ -16,7 +16,7 @@ import numpy as np
 
 from hmc.camera.segmentation import BackgroundModel, segment_views, train_background
 from hmc.io.recording import Recording, background_frames, iterate_frames, only_cameras
-from hmc.processes import ahead
+from hmc.processes import arrays_ahead
 from hmc.voxels.floor_shadows import Scene
 from hmc.voxels.frontend_settings import FrontendSettings
 
@@ -102,59 +102,42 @@ def look_at(
             own = {k: models[c] for k, c in enumerate(group) if c in models}
             taught = {k for k, c in enumerate(group) if c in background}
             part = only_cameras(recording, group)
-            pixels = sum(int(np.prod(camera.size)) for camera in part.rig)
-            make = partial(_look_apart, part, own, taught, settings, first, last)
-            parts.append(stack.enter_context(closing(ahead(make, workers, PIXEL_BYTES * pixels + FRAME_BYTES, lend=True))))  # type: ignore[type-var]
-        for looks in zip(*parts, strict=True):
-            look = _joined(looks, order)
+            item_bytes = PIXEL_BYTES * sum(int(np.prod(camera.size)) for camera in part.rig) + FRAME_BYTES
+            make = partial(_arrays, part, own, taught, settings, first, last)
+            parts.append(stack.enter_context(closing(arrays_ahead(make, workers, item_bytes))))  # type: ignore[type-var]
+        for found in zip(*parts, strict=True):
+            flat = [array for arrays, _ in found for array in arrays]
+            images, masks, doubtful, filled, means, unseen = (tuple(flat[6 * k + kind] for k in order) for kind in range(6))
             # Copied where others may keep them, or they are wanted again.
-            scenes = [before if now is None else _as_pixels(now) for before, now in zip(scenes, look.scenes, strict=True)]
-            yield replace(
-                look, images=_copies(look.images), masks=_copies(look.masks), doubtful=_copies(look.doubtful), scenes=tuple(scenes)
-            )
+            new = zip(scenes, _copies(means), _copies(unseen), strict=True)
+            scenes = [before if mean is None else Scene(mean, hidden) for before, mean, hidden in new]
+            lines = tuple(line for _, (_, own_lines) in found for line in own_lines)
+            index = found[0][1][0]
+            yield Look(index, _copies(images), _copies(masks), _copies(doubtful), filled, tuple(scenes), lines)
 
 
-def _look_apart(
+def _arrays(
     recording: Recording,
     models: Mapping[int, BackgroundModel],
     background: Collection[int],
     settings: FrontendSettings,
     first: int,
     last: int | None,
-) -> Iterator[Look]:
-    """`_look` in a process of its own: of the empty scene only what has changed is told, plane by plane, as arrays are shared."""
+) -> Iterator[tuple[list[np.ndarray | None], tuple[int, tuple[str, ...]]]]:
+    """What some cameras see as arrays, six a camera, beside the frame's number and lines; of the empty scene only what has changed."""
     told = [-1] * len(recording.rig)
     for look, changes in _look(recording, models, background, settings, first, last, None):
-        new = (scene if now != before else None for scene, now, before in zip(look.scenes, changes, told, strict=True))
+        arrays: list[np.ndarray | None] = []
+        for c, scene in enumerate(look.scenes):
+            new = scene if changes[c] != told[c] else None
+            arrays += [look.images[c], look.masks[c], look.doubtful[c], look.filled[c]]
+            arrays += [None, None] if new is None else [new.mean, new.unseen]
         told = changes
-        yield replace(look, scenes=tuple(None if one is None else Scene(np.moveaxis(one.mean, -1, 0), one.unseen) for one in new))
-
-
-def _as_pixels(planes: Scene) -> Scene:
-    """A scene as it was, of arrays that last."""
-    return Scene(np.moveaxis(planes.mean.copy(), 0, -1), None if planes.unseen is None else planes.unseen.copy())
+        yield arrays, (look.index, look.lines)
 
 
 def _copies(arrays: tuple[np.ndarray | None, ...]) -> tuple[np.ndarray | None, ...]:
     return tuple(None if array is None else array.copy() for array in arrays)
-
-
-def _joined(looks: Sequence[Look], order: Sequence[int]) -> Look:
-    """One frame as all cameras see it."""
-
-    def all_of(values: Callable[[Look], tuple]) -> tuple:
-        found = [value for look in looks for value in values(look)]
-        return tuple(found[k] for k in order)
-
-    return Look(
-        looks[0].index,
-        all_of(lambda look: look.images),
-        all_of(lambda look: look.masks),
-        all_of(lambda look: look.doubtful),
-        all_of(lambda look: look.filled),
-        all_of(lambda look: look.scenes),
-        tuple(line for look in looks for line in look.lines),
-    )
 
 
 def _look(
