@@ -22,11 +22,12 @@ def stopping(after: int):
 
 
 def noting(seen: list[int]):
-    """A `progress` that adds the number of every frame to a list; frames that need no hull are numbers themselves."""
+    """A `progress` that adds the number of every frame to a list; frames that need no hull are numbers themselves, others' views stand
+    beside their number."""
 
     def progress(steps, total):
         for step in steps:
-            seen.append(getattr(step, "index", step))
+            seen.append(step[0] if isinstance(step, tuple) else getattr(step, "index", step))
             yield step
 
     return progress

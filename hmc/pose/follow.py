@@ -31,7 +31,8 @@ from hmc.processes import ahead, each_ahead
 from hmc.tracking.resumable import WARM_UP_FRAMES, kept_silhouettes, person_grid
 from hmc.tracking.tracks import velocities
 from hmc.voxels.carving import shared_tables
-from hmc.voxels.hulls import stream_hulls, stream_masks
+from hmc.voxels.grid import VoxelGrid
+from hmc.voxels.hulls import HullStep, stream_hulls
 from hmc.voxels.run_options import RunOptions
 
 __all__ = ["FollowOptions", "PosedPeople", "follow", "only_person", "persons_of", "unfitted_notes"]
@@ -201,28 +202,31 @@ def _views_from(
         return
     grid = person_grid(recording, options.voxel_size_m)
 
-    def seen(masks: Iterable[MaskStep]) -> Iterator[dict[int, PersonView]]:
-        for hull in stream_hulls(recording, grid, run.frontend, masks=masks):
+    def seen(hulls: Iterable[HullStep]) -> Iterator[tuple[int, dict[int, PersonView]]]:
+        for hull in hulls:
             views = with_keypoints(views_of(recording, grid, tracks, hull, method.needs), recording.rig, tracks, cues)
-            yield _with_markers(views, recording, method, options)
+            yield hull.index, _with_markers(views, recording, method, options)
 
-    def kept(frames: Sequence[int]) -> Iterator[dict[int, PersonView]]:
-        return seen(kept_frames(run.masks or "", run.key, frames) or ())
+    def again(masks: Iterable[MaskStep] | None) -> Iterator[tuple[int, dict[int, PersonView]]]:
+        return seen(stream_hulls(recording, grid, run.frontend, masks=masks or ()))
 
     if method.needs & IMAGES_FOR:  # videos are read in order
         masks = kept_silhouettes(recording, run, first, images=True)
-        views = seen(_new_masks(recording, run, first)) if masks is None else ahead(lambda: seen(masks), run.workers)
+        views = seen(_new_hulls(recording, grid, run, first)) if masks is None else ahead(lambda: again(masks), run.workers)
     elif kept_silhouettes(recording, run, first) is None:
-        views = seen(_new_masks(recording, run, first))
+        views = seen(_new_hulls(recording, grid, run, first))
     else:
         shared_tables(grid, recording.rig)  # once, for all processes
-        views = each_ahead(kept, range(first, end), run.workers)
-    yield from run.progress(views, end - first) if run.progress else views
+        views = each_ahead(lambda frames: again(kept_frames(run.masks or "", run.key, frames)), range(first, end), run.workers)
+    for _, of_frame in run.progress(views, end - first) if run.progress else views:
+        yield of_frame
 
 
-def _new_masks(recording: Recording, run: RunOptions, first: int) -> Iterator[MaskStep]:
-    """Silhouettes from a frame on, made now and kept where they are to be."""
-    stream = stream_masks(recording, run.frontend, first=first, warm_up=WARM_UP_FRAMES, on_problem=run.on_problem, workers=run.workers)
+def _new_hulls(recording: Recording, grid: VoxelGrid, run: RunOptions, first: int) -> Iterator[HullStep]:
+    """Hulls from a frame on, of silhouettes that are made now, and kept where they are to be."""
+    stream = stream_hulls(
+        recording, grid, run.frontend, first=first, warm_up=WARM_UP_FRAMES, on_problem=run.on_problem, workers=run.workers
+    )
     return stream if run.masks is None else keep_masks(run.masks, run.key, first, stream, run.on_problem)
 
 

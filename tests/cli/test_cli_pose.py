@@ -145,7 +145,7 @@ def test_a_run_killed_in_the_second_pass_goes_on_there(finished, tmp_path, monke
             raise KeyboardInterrupt
         return views(recording, grid, tracks, hull, **options)
 
-    default = ("--frames", "5", "--voxel", "0.05")
+    default = ("--frames", "5", "--voxel", "0.05", "--workers", "1")  # what is done in another process is not noted here
     monkeypatch.setattr(backward, "views_of", dying)
     dies_after = 3
     assert pose(tmp_path, *default) == 130 and not (tmp_path / "joints.csv").exists()
