@@ -20,6 +20,7 @@ __all__ = ["main"]
 
 COMMANDS = ("check", "synth", "track", "pose", "evaluate", "view")
 
+EXIT_WORKER = 1
 EXIT_INPUT = 2
 EXIT_INTERRUPTED = 130
 
@@ -52,7 +53,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        Exit code: 0 done, 2 the input was wrong (one line on stderr says what), 130 interrupted.
+        Exit code: 0 done, 1 a process that shared the work ended by itself, 2 the input was wrong (one line on stderr says what), 130
+        interrupted.
     """
     # FFmpeg's own complaints about a damaged video would bury the one line that says which; OpenCV reads these on its first use.
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
@@ -77,6 +79,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         # The reader of a pipe went away (`| head`); point stdout elsewhere, or the interpreter complains when it closes.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+    except ChildProcessError as error:
+        print(f"hmc {args.command}: {error} Try --workers 1; what is done is kept.", file=sys.stderr)
+        return EXIT_WORKER
     except OSError as error:
         if error.filename is None:
             raise

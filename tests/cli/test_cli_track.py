@@ -1,5 +1,7 @@
 """The track command: results, resuming, repeated runs and wrong input."""
 
+import os
+import signal
 from dataclasses import replace
 
 import numpy as np
@@ -8,8 +10,10 @@ from drawn import draw_recording, walk
 
 from hmc.cli import main
 from hmc.io.results import read_run, read_tracks
+from hmc.processes import may_fork
 from hmc.tracking import resumable
 from hmc.tracking.trackers import TRACKERS
+from hmc.voxels import looks
 
 
 @pytest.fixture(scope="module")
@@ -43,6 +47,14 @@ def test_tracks_are_the_same_bytes_whatever_the_number_of_processes(folder, tmp_
     for workers in ("1", "2", "3"):
         assert track(folder, tmp_path / workers, "--workers", workers) == 0
         assert (tmp_path / workers / "tracks.csv").read_bytes() == (tmp_path / "1" / "tracks.csv").read_bytes()
+
+
+@pytest.mark.skipif(not may_fork(), reason="there is one process only")
+def test_a_process_that_is_gone_is_one_line(folder, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(looks, "segment_views", lambda *given: os.kill(os.getpid(), signal.SIGKILL))
+    assert track(folder, tmp_path / "out", "--workers", "2") == 1
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 1 and "exit code -9" in lines[0] and "--workers 1" in lines[0]
 
 
 @pytest.mark.parametrize("stop", [3, 14, 23])
