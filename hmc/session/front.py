@@ -43,7 +43,7 @@ class Session:
     background : sequence or mapping of iterables of ndarray, shape (h, w, 3), uint8 BGR
         Images of the empty scene, camera by camera in the rig's order, or by a camera's name; two seconds of them are plenty.
     fps : float
-        Steps a second. Where frames are dropped (`hmc.live`): those that are left.
+        Steps a second: of cameras that are quicker than the work, as many as it keeps up with (`hmc.live`).
     room : ndarray, shape (2, 3), optional
         Corners of the space in which people are looked for, metres; estimated from the rig where left out.
     method : str, PoseMethod or None
@@ -87,6 +87,11 @@ class Session:
     ) -> None:
         self.settings = session_settings(rig, fps, room, method, height_m, persons, seed, voxel_size_m)
         self.state = begin_session(self.settings, background)
+
+    @property
+    def fps(self) -> float:
+        """Steps a second."""
+        return self.settings.scene.fps
 
     @property
     def first_delay_s(self) -> float:
