@@ -70,7 +70,7 @@ class Session:
     >>> background = [background_frames(recording, camera) for camera in range(len(recording.rig))]
     >>> session = hmc.Session(recording.rig, background, recording.fps, recording.room, persons=1)
     >>> [sorted(session.step(frame.images).people) for frame in iterate_frames(recording)]  # told once they are surely there
-    [[], [], [], [], [0], [0]]
+    [[], [], [], [0], [0], [0]]
     """
 
     def __init__(
