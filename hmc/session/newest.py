@@ -114,11 +114,11 @@ class _Waiting:
 
     def _put(self, images: Images, now: float) -> None:
         # Half a period of grace: cameras as quick as the session are not punctual.
-        earliest = self._due - self._period_s / 2
-        if now < earliest:
+        grace_s = self._period_s / 2
+        if now < self._due - grace_s:
             self.between += 1
             return
-        self._due = max(self._due, now - self._period_s / 2) + self._period_s
+        self._due = (self._due if now < self._due + grace_s else now) + self._period_s
         self.dropped += len(self._frames) == self._frames.maxlen
         self._frames.append(images)
         self._changed.notify()
