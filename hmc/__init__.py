@@ -6,9 +6,10 @@
 >>> people.positions.shape  # rows, landmarks, x y z in metres
 (8, 15, 3)
 
-These names will stay: `open_recording`, `check`, `silhouettes`, `hulls`, `track`, `views`, `pose`, `evaluate`, `view`; the records
-`Recording`, `Rig`, `Camera`, `TrackTable`, `PoseTable`, `PosedPeople`; `METHODS` and `TRACKERS`, `pose_method`, `PoseMethod`,
-`register_method` and `register_tracker` to add to them; and `InputError`. What is in the modules below may move.
+These names will stay: `open_recording`, `check`, `silhouettes`, `hulls`, `track`, `views`, `pose`, `evaluate`, `view`; `Session` and `live`
+for images as they come; the records `Recording`, `Rig`, `Camera`, `TrackTable`, `PoseTable`, `PosedPeople`; `METHODS` and `TRACKERS`,
+`pose_method`, `PoseMethod`, `register_method` and `register_tracker` to add to them; and `InputError`.
+What is in the modules below may move.
 """
 
 from __future__ import annotations
@@ -28,10 +29,12 @@ _WHERE = {
     "PosedPeople": "hmc.pose.follow",
     "Recording": "hmc.io.recording",
     "Rig": "hmc.camera.model",
+    "Session": "hmc.session.front",
     "TRACKERS": "hmc.tracking.trackers",
     "TrackTable": "hmc.io.results",
     "evaluate": "hmc.api",
     "hulls": "hmc.api",
+    "live": "hmc.session.newest",
     "open_recording": "hmc.io.recording",
     "pose_method": "hmc.pose.registry",
     "register_method": "hmc.pose.registry",

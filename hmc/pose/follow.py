@@ -15,6 +15,7 @@ import numpy as np
 
 from hmc.body.joints import DOF_NAMES
 from hmc.body.kinematics import landmark_masks, landmarks
+from hmc.body.model import BodyModel
 from hmc.errors import InputError
 from hmc.io.detections import DetectionTable
 from hmc.io.masks import MaskStep, keep_masks, kept_frames
@@ -35,7 +36,7 @@ from hmc.voxels.grid import VoxelGrid
 from hmc.voxels.hulls import HullStep, stream_hulls
 from hmc.voxels.run_options import RunOptions
 
-__all__ = ["FollowOptions", "PosedPeople", "follow", "only_person", "persons_of", "unfitted_notes"]
+__all__ = ["FollowOptions", "PosedPeople", "follow", "known_landmarks", "only_person", "persons_of", "unfitted_notes"]
 
 
 @dataclass(frozen=True)
@@ -292,10 +293,7 @@ def _posed_people(rows: Sequence[DecidedFrames]) -> PosedPeople:
     positions = np.full((len(frames), len(LANDMARKS), 3), np.nan)
     for person, body in bodies.items():
         fitted = (persons == person) & (status == "fitted")
-        positions[fitted] = landmarks(body, states[fitted])
-        # An angle that no data shows is not a number, and neither is what it moves.
-        unknown = missing[fitted].astype(int) @ landmark_masks(body).T
-        positions[fitted] = np.where(unknown[..., None] > 0, np.nan, positions[fitted])
+        positions[fitted] = known_landmarks(body, states[fitted], missing[fitted])
     return PosedPeople(
         PoseTable(frames, persons, positions),
         PoseStates(
@@ -306,6 +304,25 @@ def _posed_people(rows: Sequence[DecidedFrames]) -> PosedPeople:
         tuple(info.details for info in infos),
         tuple(status.tolist()),
     )
+
+
+def known_landmarks(body: BodyModel, states: np.ndarray, missing: np.ndarray) -> np.ndarray:
+    """Landmarks of poses; an angle that no data shows is not a number, and neither is what it moves.
+
+    Parameters
+    ----------
+    body : BodyModel
+    states : ndarray, shape (n, 33)
+    missing : ndarray of bool, shape (n, 33)
+        Angles that no data shows.
+
+    Returns
+    -------
+    ndarray, shape (n, 15, 3)
+        World, metres.
+    """
+    unknown = missing.astype(int) @ landmark_masks(body).T
+    return np.where(unknown[..., None] > 0, np.nan, landmarks(body, states))
 
 
 def _limb_notes(persons: np.ndarray, missing: np.ndarray) -> list[str]:

@@ -19,7 +19,7 @@ from hmc.pose.method import Alternatives, Capture, PoseMethod, StepInfo, Subject
 from hmc.pose.starts.window import walk
 from hmc.pose.views.person_view import PersonView
 
-__all__ = ["DecidedFrames", "PersonState", "PersonTrack", "PoseTask", "person_step", "resumed"]
+__all__ = ["DecidedFrames", "PersonState", "PersonTrack", "PoseTask", "end_person", "person_step", "resumed"]
 
 NO_START = "nothing to start from"
 
@@ -69,11 +69,15 @@ class PersonTrack:
         Rising.
     velocities : ndarray, shape (n, 3)
         Metres a second.
+    ended : bool
+        Whether the last of these frames is the person's last. Of a track that is still followed it may not be: what waits for later frames
+        goes on waiting then, until `end_person`.
     """
 
     number: int
     frames: np.ndarray
     velocities: np.ndarray
+    ended: bool = True
 
     def velocity(self, frames: int | Sequence[int]) -> np.ndarray:
         """Velocity in some of the person's frames, shape (..., 3), metres a second."""
@@ -161,7 +165,7 @@ def person_step(task: PoseTask, person: PersonTrack, state: PersonState, view: P
     decided : list of DecidedFrames
         In order.
     """
-    is_last = view.frame == int(person.frames[-1])
+    is_last = person.ended and view.frame == int(person.frames[-1])
     if state.tracked is None:
         state = replace(state, watched=(*state.watched, view))
         if len(state.watched) < task.window and not is_last:
@@ -182,6 +186,23 @@ def person_step(task: PoseTask, person: PersonTrack, state: PersonState, view: P
             stepped = task.method.recover(rng, state.tracked, stepped, view)
         state = replace(state, tracked=stepped[0], followed=(*state.followed, _followed(task, rng, *stepped, view)))
     return _decide(task, person, state, is_last)
+
+
+def end_person(task: PoseTask, person: PersonTrack, state: PersonState) -> list[DecidedFrames]:
+    """What is left to decide of a person of whom no frame will follow; of one who was not watched for long enough nothing.
+
+    Parameters
+    ----------
+    task : PoseTask
+    person : PersonTrack
+    state : PersonState
+        Not to be used again.
+
+    Returns
+    -------
+    list of DecidedFrames
+    """
+    return _decide(task, person, state, is_last=True)[1] if state.followed else []
 
 
 def _start(task: PoseTask, person: PersonTrack, state: PersonState) -> PersonState | None:

@@ -33,7 +33,7 @@ from hmc.voxels.frontend_settings import FrontendSettings
 from hmc.voxels.grid import VoxelGrid
 from hmc.voxels.looks import Look, look_at
 
-__all__ = ["FrontendSettings", "HullStep", "stream_hulls", "stream_masks"]
+__all__ = ["FrontendSettings", "HullStep", "carve_step", "settle", "stream_hulls", "stream_masks"]
 
 logger = logging.getLogger("hmc")
 
@@ -88,7 +88,7 @@ def stream_hulls(
     if masks is None:
         masks = stream_masks(recording, settings, first=first, last=last, warm_up=warm_up, on_problem=on_problem, workers=workers)
     for step in masks:
-        yield HullStep(step.index, step.images, step.masks, step.doubtful, *_hulls(tables, step, settings))
+        yield carve_step(tables, step, settings)
 
 
 def stream_masks(
@@ -149,7 +149,7 @@ def stream_masks(
                 masks = look.masks
                 if scene.places is not None:
                     masks = with_unseen_places(scene.places, look.images, masks, pool)
-                masks, doubtful = _settle(tables, replace(look, masks=masks), settings)
+                masks, doubtful = settle(tables, replace(look, masks=masks), settings)
                 yield MaskStep(look.index, look.images, masks, doubtful)
         for c, began in changed.items():
             report(_say_changed(names[c], began, look.index))
@@ -206,6 +206,19 @@ def _empty_scene(recording: Recording, settings: FrontendSettings, report: Repor
     return _EmptyScene(models, frozenset(background), known, places)
 
 
+def carve_step(tables: CarvingTables, step: MaskStep, settings: FrontendSettings) -> HullStep:
+    """One frame's silhouettes with their hulls.
+
+    Parameters
+    ----------
+    tables : CarvingTables
+        Of the grid.
+    step : MaskStep
+    settings : FrontendSettings
+    """
+    return HullStep(step.index, step.images, step.masks, step.doubtful, *_hulls(tables, step, settings))
+
+
 def _hulls(tables: CarvingTables, step: MaskStep, settings: FrontendSettings) -> tuple[np.ndarray, ...]:
     if not step.usable:
         return tuple(np.zeros(tables.grid.shape, bool) for _ in range(3))
@@ -218,8 +231,20 @@ def _hulls(tables: CarvingTables, step: MaskStep, settings: FrontendSettings) ->
     return hulls
 
 
-def _settle(tables: CompletionTables | None, look: Look, settings: FrontendSettings) -> tuple[tuple, tuple]:
-    """Silhouettes after the cameras settled one another's doubts, and the doubts of frames in which much is left to doubt."""
+def settle(tables: CompletionTables | None, look: Look, settings: FrontendSettings) -> tuple[tuple, tuple]:
+    """Silhouettes after the cameras settled one another's doubts, and the doubts of frames in which much is left to doubt.
+
+    Parameters
+    ----------
+    tables : CompletionTables or None
+        None: nothing is settled.
+    look : Look
+    settings : FrontendSettings
+
+    Returns
+    -------
+    masks, doubtful : tuples of ndarray of bool, shape (h, w), or None; one a camera
+    """
     masks, doubtful = look.masks, look.doubtful
     none, much = (None,) * len(masks), False
     if tables is None:

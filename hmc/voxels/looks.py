@@ -14,13 +14,13 @@ from typing import TypeVar
 
 import numpy as np
 
-from hmc.camera.segmentation import BackgroundModel, segment_views, train_background
-from hmc.io.recording import Recording, background_frames, iterate_frames, only_cameras
+from hmc.camera.segmentation import BackgroundModel, SegmentationSettings, segment_views, train_background
+from hmc.io.recording import Frame, Recording, background_frames, iterate_frames, only_cameras
 from hmc.processes import arrays_ahead
 from hmc.voxels.floor_shadows import Scene
 from hmc.voxels.frontend_settings import FrontendSettings
 
-__all__ = ["Look", "look_at"]
+__all__ = ["Look", "look_at", "look_once"]
 
 T = TypeVar("T")
 
@@ -116,6 +116,44 @@ def look_at(
             yield Look(index, _copies(images), _copies(masks), _copies(doubtful), filled, tuple(scenes), lines)
 
 
+def look_once(
+    models: Mapping[int, BackgroundModel],
+    frame: Frame,
+    settings: SegmentationSettings,
+    pool: Executor | None = None,
+    lines: tuple[str, ...] = (),
+) -> tuple[Look, dict[int, BackgroundModel]]:
+    """What the cameras see in one frame, and the models after it.
+
+    Parameters
+    ----------
+    models : mapping of int to BackgroundModel
+        By camera. Not to be used again: go on with those returned.
+    frame : Frame
+        Its silhouettes are taken as they are of cameras without a model.
+    settings : SegmentationSettings
+    pool : concurrent.futures.Executor, optional
+        Threads to spread the cameras over.
+    lines : tuple of str
+        Of the look.
+
+    Returns
+    -------
+    look : Look
+    models : dict of int to BackgroundModel
+    """
+    found, after = segment_views(list(models.values()), [frame.images[c] for c in models], settings, pool)
+    known = dict(zip(models, after, strict=True))
+    masks = list(frame.silhouettes or (None,) * len(frame.images))
+    for c, mask in zip(known, found, strict=True):
+        masks[c] = mask
+    seen = [known.get(c) for c in range(len(masks))]
+    doubtful = tuple(None if model is None else model.doubtful for model in seen)
+    filled = tuple(None if model is None else model.filled for model in seen)
+    scenes = tuple(None if model is None else Scene(model.mean, model.unseen) for model in seen)
+    return Look(frame.index, frame.images, tuple(masks), doubtful, filled, scenes, lines), known
+
+
 def _arrays(
     recording: Recording,
     models: Mapping[int, BackgroundModel],
@@ -159,18 +197,9 @@ def _look(
         if pool is not None:
             frames = _read_ahead(frames, stack.enter_context(ThreadPoolExecutor(1)))
         for frame in frames:
-            found, after = segment_views(list(known.values()), [frame.images[c] for c in known], settings.segmentation, pool)
-            known = dict(zip(known, after, strict=True))
-            masks = list(frame.silhouettes or (None,) * len(recording.rig))
-            for c, mask in zip(known, found, strict=True):
-                masks[c] = mask
-            seen = [known.get(c) for c in range(len(masks))]
-            doubtful = tuple(None if model is None else model.doubtful for model in seen)
-            filled = tuple(None if model is None else model.filled for model in seen)
-            scenes = tuple(None if model is None else Scene(model.mean, model.unseen) for model in seen)
             told, lines[:] = tuple(lines), []
-            changes = [0 if model is None else model.changes for model in seen]
-            yield Look(frame.index, frame.images, tuple(masks), doubtful, filled, scenes, told), changes
+            look, known = look_once(known, frame, settings.segmentation, pool, told)
+            yield look, [known[c].changes if c in known else 0 for c in range(len(recording.rig))]
 
 
 def _read_ahead(items: Iterable[T], reader: ThreadPoolExecutor) -> Iterator[T]:

@@ -25,7 +25,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 def examples() -> list:
     finder, found = doctest.DocTestFinder(recurse=False), []
-    for name in ("__init__", *hmc.api.__all__, "open_recording", "pose_method", "register_method", "register_tracker"):
+    for name in ("__init__", *hmc.api.__all__, "Session", "live", "open_recording", "pose_method", "register_method", "register_tracker"):
         found += finder.find(hmc if name == "__init__" else getattr(hmc.api, name, None) or getattr(hmc, name), f"hmc.{name}", globs={})
     return found + finder.find(registry, "hmc.pose.registry") + finder.find(trackers, "hmc.tracking.trackers")
 

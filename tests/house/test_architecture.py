@@ -74,6 +74,7 @@ MAY_IMPORT = {
     "synthetic": IO | BODY | {"synthetic"},
     "plugins": BASE,
     "processes": set(),
+    "session": POSE | {"session"},
     "experiments": EVERYTHING,
     "api": EVERYTHING,
     "callable_package": set(),  # finds `api` by its name, once it is called

@@ -1,0 +1,47 @@
+"""Images as they are given to a session, checked: one line says whose is wrong, and how."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import islice
+
+import numpy as np
+
+from hmc.camera.model import Camera, Rig
+from hmc.errors import InputError
+
+__all__ = ["Images", "background_images", "frame_images"]
+
+#: One a camera; None where it has none.
+Images = Sequence[np.ndarray | None]
+
+
+def frame_images(rig: Rig, images: Images) -> tuple[np.ndarray | None, ...]:
+    """The images of a frame, copied: cameras write the next frame where the last one was, and views are kept for a while."""
+    if not isinstance(images, Sequence | np.ndarray) or len(images) != len(rig):
+        given = len(images) if isinstance(images, Sequence | np.ndarray) else type(images).__name__
+        raise InputError(f"a frame has one image a camera, {len(rig)} of them, None where there is none; got {given}")
+    return tuple(None if image is None else _image(camera, image).copy() for camera, image in zip(rig, images, strict=True))
+
+
+def _image(camera: Camera, image: np.ndarray, what: str = "image") -> np.ndarray:
+    """An image that may be one of a camera."""
+    if not isinstance(image, np.ndarray) or image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3:
+        got = f"{image.dtype} of shape {image.shape}" if isinstance(image, np.ndarray) else type(image).__name__
+        raise InputError(f"camera '{camera.name}': an {what} is an array of uint8, shape (height, width, 3), BGR; got {got}")
+    if image.shape[1::-1] != camera.size:
+        width, height = camera.size
+        raise InputError(
+            f"camera '{camera.name}': the {what} is {image.shape[1]} x {image.shape[0]} pixels, its calibration says {width} x {height}"
+        )
+    return image
+
+
+def background_images(camera: Camera, images: Iterable[np.ndarray], most: int) -> Iterator[np.ndarray]:
+    """Images of a camera's empty scene, one at least."""
+    empty = True
+    for image in islice(images, most):
+        empty = False
+        yield _image(camera, image, "image of the background")
+    if empty:
+        raise InputError(f"no background for camera '{camera.name}'; give images of the empty scene")
