@@ -341,11 +341,11 @@ def carve_levels(
     hulls = tuple(np.zeros(tables.grid.shape, bool) for _ in tolerances)
     if voting:
         needed = min(DEFAULT_MIN_VIEWS, len(voting)) if min_views is None else min_views
-        whole, undecided, order = _judge_blocks(tables, images, voting, max(tolerances), outside, needed)
-        voxels, misses = _judge_voxels(tables, images, order, undecided, max(tolerances), outside, needed)
+        judged = _judge_blocks(tables, images, voting, max(tolerances), outside, needed)
+        voxels, misses = _judge_voxels(tables, images, judged, max(tolerances), outside, needed)
+        places, misses = _places(tables, voxels, misses)
         for hull, tolerance in zip(hulls, tolerances, strict=True):
-            _mark(hull, tables, (whole[:, None] * BLOCK_VOXELS + np.arange(BLOCK_VOXELS)).ravel())
-            _mark(hull, tables, voxels[misses <= tolerance])
+            hull.ravel()[places[misses <= tolerance]] = True
     return hulls
 
 
@@ -366,55 +366,74 @@ def _check_masks(tables: CarvingTables, masks: Sequence[np.ndarray | None], desp
     return images
 
 
-def _judge_blocks(tables, images, voting, tolerance, outside, min_views) -> tuple[np.ndarray, np.ndarray, list[int]]:
-    """Blocks that are occupied as a whole; blocks whose voxels must be looked at; in which order of cameras. Other blocks are empty."""
+@dataclass(frozen=True)
+class _Judged:
+    """What the blocks' rectangles tell.
+
+    Parameters
+    ----------
+    blocks : ndarray of int, shape (n,)
+        Those that may hold occupied voxels; all others are empty.
+    missing, voted : ndarray of uint8, shape (n,)
+        Cameras that miss every voxel of a block; cameras that have voted on every voxel of it.
+    mixed : dict of int to ndarray of bool, shape (n,)
+        By camera, the one that rejects most first: whether the block's voxels have to be asked for one by one.
+    """
+
+    blocks: np.ndarray
+    missing: np.ndarray
+    voted: np.ndarray
+    mixed: dict[int, np.ndarray]
+
+
+def _judge_blocks(tables, images, voting, tolerance, outside, min_views) -> _Judged:
+    """What each camera says of whole blocks, camera by camera; blocks that cannot be occupied are left out at once."""
     blocks = np.arange(tables.areas.shape[1])
-    missing = np.zeros(blocks.size, np.uint8)  # cameras that miss every voxel of the block
-    full = np.zeros(blocks.size, np.uint8)  # cameras that have every voxel in their silhouette
-    absent = np.zeros(blocks.size, np.uint8)  # cameras that do not vote on any voxel of the block
+    missing, full, absent = np.zeros((3, blocks.size), np.uint8)  # cameras that miss all voxels, show all on people, vote on none
+    mixed = np.zeros((len(voting), blocks.size), bool)
     foreground = []
     for done, c in enumerate(voting):
         integral = cv2.integral(images[c]).ravel()
         bottom_right, top_left, top_right, bottom_left = (integral.take(corner.take(blocks)) for corner in tables.corners[c])
         inside = bottom_right + top_left - top_right - bottom_left
         area, whole = tables.areas[c].take(blocks), tables.seen_whole[c].take(blocks)
-        missing += (inside == 0) & (whole if outside != "carve" else True)
-        full += (inside == area) & (whole if outside != "keep" else True)
+        misses = (inside == 0) & (whole if outside != "carve" else True)
+        shows = (inside == area) & (whole if outside != "keep" else True)
+        missing += misses
+        full += shows
+        told = misses | shows
         if outside == "ignore":
             absent += area == 0
+            told |= area == 0
+        mixed[done, blocks] = ~told
         foreground.append(float(np.count_nonzero(images[c])))
         if done >= tolerance:
             possible = np.flatnonzero((missing <= tolerance) & (absent <= len(voting) - min_views))
             blocks, missing, full, absent = (array.take(possible) for array in (blocks, missing, full, absent))
-    occupied = (full == len(voting)) & (len(voting) >= min_views)
-    # The camera that rejects most comes first.
-    order = [voting[i] for i in np.argsort(foreground, kind="stable")]
-    return blocks[occupied], blocks[~occupied], order
+    order = np.argsort(foreground, kind="stable")
+    return _Judged(blocks, missing, missing + full, {voting[i]: mixed[i].take(blocks) for i in order})
 
 
-def _judge_voxels(tables, images, order, blocks, tolerance, outside, min_views) -> tuple[np.ndarray, np.ndarray]:
-    """The occupied voxels of the blocks, as block * 512 + place in the block, and how many cameras miss each."""
+def _judge_voxels(tables, images, judged, tolerance, outside, min_views) -> tuple[np.ndarray, np.ndarray]:
+    """The occupied voxels, as block * 512 + place in the block, and how many cameras miss each."""
     # One number a pixel: `vote` for having voted plus 1 for a miss; in the sum over cameras the low part is the number of misses.
-    vote: int = 16 if len(order) < 16 else 1 << 16
-    dtype: type = np.uint8 if len(order) < 16 else np.uint32
+    vote: int = 16 if len(judged.mixed) < 16 else 1 << 16
+    dtype: type = np.uint8 if len(judged.mixed) < 16 else np.uint32
     beyond = {"ignore": 0, "carve": vote + 1, "keep": vote}[outside]
-    voxels = None  # those that can still be occupied; all of the blocks' at first
-    total: np.ndarray = np.zeros(0, dtype)
-    for done, c in enumerate(order):
+    blocks, alive = judged.blocks, np.ones(judged.blocks.size, bool)
+    total = np.repeat(judged.voted.astype(dtype) * dtype(vote) + judged.missing, BLOCK_VOXELS).reshape(-1, BLOCK_VOXELS)
+    for c, mixed in judged.mixed.items():
         codes = np.empty(images[c].size + 1, dtype)
         np.subtract(dtype(vote + 1), images[c].ravel(), out=codes[:-1])
         codes[-1] = beyond
-        pixels = tables.pixels[c][blocks].ravel() if voxels is None else tables.pixels[c].ravel().take(voxels)
-        found = codes.take(pixels)
-        total = found if done == 0 else total + found
-        if done >= tolerance:
-            good = np.flatnonzero((total & (vote - 1)) <= tolerance)
-            total = total.take(good)
-            voxels = _number_voxels(blocks, good) if voxels is None else voxels.take(good)
-    if voxels is None:  # more cameras may miss than there are
-        voxels = _number_voxels(blocks, np.arange(total.size))
-    seen = np.flatnonzero(total // vote >= min_views)
-    return voxels.take(seen), (total & (vote - 1)).take(seen)
+        asked = np.flatnonzero(mixed & alive)
+        sums = total.take(asked, axis=0)
+        sums += codes.take(tables.pixels[c].take(blocks.take(asked), axis=0))
+        total[asked] = sums
+        alive[asked] = (sums & dtype(vote - 1)).min(axis=1, initial=vote - 1) <= tolerance
+    misses = total & dtype(vote - 1)
+    voxels = np.flatnonzero((misses <= tolerance) & (total >= min_views * vote))
+    return _number_voxels(blocks, voxels), misses.ravel().take(voxels)
 
 
 def _number_voxels(blocks: np.ndarray, places: np.ndarray) -> np.ndarray:
@@ -422,14 +441,14 @@ def _number_voxels(blocks: np.ndarray, places: np.ndarray) -> np.ndarray:
     return blocks.take(places // BLOCK_VOXELS) * BLOCK_VOXELS + places % BLOCK_VOXELS
 
 
-def _mark(hull: np.ndarray, tables: CarvingTables, voxels: np.ndarray) -> None:
-    """Set voxels, given as block * 512 + place in the block, in the volume; those beyond the grid are dropped."""
-    _, ny, nz = hull.shape
+def _places(tables: CarvingTables, voxels: np.ndarray, misses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Flat places in the volume of voxels, given as block * 512 + place in the block, with their misses; without those beyond the grid."""
+    _, ny, nz = tables.grid.shape
     block, place = voxels // BLOCK_VOXELS, voxels % BLOCK_VOXELS
     flat = tables.first.take(block) + (WITHIN @ np.array([ny * nz, nz, 1])).take(place)
     suspects = np.flatnonzero(tables.sticks_out.take(block))
     if suspects.size:
         corner = np.stack(np.unravel_index(block[suspects], tables.blocks), axis=-1) * BLOCK
-        beyond = (corner + WITHIN[place[suspects]] >= hull.shape).any(axis=1)
-        flat = np.delete(flat, suspects[beyond])
-    hull.ravel()[flat] = True
+        beyond = suspects[(corner + WITHIN[place[suspects]] >= tables.grid.shape).any(axis=1)]
+        flat, misses = np.delete(flat, beyond), np.delete(misses, beyond)
+    return flat, misses
