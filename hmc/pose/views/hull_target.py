@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hmc.pose.views.near_distance import near_distance
+from hmc.pose.views.near_distance import distances_of_squares, look_up, near_squares
 from hmc.voxels.grid import VoxelGrid
 from hmc.voxels.surface import surface
 
@@ -137,15 +137,17 @@ def make_target(
         needed[:] = core
         beyond = np.argwhere((occupied | maybe) & ~core)
         needed[tuple(beyond[new(grid.centres(beyond + low))].T)] = True
-    distance = _distance_to(occupied & needed, grid.voxel_size_m)
-    distance += STRICT_SHARE * np.minimum(_distance_to(core, grid.voxel_size_m), STRICT_CAP_M)
+    reach = int(np.ceil(FAR_M / grid.voxel_size_m))
+    far = _surface_distances(reach, grid.voxel_size_m)
+    distance = look_up(far, near_squares(occupied & needed, reach))
+    distance += look_up(STRICT_SHARE * np.minimum(far, STRICT_CAP_M), near_squares(core, reach))
     if loose is not None:
-        distance = np.minimum(distance, _distance_to(maybe & needed, grid.voxel_size_m) + LOOSE_M)
+        np.minimum(distance, look_up(far + LOOSE_M, near_squares(maybe & needed, reach)), out=distance)
     if unseen is not None and len(unseen):
         hidden = np.zeros(shape, bool)
         inside = unseen[np.all((unseen >= low) & (unseen < low + shape), axis=1)] - low
         hidden[tuple(inside.T)] = True
-        distance = np.minimum(distance, _distance_to(hidden, grid.voxel_size_m) + UNSEEN_M)
+        np.minimum(distance, look_up(far + UNSEEN_M, near_squares(hidden, reach)), out=distance)
     if floor_z is not None:
         # Hulls end at the floor because voxels do. A toe that points down, as the body has no ankles, is not outside of them for that; how
         # deep a sole may sink is for `hmc.body.floor`.
@@ -167,12 +169,10 @@ def _crop(volume: np.ndarray, low: np.ndarray, shape: np.ndarray) -> np.ndarray:
     return out
 
 
-def _distance_to(occupied: np.ndarray, voxel_size_m: float) -> np.ndarray:
-    distance = near_distance(occupied, int(np.ceil(FAR_M / voxel_size_m)))
-    # Measured to voxel centres; the hull's surface is half a voxel nearer.
-    distance -= np.float32(0.5)
-    distance *= np.float32(voxel_size_m)
-    return np.maximum(distance, 0, out=distance)
+def _surface_distances(reach: int, voxel_size_m: float) -> np.ndarray:
+    """Distances to a hull's surface, metres, float32, by the square of those to its voxels' centres (`near_squares`)."""
+    # The hull's surface is half a voxel nearer than its voxels' centres.
+    return np.maximum((distances_of_squares(reach) - np.float32(0.5)) * np.float32(voxel_size_m), np.float32(0))
 
 
 def sample_points(rng: np.random.Generator, points: np.ndarray, n: int) -> np.ndarray:
