@@ -193,25 +193,36 @@ def project(cameras: Camera | Rig, points: np.ndarray) -> tuple[np.ndarray, np.n
         pairs = [project(camera, points) for camera in cameras]
         return np.stack([uv for uv, _ in pairs]), np.stack([valid for _, valid in pairs])
     points = np.asarray(points, float)
-    cam = points @ cameras.rotation.T + cameras.translation
-    depth = cam[..., 2]
+    turned = points @ cameras.rotation.T
+    # Coordinate by coordinate: NumPy is slow along axes of two or three.
+    x, y, depth = (turned[..., k] + cameras.translation[k] for k in range(3))
     front = depth > NEAR_M
-    xy = cam[..., :2] / np.where(front, depth, 1.0)[..., None]
-    r2 = np.einsum("...i,...i->...", xy, xy)
-    valid = front & (r2 < cameras.max_radius**2)
-    xy = distort(cameras, np.where(valid[..., None], xy, 0.0))
-    return xy @ cameras.matrix[:2, :2].T + cameras.matrix[:2, 2], valid
+    depth = np.where(front, depth, 1.0)
+    x, y = x / depth, y / depth
+    valid = front & (x * x + y * y < cameras.max_radius**2)
+    xy = np.empty((*points.shape[:-1], 2))
+    xy[..., 0], xy[..., 1] = _distorted(cameras, np.where(valid, x, 0.0), np.where(valid, y, 0.0))
+    uv = xy @ cameras.matrix[:2, :2].T
+    uv[..., 0] += cameras.matrix[0, 2]
+    uv[..., 1] += cameras.matrix[1, 2]
+    return uv, valid
 
 
 def distort(camera: Camera, xy: np.ndarray) -> np.ndarray:
     """Distort normalised image coordinates, (..., 2) to (..., 2)."""
-    k1, k2, p1, p2, k3 = camera.distortions
     if not camera.distortions.any():
         return xy
-    x, y = xy[..., 0], xy[..., 1]
+    return np.stack(_distorted(camera, xy[..., 0], xy[..., 1]), axis=-1)
+
+
+def _distorted(camera: Camera, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """`distort` of x and y apart."""
+    k1, k2, p1, p2, k3 = camera.distortions
+    if not camera.distortions.any():
+        return x, y
     r2 = x * x + y * y
     radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
-    return np.stack([x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x), y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y], axis=-1)
+    return x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x), y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
 
 
 def undistort(camera: Camera, uv: np.ndarray, iterations: int = 30) -> np.ndarray:

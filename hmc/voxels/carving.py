@@ -244,11 +244,12 @@ def pixel_of_voxel(camera: Camera, points: np.ndarray) -> tuple[np.ndarray, np.n
         In front of the camera, within its lens and its image.
     """
     uv, valid = project(camera, points)
+    u, v = uv[..., 0], uv[..., 1]
     width, height = camera.size
     # Compared before the cast: a far-away point's pixel may not fit in an integer.
-    seen = valid & (uv[..., 0] >= -0.5) & (uv[..., 0] < width - 0.5) & (uv[..., 1] >= -0.5) & (uv[..., 1] < height - 0.5)
-    pixel = np.floor(np.where(seen[..., None], uv, 0.0) + 0.5).astype(np.int32)
-    return pixel[..., 0], pixel[..., 1], seen
+    seen = valid & (u >= -0.5) & (u < width - 0.5) & (v >= -0.5) & (v < height - 0.5)
+    column, row = (np.floor(np.where(seen, place, 0.0) + 0.5).astype(np.int32) for place in (u, v))
+    return column, row, seen
 
 
 def pixels_at(tables: CarvingTables, voxels: np.ndarray) -> np.ndarray:
