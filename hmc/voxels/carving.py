@@ -431,7 +431,7 @@ def _judge_voxels(tables, images, judged, tolerance, outside, min_views) -> tupl
         sums = total.take(asked, axis=0)
         sums += codes.take(tables.pixels[c].take(blocks.take(asked), axis=0))
         total[asked] = sums
-        alive[asked] = (sums & dtype(vote - 1)).min(axis=1, initial=vote - 1) <= tolerance
+        alive[asked] = (sums & dtype(vote - 1)).min(axis=1) <= tolerance
     misses = total & dtype(vote - 1)
     voxels = np.flatnonzero((misses <= tolerance) & (total >= min_views * vote))
     return _number_voxels(blocks, voxels), misses.ravel().take(voxels)

@@ -71,15 +71,17 @@ def silhouette_rays(
         if mask is None:
             continue
         column, row, in_image = pixel_of_voxel(camera, points)
-        seen = np.flatnonzero(in_image & mask[row, column])
+        seen = np.flatnonzero(in_image & mask.ravel().take(row * camera.size[0] + column))
         if not len(seen):
             continue
-        here = points[seen]
-        per_patch = np.median(_in_camera(camera, here)[:, 2]) / spacing_m
-        patches, pick = np.unique(_patches(camera, here, per_patch), return_index=True)
+        here = points.take(seen, axis=0)
+        placed = _in_camera(camera, here)
+        per_patch = _median(placed[:, 2]) / spacing_m
+        before = np.zeros((0, 3))
         if others is not None and len(others):
-            before = others[_in_camera(camera, others)[:, 2] > spacing_m]
-            pick = pick[~np.isin(patches, _patches(camera, before, per_patch))]
+            before = _in_camera(camera, others)
+            before = before[before[:, 2] > spacing_m]
+        pick = _first_of_patches(_patches(placed, per_patch), _patches(before, per_patch))
         directions = here[pick] - camera.centre
         directions /= np.linalg.norm(directions, axis=1, keepdims=True)
         rays.append(np.concatenate([here[pick], directions], axis=1))
@@ -90,11 +92,39 @@ def _in_camera(camera: Camera, points: np.ndarray) -> np.ndarray:
     return points @ camera.rotation.T + camera.translation
 
 
-def _patches(camera: Camera, points: np.ndarray, per_unit: float) -> np.ndarray:
-    """A number for the patch of the image, without distortion, on which each point falls."""
-    x, y, depth = _in_camera(camera, points).T
-    column, row = np.floor(np.stack([x, y]) / depth * per_unit).astype(np.int64)
-    return column * 1_000_003 + row
+def _median(values: np.ndarray) -> float:
+    """`numpy.median` of finite values, at least one, for a fraction of its time."""
+    half = len(values) // 2
+    parted = np.partition(values, half)
+    return float(parted[half] if len(values) % 2 else (parted[:half].max() + parted[half]) / 2)
+
+
+def _patches(placed: np.ndarray, per_unit: float) -> np.ndarray:
+    """Column and row of the patch of the image, without distortion, on which each point in the camera's frame (n, 3) falls: (2, n)."""
+    x, y, depth = placed.T
+    return np.floor(np.stack([x / depth, y / depth]) * per_unit).astype(np.int64)
+
+
+def _first_of_patches(patches: np.ndarray, taken: np.ndarray) -> np.ndarray:
+    """The first point of every patch, column by column, without those that are taken.
+
+    Parameters
+    ----------
+    patches, taken : ndarray of int, shape (2, n) and (2, m)
+        Column and row, n at least 1.
+
+    Returns
+    -------
+    ndarray of int, shape (k,)
+    """
+    n, low = patches.shape[1], patches.min(axis=1)
+    shape = patches.max(axis=1) - low + 1
+    first = np.full(shape.prod(), n)
+    np.minimum.at(first, np.ravel_multi_index(tuple(patches - low[:, None]), shape), np.arange(n))
+    taken = taken - low[:, None]
+    inside = ((taken >= 0) & (taken < shape[:, None])).all(axis=0)
+    first[np.ravel_multi_index(tuple(taken[:, inside]), shape)] = n
+    return first[first < n]
 
 
 def points_to_cover(rng: np.random.Generator, target: HullTarget, n: int, ray_share: float) -> np.ndarray:

@@ -42,9 +42,9 @@ def on_uncovered_pixels(
         if mask is None:
             continue
         column, row, in_image = pixel_of_voxel(camera, candidates)
-        seen = np.flatnonzero(in_image & mask[row, column])
+        seen = np.flatnonzero(in_image & mask.ravel().take(row * camera.size[0] + column))
         covered, step = _covered(camera, known, spacing_m)
-        new[seen] |= ~covered[row[seen] // step, column[seen] // step]
+        new[seen] |= ~covered[row.take(seen) // step, column.take(seen) // step]
     return new
 
 
