@@ -17,6 +17,7 @@ from hmc.body.model import neutral_state
 from hmc.camera.model import project
 from hmc.pose.objectives.symmetric import body_distance
 from hmc.pose.views.rays import points_to_cover, silhouette_rays, with_rays
+from hmc.voxels.carving import pixel_of_voxel
 
 
 @settings(max_examples=50)
@@ -97,6 +98,44 @@ def test_rays_come_from_the_cameras_and_fall_on_silhouettes(seen):
         assert gaps.max() < 2.5 * 0.03 * per_metre
         assert len(own) < 1.6 * np.pi * 0.33**2 / 0.03**2
     assert first == len(rays)
+
+
+def rays_by_sorting(rig, masks, points, spacing_m, others):
+    """The first point of every patch, told by sorting the patches' numbers."""
+    rays, points = [], points[np.random.default_rng(0).permutation(len(points))]
+    for camera, mask in zip(rig, masks, strict=True):
+        column, row, in_image = pixel_of_voxel(camera, points)
+        here = points[in_image & mask[row, column]]
+        if not len(here):
+            continue
+        per_patch = np.median((here @ camera.rotation.T + camera.translation)[:, 2]) / spacing_m
+
+        def patches(some, camera=camera, per_patch=per_patch):
+            x, y, depth = (some @ camera.rotation.T + camera.translation).T
+            column, row = np.floor(np.stack([x, y]) / depth * per_patch).astype(np.int64)
+            return column * 1_000_003 + row
+
+        before = others[(others @ camera.rotation.T + camera.translation)[:, 2] > spacing_m]
+        numbers, first = np.unique(patches(here), return_index=True)
+        first = first[~np.isin(numbers, patches(before))]
+        directions = here[first] - camera.centre
+        rays.append(np.concatenate([here[first], directions / np.linalg.norm(directions, axis=1, keepdims=True)], axis=1))
+    return np.concatenate(rays) if rays else np.zeros((0, 6))
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    n=st.integers(1, 400),
+    spread_m=st.sampled_from([0.1, 0.5, 3.0]),
+    share=st.sampled_from([0.0, 0.02, 0.7]),
+)
+def test_rays_are_the_first_points_of_patches_that_no_other_person_covers(seed, n, spread_m, share):
+    rng = np.random.default_rng(seed)
+    points = [0, 0, 1.0] + rng.uniform(-spread_m, spread_m, (n, 3))
+    others = [0.2, 0, 1.0] + rng.uniform(-spread_m, spread_m, (int(rng.integers(0, 300)), 3))
+    masks = [rng.random(camera.size[::-1]) < share for camera in ring()]
+    assert_array_equal(silhouette_rays(ring(), masks, points, 0.05, others), rays_by_sorting(ring(), masks, points, 0.05, others))
 
 
 def test_no_ray_without_a_silhouette_nor_where_somebody_else_may_be(seen):

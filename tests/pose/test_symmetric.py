@@ -23,7 +23,7 @@ from hmc.errors import InputError
 from hmc.landmarks import landmark_index
 from hmc.pose.objectives.symmetric import Symmetric, SymmetricSettings, body_distance, outside_distance
 from hmc.pose.views.hull_target import FAR_M, HullTarget, distance_at, distance_gradient, make_target, sample_points
-from hmc.pose.views.near_distance import near_distance
+from hmc.pose.views.near_distance import near_distance, near_squares
 from hmc.voxels.grid import VoxelGrid
 
 GRID = VoxelGrid(np.array([-1.0, 2.0, 0.0]), 0.04, (50, 40, 60))
@@ -269,14 +269,19 @@ def test_the_true_pose_of_a_rendered_person_costs_least():
 
 
 @settings(max_examples=25)
-@given(seed=st.integers(0, 2**31), reach=st.integers(1, 14))
+@given(seed=st.integers(0, 2**31), reach=st.integers(1, 17))
 def test_near_distance_is_the_exact_transform_up_to_its_reach(seed, reach):
     rng = np.random.default_rng(seed)
-    occupied = rng.random(rng.integers(1, 14, 3)) < rng.choice([0.003, 0.05])
+    shape = rng.integers(1, 24, 3)
+    occupied = np.zeros(shape, bool)
+    low = rng.integers(0, shape)  # what is occupied may lie anywhere, at the border too
+    box = occupied[tuple(slice(a, a + 6) for a in low)]
+    box[...] = rng.random(box.shape) < rng.choice([0.003, 0.05, 0.9])
     expected = np.full(occupied.shape, reach + 1.0)
     if occupied.any():
         expected = np.minimum(ndimage.distance_transform_edt(~occupied), reach + 1)
     assert_allclose(near_distance(occupied, reach), expected, atol=1e-5)
+    np.testing.assert_array_equal(near_squares(occupied, reach), np.rint(expected**2))
 
 
 @pytest.mark.parametrize("cap_m", [0.0, -0.1, 0.5])

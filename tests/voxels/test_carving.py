@@ -66,15 +66,20 @@ def brute_force(grid, rig, masks, tolerance, outside, min_views):
     return ((misses <= tolerance) & (votes >= needed) & (n_masks > 0)).reshape(grid.shape)
 
 
+def blob(camera, rng, share=0.5):
+    """A mask of large blobs that cover a share of the image."""
+    noise = cv2.GaussianBlur(rng.standard_normal(camera.size[::-1]), (0, 0), 9)
+    return noise > np.quantile(noise, 1 - share)
+
+
+def speckled(mask, rng, share=0.002):
+    """The mask with a share of its pixels turned."""
+    return mask ^ (rng.random(mask.shape) < share)
+
+
 def blob_masks(rig, rng, share=0.5):
     """Masks with large blobs, holes and single pixels."""
-    masks = []
-    for camera in rig:
-        width, height = camera.size
-        noise = cv2.GaussianBlur(rng.standard_normal((height, width)), (0, 0), 9)
-        mask = noise > np.quantile(noise, 1 - share)
-        masks.append(mask ^ (rng.random(mask.shape) < 0.002))
-    return masks
+    return [speckled(blob(camera, rng, share), rng) for camera in rig]
 
 
 @pytest.mark.parametrize("outside", OUTSIDE)
@@ -113,6 +118,39 @@ def test_equals_votes_counted_over_the_room(scene, seed, share, absent, toleranc
     needed = min(3, n_masks) if min_views is None else min_views
     expected = (misses <= tolerance) & (votes >= needed) & (n_masks > 0)
     np.testing.assert_array_equal(carve(tables, masks, tolerance, outside=outside, min_views=min_views), expected)
+
+
+@pytest.fixture(scope="module")
+def fine(scene):
+    """Blocks smaller than people: many of them lie inside a silhouette or beside it. With the pixel of every voxel in each camera."""
+    _, rig, _ = scene
+    grid = VoxelGrid.from_room(ROOM, 0.025)
+    return rig, make_tables(grid, rig), [pixel_of_voxel(camera, grid.centres()) for camera in rig]
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    share=st.sampled_from([0.1, 0.3, 0.6, 0.95]),
+    speckles=st.sampled_from([0.0, 0.0005]),
+    absent=st.sets(st.integers(0, 4), max_size=3),
+    tolerances=st.lists(st.integers(0, 3), min_size=1, max_size=3),
+    outside=st.sampled_from(OUTSIDE),
+    min_views=st.sampled_from([None, 1, 3]),
+)
+def test_blocks_that_are_told_as_a_whole_equal_votes_of_their_voxels(fine, seed, share, speckles, absent, tolerances, outside, min_views):
+    rig, tables, pixels = fine
+    rng = np.random.default_rng(seed)
+    masks = [None if c in absent else speckled(blob(camera, rng, share), rng, speckles) for c, camera in enumerate(rig)]
+    misses, votes = np.zeros(tables.grid.shape, int), np.zeros(tables.grid.shape, int)
+    for mask, (column, row, seen) in zip(masks, pixels, strict=True):
+        if mask is not None:
+            misses += np.where(seen, ~mask[row, column], outside == "carve")
+            votes += seen if outside == "ignore" else 1
+    needed = min(3, len(rig) - len(absent)) if min_views is None else min_views
+    hulls = carve_levels(tables, masks, tolerances, outside=outside, min_views=min_views)
+    for hull, tolerance in zip(hulls, tolerances, strict=True):
+        np.testing.assert_array_equal(hull, (misses <= tolerance) & (votes >= needed))
 
 
 def test_pixels_of_voxels_are_those_of_their_centres(scene):

@@ -83,7 +83,7 @@ def look_up(table: np.ndarray, squares: np.ndarray) -> np.ndarray:
 
 def _box(occupied: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """First and one past the last occupied place along each axis, shape (3,); equal where nothing is occupied."""
-    columns = occupied.any(axis=0)
+    columns = np.logical_or.reduce(occupied, axis=0)
     sides = (np.flatnonzero(side) for side in (occupied.any(axis=(1, 2)), columns.any(axis=1), columns.any(axis=0)))
     ends = [(side[0], side[-1] + 1) if side.size else (0, 0) for side in sides]
     return np.array([first for first, _ in ends]), np.array([last for _, last in ends])
