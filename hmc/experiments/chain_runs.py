@@ -82,6 +82,7 @@ PARTS: dict[str, Part] = {
     "a trunk that bends": Part(preset={"body": "stiff"}),
     "recovery": Part(method={"recover": None}),
     "legs told apart": Part(method={"legs": None, "alternatives": None}),
+    "particles where they are needed only": Part(preset={"sparing": None}),
     "limb search": Part(preset={"search": None}),
     "completion by other cameras": Part(frontend={"complete": False}),
     "cutting of shadows": Part(frontend={"cut_shadows": False}),

@@ -70,7 +70,7 @@ ANNEALING: dict[str, PosePreset] = {
         annealed=replace(_PRINTED.annealed, spread="variance"),
         structural=replace(_PRINTED.structural, inner=_PRINTED.structural.inner**0.5, structural=_PRINTED.structural.structural**0.5),
     ),
-    "strong": PRESETS["default"],
+    "strong": replace(PRESETS["default"], sparing=None),
 }
 APF = "APF"
 #: Methods, and what they are on the command line.

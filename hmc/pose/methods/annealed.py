@@ -15,13 +15,15 @@ from hmc.pose.steps.hidden.step import with_hidden_limbs
 from hmc.pose.steps.polish import polished
 from hmc.pose.steps.presets import PosePreset
 from hmc.pose.steps.proposal import as_proposed
+from hmc.pose.steps.sparing import sparing
 from hmc.pose.steps.structured import structured
 
 __all__ = ["annealed_method", "annealed_pose_step"]
 
 
 def annealed_pose_step(preset: PosePreset):
-    """One frame by a preset: annealed, of one body or of models of rising detail; refined; without the limbs that nothing shows.
+    """One frame by a preset: annealed, of one body or of models of rising detail; refined; at once where a frame is as expected;
+    without the limbs that nothing shows.
 
     Parameters
     ----------
@@ -34,6 +36,8 @@ def annealed_pose_step(preset: PosePreset):
     """
     propose = structured(preset) if preset.models else annealed(preset)
     step = as_proposed(propose) if preset.refine is None else polished(propose, preset.polish)
+    if preset.sparing is not None:
+        step = sparing(step, preset.polish, preset.sparing)
     return step if preset.limbs is None else with_hidden_limbs(step, preset.limbs, preset.hull)
 
 

@@ -47,6 +47,8 @@ def method_preset(preset: PosePreset, method: str, models: Sequence[str] = ()) -
             tree = found
         else:
             structural = (found,) if isinstance(found, Inclusive) else found
+    if method in SCALABLE_METHODS:
+        preset = replace(preset, sparing=None)  # of one body: its refinement knows neither a hierarchy nor which limbs are missing
     if "shbm" in method:
         preset = replace(preset, models=structural or shipped["1"])
     if "ddm" in method:

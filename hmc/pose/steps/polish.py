@@ -16,12 +16,12 @@ from hmc.pose.objectives.objective import Objective, Sum
 from hmc.pose.objectives.symmetric import Symmetric, SymmetricSettings
 from hmc.pose.steps.limb_search import SearchSettings, lost_limbs, search_limbs
 from hmc.pose.steps.proposal import Propose, shows_enough
-from hmc.pose.steps.refine import RefineSettings, refine_all
+from hmc.pose.steps.refine import RefineInfo, RefineSettings, refine_all
 from hmc.pose.views.keypoint_pose import keypoint_pose
 from hmc.pose.views.person_view import PersonView
 from hmc.pose.views.rays import points_to_cover
 
-__all__ = ["MakeObjective", "PolishSettings", "fine_objective", "polish", "polished"]
+__all__ = ["MakeObjective", "PolishSettings", "fine_objective", "polish", "polished", "refined_starts", "searched"]
 
 
 @dataclass(frozen=True)
@@ -90,16 +90,29 @@ def polish(
         Square metres.
     evaluations : int
     """
+    estimate, info, evaluations = refined_starts(objective, starts, anchor, settings)
+    estimate, cost, more = searched(rng, objective, estimate, info, settings)
+    return estimate, cost, evaluations + more
+
+
+def refined_starts(
+    objective: Objective, starts: Sequence[np.ndarray], anchor: np.ndarray, settings: PolishSettings
+) -> tuple[np.ndarray, RefineInfo, int]:
+    """The best of several starts, refined, with what its refinement came to, and the evaluations of all; as for `polish`."""
     # Each to the end: a start that has moved a limb across costs more than one that has lost it until late in the refinement.
     trials = refine_all(objective, starts, settings.refine, anchor=anchor)
-    evaluations = sum(info.evaluations for _, info in trials)
     estimate, info = min(trials, key=lambda trial: trial[1].cost_after)
-    cost = info.cost
-    if settings.search is not None and info.misfit is not None:
-        searched = lost_limbs(rng, objective.body, estimate, info.misfit, settings.search)
-        estimate, cost, more = search_limbs(rng, objective, (estimate, cost), searched, settings.refine, settings.search)
-        evaluations += more
-    return estimate, cost, evaluations
+    return estimate, info, sum(one.evaluations for _, one in trials)
+
+
+def searched(
+    rng: np.random.Generator, objective: Objective, estimate: np.ndarray, info: RefineInfo, settings: PolishSettings
+) -> tuple[np.ndarray, float, int]:
+    """A refined pose with limbs that the hulls contradict looked for; state, cost and evaluations as for `polish`."""
+    if settings.search is None or info.misfit is None:
+        return estimate, info.cost, 0
+    limbs = lost_limbs(rng, objective.body, estimate, info.misfit, settings.search)
+    return search_limbs(rng, objective, (estimate, info.cost), limbs, settings.refine, settings.search)
 
 
 def polished(propose: Propose, settings: PolishSettings, make_objective: MakeObjective | None = None) -> PoseStep:

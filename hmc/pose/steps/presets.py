@@ -18,6 +18,7 @@ from hmc.pose.steps.hidden.limbs import LimbSettings
 from hmc.pose.steps.limb_search import SearchSettings
 from hmc.pose.steps.polish import PolishSettings
 from hmc.pose.steps.refine import RefineSettings
+from hmc.pose.steps.sparing import SparingSettings
 from hmc.search.filters import AnnealedSettings
 from hmc.search.structural import StructuralSettings
 
@@ -88,6 +89,8 @@ class PosePreset:
         Local refinement of each frame's estimate.
     search : SearchSettings or None
         Search for a limb that got lost.
+    sparing : SparingSettings or None
+        When a frame is as expected and needs no particles; None: all frames have some. Of the annealed filter of one body only.
     keypoints : KeypointSettings
         What a detector's keypoints weigh, where there are any.
     fit_body : FitBodySettings or None
@@ -124,6 +127,7 @@ class PosePreset:
     symmetric: SymmetricSettings = field(default_factory=SymmetricSettings)
     refine: RefineSettings | None = None
     search: SearchSettings | None = None
+    sparing: SparingSettings | None = None
     keypoints: KeypointSettings = field(default_factory=KeypointSettings)
     fit_body: FitBodySettings | None = None
     start: Literal["hypotheses", "spectral", "neutral"] = "neutral"
@@ -134,8 +138,10 @@ class PosePreset:
     hidden_limbs: LimbSettings = field(default_factory=LimbSettings)
 
     def __post_init__(self) -> None:
-        if self.refine is None and (self.search is not None or self.fit_body is not None or self.start != "neutral"):
-            raise InputError(f"preset '{self.name}': search, fit_body and several starts need `refine`")
+        if self.refine is None and (
+            self.search is not None or self.sparing is not None or self.fit_body is not None or self.start != "neutral"
+        ):
+            raise InputError(f"preset '{self.name}': search, sparing, fit_body and several starts need `refine`")
         if self.search is not None and self.search.far_m > self.symmetric.cap_m:
             raise InputError(f"preset '{self.name}': `search.far_m` must not exceed `symmetric.cap_m`, beyond which no distance is known")
         if self.refine is not None and self.likelihood != "symmetric":
@@ -184,6 +190,7 @@ PRESETS: dict[str, PosePreset] = {
         motion="both",
         refine=RefineSettings(),
         search=SearchSettings(),
+        sparing=SparingSettings(),
         fit_body=FitBodySettings(),
         start="hypotheses",
         structural=StructuralSettings(gamma=11.0, layers=2, inner=0.6, survival_rate=0.3, by_limb=True),
