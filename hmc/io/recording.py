@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -374,10 +375,16 @@ def find_views(
         The frame of a camera's files that is frame 0 of the recording, where it is not the first.
     """
 
-    def find(folder: Path, name: str, first: int) -> Footage | None:
-        try:
+    def find(folder: Path, wanted: Sequence[str], first: int) -> list[Footage | None]:
+        def one(name: str) -> Footage | None:
             found = find_footage(folder, name, first, count)
             return found and starting_at(found, (starts or {}).get(name, 0))
+
+        return [settled(name, found) for name, found in zip(wanted, _side_by_side(one, wanted), strict=True)]
+
+    def settled(name: str, found: Future[Footage | None]) -> Footage | None:
+        try:
+            return found.result()
         except InputError as error:
             if on_error is None:
                 raise
@@ -386,10 +393,19 @@ def find_views(
 
     images = path / "images"
     first = _first_number(images, all_names)
-    footage = [find(path / "videos", name, 0) or find(images, name, first) for name in names]
+    footage = find(path / "videos", names, 0)
+    left = [name for name, found in zip(names, footage, strict=True) if found is None]
+    others = dict(zip(left, find(images, left, first), strict=True))
+    footage = [found or others[name] for name, found in zip(names, footage, strict=True)]
     if not any(footage):
         first = _first_number(path / "silhouettes", all_names)
-    return footage, [find(path / "silhouettes", name, first) for name in names]
+    return footage, find(path / "silhouettes", names, first)
+
+
+def _side_by_side(find: Callable[[str], Footage | None], names: Sequence[str]) -> list[Future[Footage | None]]:
+    """What is found of each camera, in threads: decoders, which do most of the work, let each other run."""
+    with ThreadPoolExecutor() as pool:
+        return [pool.submit(find, name) for name in names]
 
 
 def _first_number(folder: Path, names: Sequence[str]) -> int:
@@ -400,10 +416,11 @@ def _first_number(folder: Path, names: Sequence[str]) -> int:
 def _find_background(path: Path, rig: Rig, problems: list[str]) -> list[Footage | None]:
     """The empty scene of each camera; what cannot be used is left out and added to the problems."""
     background: list[Footage | None] = []
-    for camera in rig:
+    coming = _side_by_side(lambda name: find_footage(path / "background", name, count=False), rig.names)
+    for camera, outcome in zip(rig, coming, strict=True):
         found = None
         try:
-            found = find_footage(path / "background", camera.name, count=False)
+            found = outcome.result()
         except InputError as error:
             problems.append(f"{error}; going on without this background")
         if found is not None and found.size != camera.size:
