@@ -284,7 +284,9 @@ def only_cameras(recording: Recording, cameras: Sequence[int]) -> Recording:
 
 def whole_recording(recording: Recording) -> Recording:
     """All frames of the same cameras, as large as they are read in this selection."""
-    return reduced(open_recording(recording.path, recording.rig.names), recording.factors)
+    views = [image or mask for image, mask in zip(recording._footage, recording._silhouettes, strict=True)]
+    total = common_length([view.n_frames for view in views if view is not None])
+    return replace(recording, start=0, n_frames=min(total, read_settings(recording.path).get("frames") or total))
 
 
 def reduced(recording: Recording, factors: Sequence[int]) -> Recording:

@@ -449,6 +449,20 @@ def test_smaller_images_of_a_selection(recording_folder, ring):
     assert reduced(small, (2, 2, 1)).factors == (4, 2, 4)
 
 
+def test_the_whole_recording_is_that_which_is_opened_without_a_selection(recording_folder):
+    write_video(recording_folder / "videos" / "cam_02.avi", 5, (160, 120))
+    for text, names in (
+        ("", None),
+        ("frames = 9\n", None),
+        ("frames = 9\n", ["cam_02", "cam_01"]),
+        ("first_frame = { cam_01 = 4 }\n", None),
+    ):
+        (recording_folder / "recording.toml").write_text(text)
+        whole = whole_recording(open_recording(recording_folder, cameras=names, start=2, frames=1))
+        opened = open_recording(recording_folder, cameras=names)
+        assert (whole.start, whole.n_frames, whole.rig.names) == (0, opened.n_frames, opened.rig.names)
+
+
 def test_small_images_stay_as_they_are_for_any_voxels(recording_folder):
     recording = open_recording(recording_folder)
     assert for_voxels(recording, 0.5) is recording
