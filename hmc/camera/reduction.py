@@ -15,9 +15,10 @@ from hmc.camera.model import Camera, Rig
 
 __all__ = ["reduce_image", "reduce_mask", "reduce_pixels", "reduced_camera", "reduction_factors"]
 
-#: The side of a voxel in the middle of the room covers so many pixels at least of a smaller image.
+#: The side of a voxel in the middle of the room covers so many pixels at least of a smaller image; one and a half at the far wall then.
 LEAST_VOXEL_PX = 3.0
-#: The longer side of a smaller image, pixels: for images of this size silhouettes were made.
+#: The longer side of a smaller image, pixels. For images of this size silhouettes were made, and smaller ones save little more
+#: (benchmarks/README.md).
 LEAST_SIDE_PX = 640
 
 
