@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Literal
 
 from hmc.errors import InputError
 from hmc.io.masks import MaskStep
-from hmc.io.recording import Recording, open_recording
+from hmc.io.recording import Recording, for_voxels, open_recording
 from hmc.io.results import TrackTable, read_centroids, read_joints
 from hmc.voxels.hulls import HullStep, stream_hulls, stream_masks
 
@@ -107,6 +107,7 @@ def track(
     seed: int = 0,
     voxel_size_m: float = TRACK_VOXEL_M,
     keypoints: KeypointSource | None = None,
+    full_images: bool = False,
 ) -> TrackTable:
     """The track of every person: where each is in every frame.
 
@@ -122,6 +123,8 @@ def track(
     keypoints : KeypointSource, optional
         What a detector of 2-D keypoints saw (`hmc.io.keypoints.open_keypoints`): people are found by these alone then, without silhouettes,
         voxels and a tracker.
+    full_images : bool
+        Use images as large as they are; else no larger than the voxels show (`hmc.camera.reduction`).
 
     Returns
     -------
@@ -140,13 +143,15 @@ def track(
     >>> sorted(set(tracks.persons.tolist())), tracks.positions.shape
     ([0], (8, 3))
     """
+    recording = _opened(recording)
     if keypoints is None:
-        return _tracked(_opened(recording), tracker or "sparse", seed, voxel_size_m)
+        recording = recording if full_images else for_voxels(recording, voxel_size_m)
+        return _tracked(recording, tracker or "sparse", seed, voxel_size_m)
     if tracker is not None:
         raise InputError("track: keypoints have no use for a tracker; leave one of both out")
     from hmc.pose.keypoint_tracks import tracks_of_keypoints
 
-    return tracks_of_keypoints(_opened(recording), keypoints)
+    return tracks_of_keypoints(recording, keypoints.reduced(recording.factors))
 
 
 def views(
@@ -193,6 +198,7 @@ def pose(
     detections: DetectionTable | None = None,
     on_frame: Callable[[int, int], None] | None = None,
     keypoints: KeypointSource | None = None,
+    full_images: bool = False,
 ) -> PosedPeople:
     """The pose of every person in every frame.
 
@@ -217,6 +223,8 @@ def pose(
     keypoints : KeypointSource, optional
         What a detector of 2-D keypoints saw (`hmc.io.keypoints.open_keypoints`), to be used beside the silhouettes; with the method
         "keypoints" without any, and people are tracked by them too.
+    full_images : bool
+        As for `track`.
 
     Returns
     -------
@@ -238,7 +246,7 @@ def pose(
     """
     from hmc.pose.backward import backward
     from hmc.pose.clear_views import with_clear_views
-    from hmc.pose.follow import FollowOptions, follow
+    from hmc.pose.follow import FollowOptions, follow, for_method
     from hmc.pose.keypoint_cues import learn_scatter
     from hmc.pose.keypoint_tracks import tracks_of_keypoints
     from hmc.pose.keypoint_views import with_keypoint_views
@@ -248,6 +256,8 @@ def pose(
 
     recording, method = _opened(recording), pose_method(method) if isinstance(method, str) else method
     height = None if height_m == "auto" else recording.known_height_m if height_m is None else height_m
+    recording = recording if full_images else for_method(recording, method, POSE_VOXEL_M)
+    keypoints = None if keypoints is None else keypoints.reduced(recording.factors)
 
     def counted(steps: Iterable[HullStep], total: int) -> Iterator[HullStep]:
         for n, step in enumerate(steps, start=1):

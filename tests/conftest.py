@@ -70,6 +70,12 @@ def recording_folder(tmp_path, ring) -> Path:
     return folder
 
 
+@pytest.fixture
+def halved_images(monkeypatch) -> None:
+    """Images of any size are read at half of it, as those that are twice as large as voxels show are."""
+    monkeypatch.setattr("hmc.io.recording.reduction_factors", lambda rig, room, voxel_size_m: tuple(1 + (max(c.size) > 100) for c in rig))
+
+
 @pytest.fixture(autouse=True)
 def _no_figure_is_left():
     """What a test drew is closed after it: matplotlib warns of many, and the next test would be blamed."""

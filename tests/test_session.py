@@ -16,7 +16,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import hmc
 from hmc.body.kinematics import landmarks
-from hmc.io.recording import background_frames, iterate_frames
+from hmc.io.recording import background_frames, iterate_frames, reduced
 from hmc.session import front
 from hmc.session.newest import live
 from hmc.session.step import session_step
@@ -131,6 +131,24 @@ def test_images_are_not_kept():
         for buffer in buffers:
             buffer[...] = 0
     assert_array_equal(found.people[0].latest, watched()[1][-1].people[0].latest)
+
+
+def test_large_images_are_made_smaller(halved_images):
+    """As if cameras with half as many pixels had filmed."""
+    clip = tiny_clip(FRAMES)
+    with_full = front.session_settings(clip.rig, clip.fps, clip.room, None, persons=1, full_images=True)
+    large = front.session_settings(clip.rig, clip.fps, clip.room, None, persons=1)
+    assert with_full.scene.rig is clip.rig and with_full.scene.factors == (1,) * 7
+    assert large.rig is clip.rig and large.scene.factors == (2,) * 7 and {camera.size for camera in large.scene.rig} == {(160, 120)}
+    halved = reduced(clip, (2,) * 7)
+    small = front.session_settings(halved.rig, clip.fps, clip.room, None, persons=1, full_images=True)
+    ends = []
+    for chosen, recording in ((large, clip), (small, halved)):
+        state = front.begin_session(chosen, [background_frames(recording, camera) for camera in range(7)])
+        for frame in iterate_frames(recording):
+            state, found = session_step(chosen, state, frame.images)
+        ends.append(found.people[0].position)
+    assert_array_equal(*ends)
 
 
 def test_a_camera_that_drops_out_and_a_moment_without_any():

@@ -9,11 +9,13 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 __all__ = [
+    "add_image_option",
     "add_plugin_option",
     "add_selection_options",
     "add_workers_option",
     "camera_names",
     "gather_problems",
+    "image_parameters",
     "load_given_plugins",
     "open_given_keypoints",
     "open_selected",
@@ -68,6 +70,20 @@ def selected_workers(args: argparse.Namespace) -> int:
     from hmc.processes import available_processors
 
     return args.workers or available_processors()
+
+
+def add_image_option(parser: argparse.ArgumentParser) -> None:
+    """Add ``--full-images``."""
+    parser.add_argument(
+        "--full-images",
+        action="store_true",
+        help="use images as large as they are (default: large ones are made smaller, by whole factors, where voxels show no more of them)",
+    )
+
+
+def image_parameters(recording) -> dict[str, Any]:
+    """What the parameters of a result say of smaller images: nothing where all are as large as they were recorded."""
+    return {"image_factors": list(recording.factors)} if max(recording.factors) > 1 else {}
 
 
 def add_plugin_option(parser: argparse.ArgumentParser) -> None:

@@ -7,10 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from hmc.cli.common import (
+    add_image_option,
     add_plugin_option,
     add_selection_options,
     add_workers_option,
     gather_problems,
+    image_parameters,
     load_given_plugins,
     open_given_keypoints,
     open_selected,
@@ -78,6 +80,7 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
         "--preset", default="default", metavar="NAME", help=f"{', '.join(sorted(named))}: as printed, where a work is named"
     )
     parser.add_argument("--voxel", type=positive_float, default=0.03, metavar="M", help="side of a voxel, metres (default: 0.03)")
+    add_image_option(parser)
     add_tracker_options(parser)
     parser.add_argument(
         "--tracks", type=Path, metavar="FILE", help="tracks.csv of these people, as `hmc track` writes it; made here where left out"
@@ -124,7 +127,7 @@ def run(args: argparse.Namespace) -> int:
     from hmc.io.results import write_joints, write_pose, write_run, write_tracks
     from hmc.pose.backward import backward
     from hmc.pose.clear_views import with_clear_views
-    from hmc.pose.follow import FollowOptions, follow
+    from hmc.pose.follow import FollowOptions, follow, for_method
     from hmc.pose.keypoint_cues import learn_scatter
     from hmc.pose.keypoint_tracks import tracks_of_keypoints
     from hmc.pose.keypoint_views import with_keypoint_views
@@ -136,6 +139,8 @@ def run(args: argparse.Namespace) -> int:
     name = args.method or ("keypoints" if args.cues == CUES[2] else "apf")
     method = pose_method(name, args.preset, args.model, args.init, args.markers == "skin", args.passes)
     recording = open_selected(args)
+    if not args.full_images:
+        recording = for_method(recording, method, min(args.voxel, args.track_voxel))
     if args.out.is_file():
         raise InputError(f"--out {args.out}: is a file; give a folder")
     height, hulls, frontend = _height(args.height, recording), method.needs_hulls, selected_frontend(args)
@@ -154,7 +159,9 @@ def run(args: argparse.Namespace) -> int:
         "legs": method.legs,
         "back": method.back,
         "smooth_s": args.smooth or 0.0,
-    } | plugins
+        **image_parameters(recording),
+        **plugins,
+    }
     if source_of_keypoints is not None:
         parameters["cues"] = CUES[1 if hulls else 2]
     given = None if args.tracks is None else _given_tracks(args, method, recording)

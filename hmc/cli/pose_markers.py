@@ -144,9 +144,9 @@ def _detect(args: argparse.Namespace, recording, labels: Path, settings, journal
     from hmc.errors import InputError
     from hmc.io.detections import DetectionTable, read_detections
     from hmc.io.journal import append_journal, open_journal
-    from hmc.io.recording import background_frames, iterate_frames, open_recording
+    from hmc.io.recording import background_frames, iterate_frames, whole_recording
 
-    whole = open_recording(args.recording, cameras=args.cameras)
+    whole = whole_recording(recording)
     points = read_detections(labels, whole.rig.names)
     samples = []
     for frame in np.unique(points.frames).tolist():

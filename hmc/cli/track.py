@@ -9,10 +9,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hmc.cli.common import (
+    add_image_option,
     add_plugin_option,
     add_selection_options,
     add_workers_option,
     gather_problems,
+    image_parameters,
     load_given_plugins,
     open_given_keypoints,
     open_selected,
@@ -42,6 +44,7 @@ CUES = ("silhouettes", "keypoints")
 #: Options of which keypoints alone make no use, with what they are where nothing is said.
 OF_SILHOUETTES = {
     "tracker": None, "color": None, "particles": None, "track_preset": "default", "complete": True, "cut_shadows": True, "voxel": None,
+    "full_images": False,
 }  # fmt: skip
 
 
@@ -60,6 +63,7 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     add_tracker_options(parser)
     add_plugin_option(parser)
     parser.add_argument("--voxel", type=positive_float, metavar="M", help=f"side of a voxel, metres (default: {VOXEL_M})")
+    add_image_option(parser)
     parser.add_argument("--seed", type=whole_number, default=0, metavar="N", help="seed of the random numbers (default: 0)")
     parser.add_argument(
         "--cues",
@@ -191,10 +195,12 @@ class _Work:
 
 
 def _by_silhouettes(args: argparse.Namespace, recording: Recording) -> _Work:
+    from hmc.io.recording import for_voxels
     from hmc.tracking.resumable import track_recording
 
     voxel, tracker = args.voxel or VOXEL_M, selected_tracker(args)
-    parameters = {"voxel_size_m": voxel, "tracker": tracker.settings, "frontend": selected_frontend(args)}
+    recording = recording if args.full_images else for_voxels(recording, voxel)
+    parameters = {"voxel_size_m": voxel, "tracker": tracker.settings, "frontend": selected_frontend(args)} | image_parameters(recording)
     return _Work(tracker.name, parameters, lambda run, timed: track_recording(recording, voxel, tracker, args.seed, run, timed))
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -17,12 +18,24 @@ import numpy as np
 
 from hmc.camera.coverage import estimate_room
 from hmc.camera.model import Rig
+from hmc.camera.reduction import reduce_image, reduce_mask, reduced_camera, reduction_factors
 from hmc.errors import InputError
 from hmc.io.calibration import build_camera, read_entries
 from hmc.io.footage import Footage, find_footage, number_images, read_footage, starting_at
 from hmc.io.settings import read_settings
 
-__all__ = ["Frame", "Recording", "background_frames", "iterate_frames", "only_cameras", "open_recording", "spread_frames"]
+__all__ = [
+    "Frame",
+    "Recording",
+    "background_frames",
+    "for_voxels",
+    "iterate_frames",
+    "only_cameras",
+    "open_recording",
+    "reduced",
+    "spread_frames",
+    "whole_recording",
+]
 
 logger = logging.getLogger("hmc")
 
@@ -72,6 +85,9 @@ class Recording:
     room_is_estimated : bool
     problems : tuple of str
         What was odd but could be lived with, one line each.
+    factors : tuple of int
+        How many times smaller than in their files the images and silhouettes of each camera are read (`reduced`); `rig` is that of the
+        smaller ones. Empty where there is nothing to read.
     """
 
     path: Path
@@ -85,6 +101,7 @@ class Recording:
     subject_height_m: tuple[float, ...]
     room_is_estimated: bool = False
     problems: tuple[str, ...] = ()
+    factors: tuple[int, ...] = ()
     _footage: tuple[Footage | None, ...] = field(default=(), repr=False)
     _silhouettes: tuple[Footage | None, ...] = field(default=(), repr=False)
     _background: tuple[Footage | None, ...] = field(default=(), repr=False)
@@ -205,6 +222,7 @@ def open_recording(path: str | Path, cameras: Sequence[str] | None = None, start
         subject_height_m=settings.get("subject_height_m", ()),
         room_is_estimated=room is None,
         problems=tuple(problems),
+        factors=(1,) * len(rig),
         _footage=tuple(footage),
         _silhouettes=tuple(silhouettes),
         _background=tuple(background),
@@ -237,15 +255,17 @@ def iterate_frames(
     for views, what in ((recording._footage, ""), (recording._silhouettes, " silhouettes")):
         for camera, view in zip(recording.rig, views, strict=True):
             readers.append(iter([None] * 0) if view is None else read_footage(view, first, last, report, f"{camera.name}{what}"))
-    n = len(recording.rig)
+    n, factors = len(recording.rig), recording.factors
     masks_of = recording._silhouettes
     try:
         for index in range(first, last):
-            images = [next(reader, None) for reader in readers]
+            found = [next(reader, None) for reader in readers]
+            images = tuple(None if image is None else reduce_image(image, factor) for image, factor in zip(found[:n], factors, strict=True))
             masks = tuple(
-                None if image is None or view is None else to_mask(image, view) for image, view in zip(images[n:], masks_of, strict=True)
+                None if image is None or view is None else reduce_mask(to_mask(image, view), factor)
+                for image, view, factor in zip(found[n:], masks_of, factors, strict=True)
             )
-            yield Frame(index, tuple(images[:n]), masks if recording.has_silhouettes else None)
+            yield Frame(index, images, masks if recording.has_silhouettes else None)
     finally:
         for reader in readers:
             if hasattr(reader, "close"):
@@ -258,7 +278,48 @@ def only_cameras(recording: Recording, cameras: Sequence[int]) -> Recording:
         tuple(views[c] for c in cameras) for views in (recording._footage, recording._silhouettes, recording._background)
     )
     rig = Rig(tuple(recording.rig[c] for c in cameras))
-    return replace(recording, rig=rig, _footage=footage, _silhouettes=silhouettes, _background=background)
+    factors = tuple(recording.factors[c] for c in cameras)
+    return replace(recording, rig=rig, factors=factors, _footage=footage, _silhouettes=silhouettes, _background=background)
+
+
+def whole_recording(recording: Recording) -> Recording:
+    """All frames of the same cameras, as large as they are read in this selection."""
+    views = [image or mask for image, mask in zip(recording._footage, recording._silhouettes, strict=True)]
+    total = common_length([view.n_frames for view in views if view is not None])
+    return replace(recording, start=0, n_frames=min(total, read_settings(recording.path).get("frames") or total))
+
+
+def reduced(recording: Recording, factors: Sequence[int]) -> Recording:
+    """The same selection with smaller images, silhouettes and cameras; what is in metres stays.
+
+    Parameters
+    ----------
+    recording : Recording
+    factors : sequence of int, one a camera
+        How many times smaller (`hmc.camera.reduction`).
+    """
+    rig = Rig(tuple(reduced_camera(camera, factor) for camera, factor in zip(recording.rig, factors, strict=True)))
+    return replace(recording, rig=rig, factors=tuple(one * more for one, more in zip(recording.factors, factors, strict=True)))
+
+
+def for_voxels(recording: Recording, voxel_size_m: float) -> Recording:
+    """The recording with images no larger than voxels of this size show (`hmc.camera.reduction.reduction_factors`).
+
+    Parameters
+    ----------
+    recording : Recording
+    voxel_size_m : float
+        Side of the smallest voxels that are to be used, metres.
+
+    Examples
+    --------
+    >>> import hmc
+    >>> recording = hmc.open_recording("data/synthetic/tiny")
+    >>> for_voxels(recording, 0.03) is recording  # its images are small
+    True
+    """
+    factors = reduction_factors(recording.rig, recording.room, voxel_size_m)
+    return recording if max(factors) == 1 else reduced(recording, factors)
 
 
 def to_mask(image: np.ndarray, view: Footage) -> np.ndarray:
@@ -287,7 +348,7 @@ def background_frames(recording: Recording, camera_index: int, limit: int | None
         return
     n = view.n_frames if limit is None else min(limit, view.n_frames)
     with closing(read_footage(view, 0, n, logger.warning, f"{recording.rig[camera_index].name} background")) as reader:  # type: ignore[type-var]
-        yield from (image for image in reader if image is not None)
+        yield from (reduce_image(image, recording.factors[camera_index]) for image in reader if image is not None)
 
 
 def find_views(
@@ -316,10 +377,16 @@ def find_views(
         The frame of a camera's files that is frame 0 of the recording, where it is not the first.
     """
 
-    def find(folder: Path, name: str, first: int) -> Footage | None:
-        try:
+    def find(folder: Path, wanted: Sequence[str], first: int) -> list[Footage | None]:
+        def one(name: str) -> Footage | None:
             found = find_footage(folder, name, first, count)
             return found and starting_at(found, (starts or {}).get(name, 0))
+
+        return [settled(name, found) for name, found in zip(wanted, _side_by_side(one, wanted), strict=True)]
+
+    def settled(name: str, found: Future[Footage | None]) -> Footage | None:
+        try:
+            return found.result()
         except InputError as error:
             if on_error is None:
                 raise
@@ -328,10 +395,19 @@ def find_views(
 
     images = path / "images"
     first = _first_number(images, all_names)
-    footage = [find(path / "videos", name, 0) or find(images, name, first) for name in names]
+    footage = find(path / "videos", names, 0)
+    left = [name for name, found in zip(names, footage, strict=True) if found is None]
+    others = dict(zip(left, find(images, left, first), strict=True))
+    footage = [found or others[name] for name, found in zip(names, footage, strict=True)]
     if not any(footage):
         first = _first_number(path / "silhouettes", all_names)
-    return footage, [find(path / "silhouettes", name, first) for name in names]
+    return footage, find(path / "silhouettes", names, first)
+
+
+def _side_by_side(find: Callable[[str], Footage | None], names: Sequence[str]) -> list[Future[Footage | None]]:
+    """What is found of each camera, in threads: decoders, which do most of the work, let each other run."""
+    with ThreadPoolExecutor() as pool:
+        return [pool.submit(find, name) for name in names]
 
 
 def _first_number(folder: Path, names: Sequence[str]) -> int:
@@ -342,10 +418,11 @@ def _first_number(folder: Path, names: Sequence[str]) -> int:
 def _find_background(path: Path, rig: Rig, problems: list[str]) -> list[Footage | None]:
     """The empty scene of each camera; what cannot be used is left out and added to the problems."""
     background: list[Footage | None] = []
-    for camera in rig:
+    coming = _side_by_side(lambda name: find_footage(path / "background", name, count=False), rig.names)
+    for camera, outcome in zip(rig, coming, strict=True):
         found = None
         try:
-            found = find_footage(path / "background", camera.name, count=False)
+            found = outcome.result()
         except InputError as error:
             problems.append(f"{error}; going on without this background")
         if found is not None and found.size != camera.size:

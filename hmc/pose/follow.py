@@ -19,7 +19,7 @@ from hmc.body.model import BodyModel
 from hmc.errors import InputError
 from hmc.io.detections import DetectionTable
 from hmc.io.masks import MaskStep, keep_masks, kept_frames
-from hmc.io.recording import Recording
+from hmc.io.recording import Recording, for_voxels
 from hmc.io.results import PoseStates, PoseTable, TrackTable, write_joints, write_pose
 from hmc.landmarks import LANDMARKS
 from hmc.pose.keypoint_cues import KeypointCues, with_keypoints
@@ -36,7 +36,7 @@ from hmc.voxels.grid import VoxelGrid
 from hmc.voxels.hulls import HullStep, stream_hulls
 from hmc.voxels.run_options import RunOptions
 
-__all__ = ["FollowOptions", "PosedPeople", "follow", "known_landmarks", "only_person", "persons_of", "unfitted_notes"]
+__all__ = ["FollowOptions", "PosedPeople", "follow", "for_method", "known_landmarks", "only_person", "persons_of", "unfitted_notes"]
 
 
 @dataclass(frozen=True)
@@ -240,6 +240,19 @@ def _with_markers(views: dict[int, PersonView], recording: Recording, method: Po
         person: replace(view, markers=seen_in_frame(rig, marker_views(rig), detections.in_frame(view.frame, rig.names), method.gate_px))
         for person, view in views.items()
     }
+
+
+def for_method(recording: Recording, method: PoseMethod, voxel_size_m: float) -> Recording:
+    """The recording with images no larger than the method's voxels show; as it is for a method without, or with gates in pixels.
+
+    Parameters
+    ----------
+    recording : Recording
+    method : PoseMethod
+    voxel_size_m : float
+        Side of the smallest voxels, metres.
+    """
+    return for_voxels(recording, voxel_size_m) if method.needs_hulls and "detections" not in method.needs else recording
 
 
 def only_person(recording: Recording) -> TrackTable:

@@ -13,7 +13,7 @@ from hmc.camera.coverage import estimate_room
 from hmc.camera.model import Rig
 from hmc.camera.segmentation import train_background
 from hmc.errors import InputError
-from hmc.io.recording import Recording
+from hmc.io.recording import Recording, for_voxels
 from hmc.pose.method import Capture, PoseMethod
 from hmc.pose.person import DecidedFrames, PoseTask
 from hmc.pose.registry import pose_method
@@ -56,6 +56,8 @@ class Session:
         The same seed gives the same result.
     voxel_size_m : float
         Of the hulls that poses are fitted to, metres; 0.05 is quicker and less exact.
+    full_images : bool
+        Use images as large as they come; else no larger than the voxels show (`hmc.camera.reduction`).
 
     Raises
     ------
@@ -84,8 +86,9 @@ class Session:
         persons: int | None = None,
         seed: int = 0,
         voxel_size_m: float = POSE_VOXEL_M,
+        full_images: bool = False,
     ) -> None:
-        self.settings = session_settings(rig, fps, room, method, height_m, persons, seed, voxel_size_m)
+        self.settings = session_settings(rig, fps, room, method, height_m, persons, seed, voxel_size_m, full_images)
         self.state = begin_session(self.settings, background)
 
     @property
@@ -123,6 +126,7 @@ def session_settings(
     persons: int | None = None,
     seed: int = 0,
     voxel_size_m: float = POSE_VOXEL_M,
+    full_images: bool = False,
 ) -> SessionSettings:
     """The settings of a session, with all tables that are made once; parameters as of `Session`.
 
@@ -140,17 +144,19 @@ def session_settings(
     if corners.shape != (2, 3) or not np.isfinite(corners).all() or not (corners[0] < corners[1]).all():
         raise InputError(f"`room` must be the lower and the upper corner, shape (2, 3), metres; got {np.asarray(room).tolist()}")
     init(fps)  # says what is wrong with `fps`
-    scene = Recording(Path(), "session", float(fps), rig, corners, 0, 0, persons, (), room is None)
+    scene = Recording(Path(), "session", float(fps), rig, corners, 0, 0, persons, (), room is None, factors=(1,) * len(rig))
+    if not full_images:
+        scene = for_voxels(scene, TRACK_VOXEL_M if method is None else min(voxel_size_m, TRACK_VOXEL_M))
     task = None
     if method is not None:
         chosen = pose_method(method, passes=1) if isinstance(method, str) else method
         if not chosen.needs_hulls or chosen.needs & {"detections", "keypoints"}:
             raise InputError(f"method {chosen.name} needs more than images; choose another for a session")
-        capture = Capture(scene.fps, voxel_size_m, corners, rig)
+        capture = Capture(scene.fps, voxel_size_m, corners, scene.rig)
         task = PoseTask(replace(chosen, back=None), capture, seed, height)
-    coarse = make_tables(person_grid(scene, TRACK_VOXEL_M), rig)
-    fine = coarse if task is None or voxel_size_m == TRACK_VOXEL_M else make_tables(person_grid(scene, voxel_size_m), rig)
-    return SessionSettings(scene, make_tracker(), task, coarse, fine, make_completion_tables(corners, rig), seed)
+    coarse = make_tables(person_grid(scene, TRACK_VOXEL_M), scene.rig)
+    fine = coarse if task is None or voxel_size_m == TRACK_VOXEL_M else make_tables(person_grid(scene, voxel_size_m), scene.rig)
+    return SessionSettings(rig, scene, make_tracker(), task, coarse, fine, make_completion_tables(corners, scene.rig), seed)
 
 
 def begin_session(settings: SessionSettings, background: Background) -> SessionState:
@@ -167,7 +173,7 @@ def begin_session(settings: SessionSettings, background: Background) -> SessionS
     InputError
         When a camera has none, or what it has is no image of its size.
     """
-    rig = settings.scene.rig
+    rig = settings.rig
     if isinstance(background, Mapping):
         missing = [name for name in rig.names if name not in background]
         if missing:
@@ -176,7 +182,7 @@ def begin_session(settings: SessionSettings, background: Background) -> SessionS
     if len(background) != len(rig):
         raise InputError(f"the background is of {len(background)} cameras, the rig has {len(rig)}: {', '.join(rig.names)}")
     models = []
-    for camera, images in zip(rig, background, strict=True):
-        seen = background_images(camera, images, settings.frontend.background_frames)
+    for camera, images, factor in zip(rig, background, settings.scene.factors, strict=True):
+        seen = background_images(camera, images, settings.frontend.background_frames, factor)
         models.append(train_background(seen, settings.frontend.segmentation))
     return SessionState(tuple(models), init(settings.scene.fps, settings.scene.persons))

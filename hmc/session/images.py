@@ -8,6 +8,7 @@ from itertools import islice
 import numpy as np
 
 from hmc.camera.model import Camera, Rig
+from hmc.camera.reduction import reduce_image
 from hmc.errors import InputError
 
 __all__ = ["Images", "background_images", "frame_images"]
@@ -16,12 +17,20 @@ __all__ = ["Images", "background_images", "frame_images"]
 Images = Sequence[np.ndarray | None]
 
 
-def frame_images(rig: Rig, images: Images) -> tuple[np.ndarray | None, ...]:
-    """The images of a frame, copied: cameras write the next frame where the last one was, and views are kept for a while."""
+def frame_images(rig: Rig, images: Images, factors: Sequence[int]) -> tuple[np.ndarray | None, ...]:
+    """The images of a frame, so many times smaller and copied: cameras write the next frame where the last one was, and views are kept for
+    a while."""
     if not isinstance(images, Sequence | np.ndarray) or len(images) != len(rig):
         given = len(images) if isinstance(images, Sequence | np.ndarray) else type(images).__name__
         raise InputError(f"a frame has one image a camera, {len(rig)} of them, None where there is none; got {given}")
-    return tuple(None if image is None else _image(camera, image).copy() for camera, image in zip(rig, images, strict=True))
+    return tuple(
+        None if image is None else _smaller(_image(camera, image), factor)
+        for camera, image, factor in zip(rig, images, factors, strict=True)
+    )
+
+
+def _smaller(image: np.ndarray, factor: int) -> np.ndarray:
+    return image.copy() if factor == 1 else reduce_image(image, factor)
 
 
 def _image(camera: Camera, image: np.ndarray, what: str = "image") -> np.ndarray:
@@ -37,11 +46,11 @@ def _image(camera: Camera, image: np.ndarray, what: str = "image") -> np.ndarray
     return image
 
 
-def background_images(camera: Camera, images: Iterable[np.ndarray], most: int) -> Iterator[np.ndarray]:
-    """Images of a camera's empty scene, one at least."""
+def background_images(camera: Camera, images: Iterable[np.ndarray], most: int, factor: int) -> Iterator[np.ndarray]:
+    """Images of a camera's empty scene, one at least, so many times smaller."""
     empty = True
     for image in islice(images, most):
         empty = False
-        yield _image(camera, image, "image of the background")
+        yield reduce_image(_image(camera, image, "image of the background"), factor)
     if empty:
         raise InputError(f"no background for camera '{camera.name}'; give images of the empty scene")

@@ -18,6 +18,7 @@ import numpy as np
 
 from hmc.body.kinematics import landmarks
 from hmc.body.model import BodyModel
+from hmc.camera.model import Rig
 from hmc.camera.segmentation import BackgroundModel
 from hmc.io.masks import MaskStep
 from hmc.io.recording import Frame, Recording
@@ -50,8 +51,10 @@ class SessionSettings:
 
     Attributes
     ----------
+    rig : Rig
+        The cameras, as their images come.
     scene : Recording
-        Rig, room and frames a second; it has no footage and no place on a disk.
+        Room, frames a second, and the rig of images as they are used, which may be smaller; it has no footage and no place on a disk.
     tracker : Tracker
     task : PoseTask or None
         None: people are tracked, not posed.
@@ -62,6 +65,7 @@ class SessionSettings:
     frontend : FrontendSettings
     """
 
+    rig: Rig
     scene: Recording
     tracker: Tracker
     task: PoseTask | None
@@ -188,7 +192,7 @@ def session_step(settings: SessionSettings, state: SessionState, images: Images)
         When there are not as many images as cameras, or one is no image of its camera's size; the state is good still.
     """
     scene, index = settings.scene, state.index
-    frame = Frame(index, frame_images(scene.rig, images), None)
+    frame = Frame(index, frame_images(settings.rig, images, scene.factors), None)
     with ThreadPoolExecutor(settings.frontend.threads or None) as pool:
         look, models = look_once(dict(enumerate(state.models)), frame, settings.frontend.segmentation, pool)
     step = MaskStep(index, look.images, *settle(settings.completion, look, settings.frontend))

@@ -21,7 +21,7 @@ from hmc.camera.people_cut import PeopleColors, View, cut_people, disc
 from hmc.camera.segmentation import BackgroundModel, SegmentationSettings, train_background
 from hmc.camera.standing import Standing
 from hmc.errors import InputError
-from hmc.io.recording import Recording, iterate_frames, open_recording
+from hmc.io.recording import Recording, iterate_frames, whole_recording
 from hmc.voxels.agreement import agreed_views
 from hmc.voxels.carving import CarvingTables, make_tables
 from hmc.voxels.grid import VoxelGrid
@@ -172,7 +172,7 @@ def _resize(mask: np.ndarray, size: tuple[int, int]) -> np.ndarray:
 
 def _samples(recording: Recording, cameras: Sequence[int], n_samples: int, span: int) -> list[list[np.ndarray | None]]:
     """Some frames' images of some cameras, spread over the recording around the selection."""
-    whole = open_recording(recording.path, recording.rig.names)
+    whole = whole_recording(recording)
     frame_bytes = sum(3 * width * height for width, height in (recording.rig[c].size for c in cameras))
     n_samples = int(np.clip(SAMPLE_BYTES // frame_bytes, FEWEST_SAMPLES, n_samples))
     first = max(0, recording.start + recording.n_frames // 2 - span // 2)

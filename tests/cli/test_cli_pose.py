@@ -64,6 +64,17 @@ def test_a_run_leaves_its_four_files_and_nothing_else(finished):
     assert np.median(error) < 0.12
 
 
+def test_large_images_are_made_smaller_unless_they_are_asked_for(finished, tmp_path, halved_images):
+    smaller, larger = tmp_path / "smaller", tmp_path / "larger"
+    assert pose(smaller, "--frames", "5", "--voxel", "0.05") == 0
+    assert pose(larger, "--frames", "5", "--voxel", "0.05", "--full-images") == 0
+    assert read_run(smaller / "run.toml")["parameters"]["image_factors"] == [2] * 7
+    assert (larger / "joints.csv").read_bytes() == (finished / "joints.csv").read_bytes()
+    assert "image_factors" not in read_run(larger / "run.toml")["parameters"]
+    apart = np.linalg.norm(read_joints(smaller / "joints.csv").positions - read_joints(larger / "joints.csv").positions, axis=-1)
+    assert 0 < np.median(apart) < 0.04
+
+
 @pytest.mark.parametrize("workers", ["1", "3"])
 def test_poses_are_the_same_bytes_whatever_the_number_of_processes(finished, tmp_path, workers):
     assert pose(tmp_path / "out", "--frames", "5", "--voxel", "0.05", "--workers", workers) == 0

@@ -49,6 +49,25 @@ def test_tracks_are_the_same_bytes_whatever_the_number_of_processes(folder, tmp_
         assert (tmp_path / workers / "tracks.csv").read_bytes() == (tmp_path / "1" / "tracks.csv").read_bytes()
 
 
+def test_large_images_are_made_smaller_unless_they_are_asked_for(folder, tmp_path, capsys, halved_images):
+    for workers in ("1", "2"):
+        assert track(folder, tmp_path / workers, "--workers", workers) == 0
+        assert read_run(tmp_path / workers / "run.toml")["parameters"]["image_factors"] == [2] * 5
+    assert (tmp_path / "1" / "tracks.csv").read_bytes() == (tmp_path / "2" / "tracks.csv").read_bytes()
+    assert "2 persons in 24 frames" in capsys.readouterr().out
+
+    def places():
+        """By frame, from one side of the room to the other, whoever is person 0."""
+        table = read_tracks(tmp_path / "1" / "tracks.csv")
+        return table.positions[np.lexsort([table.positions[:, 1], table.frames])]
+
+    smaller = places()
+    assert track(folder, tmp_path / "1", "--full-images") == 0
+    assert "starting anew" in capsys.readouterr().out
+    assert "image_factors" not in read_run(tmp_path / "1" / "run.toml")["parameters"]
+    assert 0 < np.abs(smaller - places()).max() < 0.07
+
+
 @pytest.mark.skipif(not may_fork(), reason="there is one process only")
 def test_a_process_that_is_gone_is_one_line(folder, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(looks, "segment_views", lambda *given: os.kill(os.getpid(), signal.SIGKILL))

@@ -86,6 +86,7 @@ def test_a_stopped_run_goes_on_and_ends_as_if_it_had_not_been(clip, tmp_path, mo
         (["--no-complete", "--voxel", "0.04"], "--cues keypoints: has no use for --no-complete, --voxel; leave them out"),
         (["--no-color", "--particles", "0"], "has no use for --no-color, --particles"),
         (["--track-preset", "alike", "--no-cut-shadows"], "has no use for --track-preset, --no-cut-shadows"),
+        (["--full-images"], "has no use for --full-images; leave it out"),
         (["--cameras", "cam_77"], "no camera named"),
     ],
 )

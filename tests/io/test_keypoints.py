@@ -17,6 +17,7 @@ from hmc.io.keypoints import KEYPOINTS, open_keypoints, write_openpose
 from hmc.io.keypoints.csv_forms import read_csv_table
 from hmc.io.keypoints.json_forms import last_number, read_json_frame, read_json_table
 from hmc.io.keypoints.layouts import BODY_25, COCO_17, HALPE_26, LAYOUTS, MEDIAPIPE_33, keypoint_named
+from hmc.io.recording import reduced
 
 L_HIP, NOSE, NECK = (KEYPOINTS.index(name) for name in ("l_hip", "nose", "neck"))
 
@@ -53,6 +54,26 @@ def test_openpose_folders(recording_folder, name):
     assert_allclose(views[1][0, L_HIP], person()[12])
     assert np.isnan(views[1][0, KEYPOINTS.index("head_top"), :2]).all() and views[1][0, KEYPOINTS.index("head_top"), 2] == 0
     assert all(len(view) == 0 for view in source.frame(3))
+
+
+def test_keypoints_of_smaller_images(recording_folder):
+    """They are in the pixels of the recording's rig, also those that files give as shares of the image; changes are made as recorded."""
+    recording = hmc.open_recording(recording_folder)
+    put(recording_folder / "keypoints" / "cam_01" / "0.json", openpose(person()))
+    put(recording_folder / "keypoints" / "cam_03" / "0.json", openpose([[(u + 0.5) / 160, (v + 0.5) / 120, c] for u, v, c in person()]))
+    full = open_keypoints(recording)
+    small = open_keypoints(reduced(recording, (1, 2, 1, 3, 1)))
+    for c, factor in ((1, 2), (3, 3)):
+        whole, people = full.frame(0)[c], small.frame(0)[c]
+        assert_allclose(whole[0, L_HIP], person()[12], atol=1e-9)
+        assert_allclose(people[..., :2], (whole[..., :2] + 0.5) / factor - 0.5)
+        assert_allclose(people[..., 2], whole[..., 2])
+        assert_allclose(full.reduced(small.factors).frame(0)[c], people)
+        assert_allclose(small.reduced(full.factors).frame(0)[c], whole)
+    seen = []
+    changed = small.changed(lambda index, people: seen.append(people) or people)
+    assert_allclose(changed.frame(0)[3], small.frame(0)[3])
+    assert_allclose(seen[0][3], full.frame(0)[3])
 
 
 @pytest.mark.parametrize("folder", ["pose/cam_02_json", "pose/cam_02", "keypoints/cam_02_json"])

@@ -15,7 +15,7 @@ from numpy.testing import assert_allclose
 from hmc.camera.model import Rig
 from hmc.errors import InputError
 from hmc.io.calibration import write_calibration
-from hmc.io.recording import background_frames, iterate_frames, open_recording
+from hmc.io.recording import background_frames, for_voxels, iterate_frames, only_cameras, open_recording, reduced, whole_recording
 
 GIVEN_ONCE = settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
@@ -419,4 +419,58 @@ def test_numbered_images_that_did_not_start_together(recording_folder, ring):
 def test_wrong_starts_are_told(recording_folder, text, words):
     (recording_folder / "recording.toml").write_text(text + "\n")
     with pytest.raises(InputError, match=re.escape(words)):
+        open_recording(recording_folder)
+
+
+def test_smaller_images_of_a_selection(recording_folder, ring):
+    """Images, silhouettes and the empty scene are smaller, each camera's by its own factor; nothing else changes."""
+    rng = np.random.default_rng(0)
+    for camera in ring:
+        folder = recording_folder / "silhouettes" / camera.name
+        folder.mkdir(parents=True)
+        for number in range(12):
+            cv2.imwrite(str(folder / f"{number}.png"), 255 * np.kron(rng.integers(0, 2, (30, 40), np.uint8), np.ones((4, 4), np.uint8)))
+    whole = open_recording(recording_folder, cameras=["cam_02", "cam_00", "cam_03"], start=2, frames=4)
+    small = reduced(whole, (2, 1, 4))
+    assert whole.factors == (1, 1, 1) and small.factors == (2, 1, 4)
+    assert [camera.size for camera in small.rig] == [(80, 60), (160, 120), (40, 30)]
+    assert_allclose(small.room, whole.room)
+    for frame, full in zip(iterate_frames(small), iterate_frames(whole), strict=True):
+        assert frame.index == full.index and indices(frame) == indices(full)
+        for camera, image, mask, own in zip(small.rig, frame.images, frame.silhouettes, full.silhouettes, strict=True):
+            side = 160 // camera.size[0]
+            assert image.shape == (*mask.shape, 3) == (*camera.size[::-1], 3) and mask.dtype == bool
+            np.testing.assert_array_equal(mask, own[::side, ::side])
+    assert [next(background_frames(small, c)).shape[1::-1] for c in range(3)] == [camera.size for camera in small.rig]
+    one = only_cameras(small, [2])
+    assert one.factors == (4,) and next(iterate_frames(one)).images[0].shape == (30, 40, 3)
+    every = whole_recording(small)
+    assert every.n_frames == 12 and every.factors == small.factors and [camera.size for camera in every.rig][2] == (40, 30)
+    assert reduced(small, (2, 2, 1)).factors == (4, 2, 4)
+
+
+def test_the_whole_recording_is_that_which_is_opened_without_a_selection(recording_folder):
+    write_video(recording_folder / "videos" / "cam_02.avi", 5, (160, 120))
+    for text, names in (
+        ("", None),
+        ("frames = 9\n", None),
+        ("frames = 9\n", ["cam_02", "cam_01"]),
+        ("first_frame = { cam_01 = 4 }\n", None),
+    ):
+        (recording_folder / "recording.toml").write_text(text)
+        whole = whole_recording(open_recording(recording_folder, cameras=names, start=2, frames=1))
+        opened = open_recording(recording_folder, cameras=names)
+        assert (whole.start, whole.n_frames, whole.rig.names) == (0, opened.n_frames, opened.rig.names)
+
+
+def test_small_images_stay_as_they_are_for_any_voxels(recording_folder):
+    recording = open_recording(recording_folder)
+    assert for_voxels(recording, 0.5) is recording
+
+
+def test_one_error_is_told_whichever_camera_is_opened_first(recording_folder):
+    """Cameras are opened side by side; the first in order that is wrong is named."""
+    for name in ("cam_03", "cam_01"):
+        (recording_folder / "videos" / f"{name}.avi").write_bytes(b"")
+    with pytest.raises(InputError, match=r"cam_01\.avi"):
         open_recording(recording_folder)

@@ -18,9 +18,10 @@ from hmc.body.model import neutral_state
 from hmc.body.proportions import default_body, stature
 from hmc.cli import main
 from hmc.io.keypoints import open_keypoints
-from hmc.io.results import read_run, read_tracks
+from hmc.io.recording import reduced
+from hmc.io.results import read_run, read_tracks, write_tracks
 from hmc.landmarks import LANDMARKS
-from hmc.pose.follow import FollowOptions, follow
+from hmc.pose.follow import FollowOptions, follow, for_method
 from hmc.pose.keypoint_cues import learn_scatter
 from hmc.pose.keypoint_tracks import tracks_of_keypoints
 from hmc.pose.keypoint_views import with_keypoint_views
@@ -108,6 +109,42 @@ def test_a_length_that_few_frames_show_is_that_of_people():
     assert len(measured_lengths(points)["forearm"]) == 2
     body = body_of_keypoints(points)
     assert body.dimensions["forearm"] / body.dimensions["height"] == pytest.approx(0.150)
+
+
+def test_lines_of_sight_are_the_same_through_smaller_images(clip):
+    recording = hmc.open_recording(clip, frames=FRAMES)
+    small = reduced(recording, (2,) * len(recording.rig))
+    tracks, again = (tracks_of_keypoints(one, open_keypoints(one)) for one in (recording, small))
+    assert_allclose(again.positions, tracks.positions, atol=1e-6)
+    full, less = (learn_scatter(one.rig, tracks, open_keypoints(one), one.fps) for one in (recording, small))
+    assert_allclose(less.scatter_m, full.scatter_m, atol=1e-6)
+
+
+def test_keypoints_go_with_images_that_are_made_smaller(clip, tmp_path, monkeypatch, halved_images):
+    given = []
+
+    def learn(rig, tracks, source, fps):
+        given.append((rig[0].size, source.factors))
+        raise hmc.InputError("enough")
+
+    monkeypatch.setattr("hmc.pose.keypoint_cues.learn_scatter", learn)
+    recording = hmc.open_recording(clip, frames=2)
+    source = open_keypoints(recording)
+    tracks = tracks_of_keypoints(recording, source)
+    write_tracks(tmp_path / "tracks.csv", tracks)
+    for full in (False, True):
+        with pytest.raises(hmc.InputError, match="enough"):
+            hmc.pose(recording, tracks, keypoints=source, full_images=full)
+        words = ["--tracks", str(tmp_path / "tracks.csv"), "--frames", "2", "--quiet", *["--full-images"] * full]
+        assert main(["pose", str(clip), "--out", str(tmp_path / "out"), *words]) == 2
+    assert given == [((160, 120), (2,) * 7)] * 2 + [((320, 240), (1,) * 7)] * 2
+
+
+def test_images_of_which_no_voxels_are_made_stay_as_they_are(clip, halved_images):
+    recording = hmc.open_recording(clip, frames=2)
+    for name in ("keypoints", "marker-apf"):
+        assert for_method(recording, hmc.pose_method(name), 0.03) is recording
+    assert for_method(recording, hmc.pose_method("smd"), 0.03).factors == (2,) * 7
 
 
 def test_cameras_agree_with_a_pose_until_it_is_moved(clip):

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hmc.camera.reduction import reduce_pixels
 from hmc.errors import InputError
 from hmc.io.calibration import read_entries
 from hmc.io.footage import Footage
@@ -41,19 +42,27 @@ class KeypointSource:
         Names of the recording's cameras, in the rig's order.
     present : tuple of bool
         Which of them have keypoints at all.
+    factors : tuple of int
+        How many times smaller than recorded the images are to whose pixels points are given (`reduced`).
     """
 
     path: Path
     cameras: tuple[str, ...]
     present: tuple[bool, ...]
+    factors: tuple[int, ...]
     _readers: tuple[Reader | None, ...] = field(repr=False)
     _offsets: tuple[int, ...] = field(repr=False)
     _change: Change | None = field(default=None, repr=False)
 
     def changed(self, change: Change) -> KeypointSource:
-        """The same keypoints with every frame's people passed through ``change(index, people)``, which returns as many arrays."""
+        """The same keypoints with every frame's people, in pixels as recorded, passed through ``change(index, people)``, which returns as
+        many arrays."""
         before = self._change
         return replace(self, _change=change if before is None else lambda index, people: change(index, before(index, people)))
+
+    def reduced(self, factors: Sequence[int]) -> KeypointSource:
+        """The same keypoints in pixels of images so many times smaller than recorded, one factor a camera; whatever they were in before."""
+        return replace(self, factors=tuple(factors))
 
     def frame(self, index: int) -> tuple[np.ndarray, ...]:
         """People of one frame, in no particular order.
@@ -66,9 +75,9 @@ class KeypointSource:
         Returns
         -------
         tuple (cameras) of ndarray, shape (n_people, 26, 3)
-            x, y and confidence of `hmc.io.keypoints.KEYPOINTS`: pixels of the camera's image as recorded (with the lens's distortion),
-            confidence in 0..1. What is not given is NaN with confidence 0. Nobody, no file of this frame, or a camera without keypoints:
-            n_people is 0.
+            x, y and confidence of `hmc.io.keypoints.KEYPOINTS`: pixels of the camera's image (with the lens's distortion), as recorded or
+            so many times smaller as `factors` say; confidence in 0..1. What is not given is NaN with confidence 0. Nobody, no file of this
+            frame, or a camera without keypoints: n_people is 0.
 
         Raises
         ------
@@ -78,7 +87,12 @@ class KeypointSource:
         people = tuple(
             NOBODY.copy() if reader is None else reader(index + offset) for reader, offset in zip(self._readers, self._offsets, strict=True)
         )
-        return people if self._change is None else self._change(index, people)
+        people = people if self._change is None else self._change(index, people)
+        return tuple(_in_smaller(one, factor) for one, factor in zip(people, self.factors, strict=True))
+
+
+def _in_smaller(people: np.ndarray, factor: int) -> np.ndarray:
+    return people if factor == 1 else np.concatenate([reduce_pixels(people[..., :2], factor), people[..., 2:]], axis=-1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,10 +161,11 @@ def open_keypoints(recording: Recording) -> KeypointSource | None:
             continue
         offsets, readers = [], []
         for camera, item, views in zip(rig, found, _footage(recording), strict=True):
-            reader, first = (None, 0) if item is None else _reader(item, camera.size)
+            reader, first = (None, 0) if item is None else _reader(item, camera.size if views is None else views.size)
             readers.append(reader)
             offsets.append(first + _offset(views))
-        return KeypointSource(folder, rig.names, tuple(item is not None for item in found), tuple(readers), tuple(offsets))
+        present = tuple(item is not None for item in found)
+        return KeypointSource(folder, rig.names, present, recording.factors, tuple(readers), tuple(offsets))
     all_names = [entry.name for entry in read_entries(recording.path)] if strangers else []
     for folder, names in strangers:
         if not any(_item_of(name, [folder / one for one in names]) for name in all_names):
