@@ -28,6 +28,8 @@ STATURE_SHARE = 0.06
 AXIS_DEG, MOST_DEG = 0.5, 4.0
 #: ... and the floor lies this near to the origin, metres.
 FLOOR_M = 0.08
+#: Points of the floor tell up to so much, degrees.
+POINTS_DEG = 0.3
 
 
 @dataclass(frozen=True)
@@ -92,20 +94,19 @@ def find_world(rig: Rig, ground: Ground | None, points: GroundPoints | None, kno
     """
     if points is not None and points.world is not None:
         return FoundWorld(points.world, points.lines, False)
-    if points is None and ground is None:
+    shown: Ground | GroundPoints | None = points or ground
+    if shown is None:
         raise InputError(
             "nobody is seen to stand, so nothing tells where up and the floor are; give points of the floor (--points) or a board that "
             "lies on it (--board)"
         )
     scale, scale_line = _scale(rig, ground, points, known)
-    if points is not None:
-        up, floor, lines, doubt_deg = points.up, points.floor, points.lines, 0.3
+    up, floor = shown.up, shown.floor
+    if isinstance(shown, Ground):
+        doubt_deg, how = shown.up_deg, f"up and the floor by {shown.standing} hulls of people who stand, and the cameras' mounting"
+        lines: tuple[str, ...] = (f"{how}, to about {doubt_deg:.1f} deg",)
     else:
-        assert ground is not None
-        up, floor, doubt_deg = ground.up, ground.floor, ground.up_deg
-        lines = (
-            f"up and the floor by {ground.standing} hulls of people who stand, and the cameras' mounting, to about {doubt_deg:.1f} deg",
-        )
+        doubt_deg, lines = POINTS_DEG, shown.lines
     axis = np.eye(3)[np.abs(up).argmax()] * np.sign(up[np.abs(up).argmax()])
     off_deg = float(np.rad2deg(np.arccos(np.clip(axis @ up, -1, 1))))
     meant = off_deg <= min(MOST_DEG, 2 * doubt_deg + AXIS_DEG) and abs(floor) * scale <= FLOOR_M

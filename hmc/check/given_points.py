@@ -117,8 +117,8 @@ def board_points(rig: Rig, images: Sequence[np.ndarray | None], size: tuple[int,
     seen = {}
     for c, image in enumerate(images):
         if image is not None:
-            found, corners = cv2.findChessboardCornersSB(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), size, flags=flags)
-            if found:
+            there, corners = cv2.findChessboardCornersSB(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), size, flags=flags)
+            if there:
                 seen[c] = corners.reshape(-1, 2).astype(float)
     names = ", ".join(rig.names[c] for c in seen)
     if len(seen) < 2:

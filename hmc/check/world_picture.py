@@ -52,7 +52,7 @@ def save_world_picture(
     points = points[:: max(1, len(points) // DRAWN)]
     new_rig = in_world(rig, world)
     picture = Picture(figsize=(14, 13), layout="constrained")
-    rows = picture.subfigures(3, 1, height_ratios=(4, 4, 4))
+    rows = picture.subfigures(3, 1, squeeze=False)[:, 0]
     for part, (what, cameras, people) in zip(
         rows,
         (("before: as the calibration has it", rig, points), ("after: metres, z up, floor at 0", new_rig, world.points(points))),

@@ -18,9 +18,9 @@ def add_parser(subparsers) -> None:
     parser = subparsers.add_parser(
         "world",
         help="find up, floor and scale of a calibration, and write it in metres with z up",
-        description="Find out of a recording which way is up in its calibration, where the floor is and what its unit is: by people who "
-        "stand in it, or by points of the floor that are given. Draw the rig before and after, and write the calibration in metres, z up and "
-        "the floor at z = 0 as calibration.toml; what was there is kept. Nothing is written where it is so already.",
+        description="Find out which way is up in a recording's calibration, where the floor is and what its unit is: by people who stand "
+        "in it, or by points of the floor that are given. Draw the rig before and after, and write the calibration in metres, with z up "
+        "and the floor at z = 0, as calibration.toml; what was there is kept. Nothing is written where it is so already.",
     )
     parser.add_argument("recording", type=Path, help="folder of the recording")
     parser.add_argument(
