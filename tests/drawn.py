@@ -24,6 +24,17 @@ def silhouette(camera: Camera, x: float, y: float) -> np.ndarray:
     return mask.view(bool)
 
 
+def post(camera: Camera, x: float, y: float) -> np.ndarray:
+    """As `silhouette`, of an upright cylinder that stands on the floor with its whole sole, (h, w) bool."""
+    angle = np.linspace(0, 2 * np.pi, 48)
+    circle = np.column_stack([0.8 * RADIUS_M * np.cos(angle) + x, 0.8 * RADIUS_M * np.sin(angle) + y])
+    points = np.vstack([np.column_stack([circle, np.full(48, z)]) for z in np.linspace(0, HEIGHT_M, 12)])
+    uv, valid = project(camera, points)
+    mask = np.zeros(camera.size[::-1], np.uint8)
+    cv2.fillConvexPoly(mask, cv2.convexHull(np.rint(uv[valid]).astype(np.int32)), 1)
+    return mask.view(bool)
+
+
 def floor_patch(camera: Camera) -> np.ndarray:
     """A camera's view of the shadow, (h, w) bool."""
     (x0, y0), (x1, y1) = SHADOW
@@ -34,7 +45,9 @@ def floor_patch(camera: Camera) -> np.ndarray:
     return view.view(bool)
 
 
-def draw_recording(folder: Path, rig: Rig, frames: list[list[tuple[float, float]]], background: int = 5, silhouettes: bool = False) -> Path:
+def draw_recording(
+    folder: Path, rig: Rig, frames: list[list[tuple[float, float]]], background: int = 5, silhouettes: bool = False, shape=silhouette
+) -> Path:
     """Write a recording: for every frame, where each person stands (x, y)."""
     folder.mkdir(parents=True, exist_ok=True)
     rng = np.random.default_rng(1)
@@ -42,7 +55,7 @@ def draw_recording(folder: Path, rig: Rig, frames: list[list[tuple[float, float]
     (folder / "recording.toml").write_text("fps = 20\nroom = [[-2.0, -2.0, 0.0], [2.0, 2.0, 2.2]]\n")
     for camera in rig:
         empty = rng.integers(90, 130, (*camera.size[::-1], 3)).astype(np.uint8)
-        views = [np.any([silhouette(camera, *place) for place in places] or [np.zeros(empty.shape[:2], bool)], axis=0) for places in frames]
+        views = [np.any([shape(camera, *place) for place in places] or [np.zeros(empty.shape[:2], bool)], axis=0) for places in frames]
         for kind, masks in (("images", views), ("background", [np.zeros_like(view) for view in views[:1]] * background)):
             for index, mask in enumerate(masks):
                 image = np.where(mask[..., None], (40, 60, 200), empty) + rng.normal(0, 2, empty.shape)

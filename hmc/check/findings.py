@@ -16,7 +16,9 @@ import numpy as np
 from hmc.camera.coverage import estimate_room, in_view
 from hmc.camera.model import Camera, Rig, undistort
 from hmc.check.keypoints import KeypointAgreement, keypoint_agreement, keypoint_findings
-from hmc.check.silhouettes import hull_findings, probe_masks
+from hmc.check.moments import probe_masks
+from hmc.check.silhouettes import hull_findings
+from hmc.check.world_findings import world_findings
 from hmc.errors import InputError
 from hmc.io.calibration import CalibrationEntry, build_camera, read_entries
 from hmc.io.footage import IMAGE_SUFFIXES, VIDEO_SUFFIXES, Footage, read_footage
@@ -144,7 +146,9 @@ def inspect_recording(path: str | Path, cameras: Sequence[str] | None = None, re
             low, high = recording.room.round(1).tolist()
             say("note", [f"recording.toml gives no `room`; estimated from the rig: {low} to {high} m"])
         say("note", background(recording))
-        say("warning", _read(recording, read_all))
+        warnings, errors = _read(recording, read_all)
+        say("error", errors)
+        say("warning", warnings)
         try:
             keypoints = _compare_keypoints(recording)
             say("warning", [] if keypoints is None else keypoint_findings(keypoints))
@@ -293,8 +297,8 @@ def background(recording: Recording) -> list[str]:
     return sentences
 
 
-def _read(recording: Recording, read_all: bool) -> list[str]:
-    """Sentences on what turns up while reading."""
+def _read(recording: Recording, read_all: bool) -> tuple[list[str], list[str]]:
+    """Warnings of what turns up while reading, and why the calibration's world is not the recording's room."""
     sentences: list[str] = []
     n = min(recording.n_frames, PROBE_FRAMES)
     wanted = {recording.start + round(i) for i in np.linspace(0, n - 1, COMPARED_FRAMES)}
@@ -307,5 +311,8 @@ def _read(recording: Recording, read_all: bool) -> list[str]:
         if image is not None and image.max() < 10:
             dark.add(camera.name)
     sentences.extend(f"camera '{name}': its first image is black" for name in sorted(dark))
-    sentences.extend(hull_findings(recording, probe_masks(recording, probes)))
-    return sentences
+    masks = probe_masks(recording, probes)
+    wrong_world = world_findings(recording, masks)
+    if not wrong_world:
+        sentences.extend(hull_findings(recording, masks))
+    return sentences, wrong_world

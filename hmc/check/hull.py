@@ -12,11 +12,10 @@ import cv2
 import numpy as np
 
 from hmc.camera.model import Camera, Rig
+from hmc.check.moments import Masks
 from hmc.voxels.carving import pixel_of_voxel
 
 __all__ = ["Hull", "best_move", "beyond_room", "fine_hull", "floor_height", "misfit", "odd_camera"]
-
-Masks = Sequence[np.ndarray | None]
 
 #: How far beyond the room people are looked for, metres.
 AROUND_M = 0.3

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import cv2
@@ -11,11 +10,10 @@ import numpy as np
 
 from hmc.camera.coverage import inside_image
 from hmc.camera.model import Camera, Rig, project
-from hmc.camera.segmentation import BackgroundModel, segment, train_background
 from hmc.check.hull import Hull, best_move, beyond_room, fine_hull, floor_height, misfit, odd_camera
-from hmc.io.recording import Frame, Recording, background_frames
+from hmc.io.recording import Recording
 
-__all__ = ["disagreements", "hull_findings", "probe_masks", "silhouette_agreement"]
+__all__ = ["disagreements", "hull_findings", "silhouette_agreement"]
 
 #: Spacing of the points that the hull is made of (metres; wider in a room that would need more than MAX_POINTS).
 SPACING_M = 0.06
@@ -29,8 +27,6 @@ TOUCHED = 0.2
 LEAST_VIEWS = 4
 #: Feet this far below the floor are told, metres: in good rigs they are between -.02 and .02, a post 40 cm wide at -.05.
 LEAST_DEPTH_M = 0.065
-#: Frames of the empty scene that are learnt from.
-LEARNT_FRAMES = 20
 #: Share of a silhouette that the others' hull covers: .97 or so in a good rig, .83 where furniture hides half of the person from two
 #: cameras, .5 to .9 when one camera is turned by 5 degrees, below .4 when two videos are swapped.
 GOOD_AGREEMENT = 0.9
@@ -47,30 +43,6 @@ class _View(NamedTuple):
     seen: np.ndarray
     cell: np.ndarray
     shape: tuple[int, int]
-
-
-def probe_masks(recording: Recording, frames: Sequence[Frame]) -> list[Sequence[np.ndarray | None]]:
-    """The silhouettes of a few frames: those on disk, or else what differs from the empty scene; none where there are neither.
-
-    Parameters
-    ----------
-    recording : Recording
-    frames : sequence of Frame
-
-    Returns
-    -------
-    list (frames) of sequence (cameras) of ndarray of bool, shape (h, w), or None
-    """
-    if recording.has_silhouettes:
-        return [frame.silhouettes or (None,) * len(recording.rig) for frame in frames]
-    with ThreadPoolExecutor() as pool:
-        models = list(pool.map(lambda c: _learn(recording, c), range(len(recording.rig))))
-    masks: list[list[np.ndarray | None]] = [[None] * len(models) for _ in frames]
-    for c, model in enumerate(models):
-        for frame, found in zip(frames, masks, strict=True):
-            if model is not None:
-                found[c], model = segment(model, frame.images[c])
-    return list(masks)
 
 
 def disagreements(recording: Recording, masks: Sequence[Sequence[np.ndarray | None]]) -> list[str]:
@@ -229,9 +201,3 @@ def _lit(view: _View, points: np.ndarray) -> np.ndarray:
 
 def _coarse(mask: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
     return cv2.resize(mask.astype(np.float32), shape[::-1], interpolation=cv2.INTER_AREA).ravel()
-
-
-def _learn(recording: Recording, index: int) -> BackgroundModel | None:
-    if not recording.n_background_frames[index]:
-        return None
-    return train_background(background_frames(recording, index, LEARNT_FRAMES))

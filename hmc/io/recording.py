@@ -127,7 +127,9 @@ class Recording:
         return tuple(0 if footage is None else footage.n_frames for footage in self._background)
 
 
-def open_recording(path: str | Path, cameras: Sequence[str] | None = None, start: int = 0, frames: int | None = None) -> Recording:
+def open_recording(
+    path: str | Path, cameras: Sequence[str] | None = None, start: int = 0, frames: int | None = None, any_world: bool = False
+) -> Recording:
     """Open a recording or a part of it.
 
     The recording is as long as at least two of its cameras last (the one, if there is one); a camera that ends sooner is None from there
@@ -143,6 +145,8 @@ def open_recording(path: str | Path, cameras: Sequence[str] | None = None, start
         First frame.
     frames : int, optional
         At most this many frames; by default all that follow.
+    any_world : bool
+        The calibration may be of any units and axes: for who is to find them out. The room then means nothing.
 
     Returns
     -------
@@ -187,7 +191,8 @@ def open_recording(path: str | Path, cameras: Sequence[str] | None = None, start
         rig = Rig(tuple(build_camera(entry, sizes) for entry in entries))
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-    for problem in (*missing_views(path, names, both), *wrong_sizes(rig, footage), *wrong_sizes(rig, silhouettes), *wrong_units(rig)):
+    units = () if any_world else wrong_units(rig)
+    for problem in (*missing_views(path, names, both), *wrong_sizes(rig, footage), *wrong_sizes(rig, silhouettes), *units):
         raise InputError(problem)
 
     lengths = {view.path.name: view.n_frames for view in both if view is not None}
@@ -475,7 +480,8 @@ def wrong_units(rig: Rig) -> list[str]:
     if distance <= MAX_CAMERA_DISTANCE_M:
         return []
     return [
-        f"calibration: cameras stand {distance:,.0f} m from the origin, which looks like millimetres; divide every `translation` by 1000"
+        f"calibration: cameras stand {distance:,.0f} m from the origin, which looks like millimetres; "
+        "write the calibration in metres by: hmc world RECORDING"
     ]
 
 

@@ -16,6 +16,7 @@ from hmc.body.proportions import default_body
 from hmc.camera.epipolar import generalised_epipolar_distance
 from hmc.camera.marker_color import MarkerColorSettings, detect_markers, learn_marker_color
 from hmc.camera.model import Rig, look_at, project
+from hmc.camera.triangulation import triangulate
 from hmc.errors import InputError
 from hmc.io.detections import DetectionTable, read_detections, write_detections
 from hmc.io.recording import Recording
@@ -24,7 +25,7 @@ from hmc.pose.follow import FollowOptions, follow
 from hmc.pose.method import Capture, StepInfo, begin_tracking, make_subject
 from hmc.pose.methods.marker_apf import MarkerRecovery, MarkerStart, marker_method
 from hmc.pose.objectives.epipolar import MarkerLikelihood, marker_cost, project_markers
-from hmc.pose.objectives.marker_points import find_points, triangulate
+from hmc.pose.objectives.marker_points import find_points
 from hmc.pose.objectives.nearest_detections import nearest_detections
 from hmc.pose.steps.marker_filter import MARKER_PRESETS, TIPS, MarkerPreset, marker_frame, on_markers, with_tips
 from hmc.pose.steps.marker_limbs import fit_all_points, refine_to_points

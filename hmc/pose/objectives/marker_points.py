@@ -5,44 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from hmc.camera.epipolar import symmetric_epipolar_distance
+from hmc.camera.triangulation import triangulate
 from hmc.pose.views.markers import SeenMarkers
 
-__all__ = ["find_points", "least_views", "matched_points", "triangulate"]
+__all__ = ["find_points", "least_views", "matched_points"]
 
 #: How far a detection may lie from the image of a point that it supports, pixels.
 SUPPORT_PX = 6.0
-
-
-def triangulate(projections: np.ndarray, uv: np.ndarray) -> np.ndarray:
-    """Points from their images in several views, at least squared algebraic distance with every view weighed by one over its depth.
-
-    Parameters
-    ----------
-    projections : ndarray, shape (n_views, 3, 4)
-    uv : ndarray, shape (..., n_views, 2)
-        Undistorted pixels; NaN where a view has none.
-
-    Returns
-    -------
-    ndarray, shape (..., 3)
-        World, metres; NaN with fewer than two views.
-    """
-    known = np.isfinite(uv).all(axis=-1)
-    images = np.where(known[..., None], uv, 0.0)
-    # Two equations a view: (u P_3 - P_1) X = 0 and (v P_3 - P_2) X = 0.
-    rows = images[..., None] * projections[:, 2, None] - projections[:, :2]
-    weight = known.astype(float)
-    for _ in range(2):
-        weighted = rows * weight[..., None, None]
-        flat = weighted.reshape(*weighted.shape[:-3], 2 * len(projections), 4)
-        a, b = flat[..., :3], flat[..., 3]
-        normal = np.einsum("...ki,...kj->...ij", a, a)
-        enough = known.sum(axis=-1) >= 2
-        normal = np.where(enough[..., None, None], normal, np.eye(3))
-        points = -np.linalg.solve(normal, np.einsum("...ki,...k->...i", a, b)[..., None])[..., 0]
-        depth = np.einsum("vi,...i->...v", projections[:, 2, :3], points) + projections[:, 2, 3]
-        weight = known / np.maximum(np.abs(depth), 0.05)
-    return np.where(enough[..., None], points, np.nan)
 
 
 def least_views(seen: SeenMarkers) -> int:

@@ -1,0 +1,116 @@
+"""``hmc world``: a room of metres, z up and the floor at 0, from a calibration of any world."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from hmc.cli.common import positive_float
+
+__all__ = ["add_parser", "run"]
+
+#: Moments that are looked at.
+MOMENTS = 16
+
+
+def add_parser(subparsers) -> None:
+    """Add the command to the argument parser."""
+    parser = subparsers.add_parser(
+        "world",
+        help="find up, floor and scale of a calibration, and write it in metres with z up",
+        description="Find out which way is up in a recording's calibration, where the floor is and what its unit is: by people who stand "
+        "in it, or by points of the floor that are given. Draw the rig before and after, and write the calibration in metres, with z up "
+        "and the floor at z = 0, as calibration.toml; what was there is kept. Nothing is written where it is so already.",
+    )
+    parser.add_argument("recording", type=Path, help="folder of the recording")
+    parser.add_argument(
+        "--unit",
+        type=positive_float,
+        default=None,
+        metavar="M",
+        help="metres a unit of the calibration: 0.05 for a board's squares of 5 cm",
+    )
+    parser.add_argument("--distance", type=_distance, default=None, metavar="A,B,M", help="two cameras, and how many metres they are apart")
+    parser.add_argument(
+        "--height",
+        type=positive_float,
+        default=None,
+        metavar="M",
+        help="stature of who is in the recording (default: what recording.toml says)",
+    )
+    parser.add_argument(
+        "--points", type=Path, default=None, metavar="FILE.csv", help="points of the floor: point,camera,u,v and, where known, x,y,z"
+    )
+    parser.add_argument(
+        "--board",
+        type=_board,
+        default=None,
+        metavar="NxM",
+        help="a chessboard of so many inner corners lies on the floor in the first images",
+    )
+    parser.add_argument("--square", type=positive_float, default=None, metavar="M", help="side of that board's squares, metres")
+    parser.add_argument("--out", type=Path, default=None, metavar="FILE.png", help="the picture (default: NAME_world.png here)")
+    parser.add_argument("--dry-run", action="store_true", help="tell and draw, and write no calibration")
+
+
+def _distance(text: str) -> tuple[str, str, float]:
+    one, other, metres = text.split(",")
+    if not float(metres) > 0:
+        raise ValueError
+    return one, other, float(metres)
+
+
+def _board(text: str) -> tuple[int, int]:
+    columns, rows = (int(n) for n in text.lower().split("x"))
+    if min(columns, rows) < 3:
+        raise ValueError
+    return columns, rows
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print what was found, write the picture and, where it is another world, the calibration."""
+    from hmc.camera.world import in_world
+    from hmc.check.find_world import Known, find_world
+    from hmc.check.given_points import board_points, read_points
+    from hmc.check.moments import moments
+    from hmc.check.upright import find_figures, find_ground
+    from hmc.check.world_picture import save_world_picture
+    from hmc.errors import InputError
+    from hmc.io.new_world import write_new_world
+    from hmc.io.recording import background_frames, iterate_frames, open_recording
+
+    recording = open_recording(args.recording, any_world=True)
+    rig = recording.rig
+    if args.distance is not None:
+        rig.select(args.distance[:2])
+    first = next(iter(iterate_frames(recording)))
+    images = [next(background_frames(recording, c, 1), image) for c, image in enumerate(first.images)]
+    points = None
+    if args.points is not None:
+        points = read_points(args.points, rig)
+    elif args.board is not None:
+        points = board_points(rig, images, args.board, args.square)
+    figures = find_figures(rig, moments(recording, MOMENTS))
+    ground = find_ground(rig, figures)
+    heights = recording.subject_height_m
+    known = Known(args.unit, args.distance, args.height or (heights[0] if len(heights) == 1 else None))
+    try:
+        found = find_world(rig, ground, points, known)
+    except InputError as error:
+        raise InputError(f"{args.recording}: {error}") from None
+    for line in found.lines:
+        print(line)
+    name = args.recording.resolve().name
+    picture = args.out or Path(f"{name}_world.png")
+    save_world_picture(picture, rig, found.world, figures, first.images, name)
+    print(f"picture: {picture}")
+    if found.as_it_was:
+        print(f"{name}: the calibration is in metres with z up and the floor at 0 already; nothing is written")
+    elif args.dry_run:
+        print(f"{name}: nothing is written (--dry-run)")
+    else:
+        for line in write_new_world(args.recording, in_world(rig, found.world)):
+            print(line)
+        if (args.recording / "truth").is_dir():
+            print(f"{args.recording / 'truth'} is still in the old world")
+    return 0

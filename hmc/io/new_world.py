@@ -1,0 +1,72 @@
+"""A recording's calibration in another world: written beside what was there, which is kept."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from hmc.camera.model import Rig
+from hmc.io.calibration import write_calibration
+
+__all__ = ["write_new_world"]
+
+#: Of recording.toml: what is said in the old world's terms.
+OLD_TERMS = ("room", "units", "up")
+
+
+def write_new_world(path: Path, rig: Rig) -> list[str]:
+    """Write ``calibration.toml``, which comes before other forms, and take what no longer holds out of ``recording.toml``.
+
+    What was there is kept as ``calibration_before.toml`` and ``recording_before.toml``, and what is taken out stays as a comment.
+
+    Parameters
+    ----------
+    path : Path
+        Folder of the recording.
+    rig : Rig
+        Of all of its cameras, metres, z up.
+
+    Returns
+    -------
+    list of str
+        What was written and kept.
+    """
+    lines = []
+    target, settings = path / "calibration.toml", path / "recording.toml"
+    if target.exists():
+        lines.append(f"kept what was there: {_keep(target)}")
+    write_calibration(target, rig)
+    lines.insert(0, f"written: {target}")
+    if settings.is_file():
+        text = settings.read_text(encoding="utf-8")
+        new, taken = without_old_terms(text)
+        if taken:
+            kept = _keep(settings)
+            settings.write_text(new, encoding="utf-8")
+            lines.append(f"{settings}: {', '.join(f'`{key}`' for key in taken)} of the old world taken out; kept what was there: {kept}")
+    return lines
+
+
+def _keep(file: Path) -> Path:
+    """Rename a file to a name that is free, and tell it."""
+    for n in range(1, 1000):
+        kept = file.with_stem(f"{file.stem}_before{'' if n == 1 else f'_{n}'}")
+        if not kept.exists():
+            return file.rename(kept)
+    raise FileExistsError(file)
+
+
+def without_old_terms(text: str) -> tuple[str, list[str]]:
+    """``recording.toml`` with the old world's terms as comments, and which they were."""
+    lines, taken, open_brackets, inside_table = [], [], 0, False
+    for line in text.splitlines():
+        bare = line.split("#")[0]
+        start = re.match(r"\s*([A-Za-z_]+)\s*=", bare)
+        inside_table = inside_table or bool(re.match(r"\s*\[[A-Za-z_]", bare) and not open_brackets)
+        if open_brackets or (start and start[1] in OLD_TERMS and not inside_table):
+            if not open_brackets and start:
+                taken.append(start[1])
+            open_brackets = max(0, open_brackets + bare.count("[") - bare.count("]"))
+            line = f"# of the world before: {line}"
+        lines.append(line)
+    return "\n".join(lines) + "\n", taken

@@ -1,0 +1,201 @@
+"""Which way is up, where the floor is and how long a metre: of drawn people in calibrations of any world."""
+
+import re
+import tomllib
+from itertools import pairwise
+
+import cv2
+import numpy as np
+import pytest
+from drawn import HEIGHT_M, draw_recording, post, walk
+from numpy.testing import assert_allclose
+from scipy.spatial.transform import Rotation
+
+from hmc.camera.model import Rig, look_at, project
+from hmc.camera.world import World, in_world
+from hmc.check import check_recording
+from hmc.check.find_world import Known, find_world
+from hmc.check.given_points import board_points, read_points
+from hmc.check.upright import find_figures, find_ground
+from hmc.cli import main
+from hmc.errors import InputError
+from hmc.io.calibration import read_calibration, write_calibration
+from hmc.io.new_world import without_old_terms
+
+FIRST = Rotation.from_euler("zyx", (100, 25, 110), degrees=True).as_matrix()
+WORLDS = {
+    "first camera": World(FIRST, np.array([3.5, 0, 2.0]), 1.0),
+    "board squares": World(FIRST, np.array([3.5, 0, 2.0]), 20.0),
+    "y up, millimetres": World(np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]), np.zeros(3), 1000.0),
+    "z down": World(np.diag([1.0, -1, -1]), np.zeros(3), 1.0),
+}
+
+
+@pytest.fixture(scope="module")
+def moments(ring):
+    """Silhouettes of one who walks in a circle."""
+    return [[post(camera, 0.7 * np.cos(a), 0.7 * np.sin(a)) for camera in ring] for a in np.linspace(0, 5, 8)]
+
+
+def tilt_deg(one, other):
+    return np.rad2deg(np.arccos(np.clip(one @ other, -1, 1)))
+
+
+@pytest.mark.parametrize("name", WORLDS)
+def test_up_floor_and_stature_are_found_in_any_world(ring, moments, name):
+    world = WORLDS[name]
+    rig = in_world(ring, world)
+    ground = find_ground(rig, find_figures(rig, moments))
+    assert tilt_deg(world.rotation.T @ ground.up, [0, 0, 1]) < 1.0
+    assert abs(world.old_points(ground.middle)[2]) < 0.06
+    assert ground.stature / world.scale == pytest.approx(HEIGHT_M, abs=0.08)
+    assert (ground.standing, ground.figures) == (8, 8)
+
+
+def test_cameras_upside_down_and_on_their_sides_do_not_turn_the_world(ring, moments):
+    turned = []
+    for camera, degrees in zip(ring, (180, 90, 180, 180, 5), strict=True):
+        roll = Rotation.from_euler("z", degrees, degrees=True).as_matrix()
+        size = camera.size
+        matrix = camera.matrix.copy()
+        turned.append(type(camera)(camera.name, size, matrix, np.zeros(5), roll @ camera.rotation, roll @ camera.translation))
+    rig = Rig(tuple(turned))
+    masks = [[post(camera, 0.7 * np.cos(a), 0.7 * np.sin(a)) for camera in rig] for a in np.linspace(0, 5, 6)]
+    assert tilt_deg(find_ground(rig, find_figures(rig, masks)).up, [0, 0, 1]) < 2.5
+
+
+def test_nothing_is_found_of_noise(ring):
+    rng = np.random.default_rng(0)
+    noise = [[rng.random(camera.size[::-1]) < 0.3 for camera in ring] for _ in range(3)]
+    assert find_ground(ring, find_figures(ring, noise)) is None
+    with pytest.raises(InputError, match="nobody is seen to stand"):
+        find_world(ring, None, None, Known())
+
+
+def found(ring, moments, world, known=None):
+    rig = in_world(ring, world)
+    return find_world(rig, find_ground(rig, find_figures(rig, moments)), None, known or Known())
+
+
+def test_an_axis_and_a_unit_that_are_meant_are_taken_as_they_are(ring, moments):
+    one = found(ring, moments, WORLDS["y up, millimetres"])
+    assert_allclose(one.world.rotation, [[1, 0, 0], [0, 0, -1], [0, 1, 0]], atol=1e-12)
+    assert (one.world.scale, one.as_it_was) == (0.001, False) and not one.world.origin.any()
+    assert found(ring, moments, World()).as_it_was
+
+
+def test_the_scale_is_asked_for_where_nothing_tells_it(ring, moments):
+    squares = WORLDS["board squares"]
+    with pytest.raises(InputError, match=r"36.1 units tall.*--unit METRES.*--distance.*--height"):
+        found(ring, moments, squares)
+    assert found(ring, moments, squares, Known(unit_m=0.05)).world.scale == 0.05
+    apart = float(np.linalg.norm(ring[0].centre - ring[2].centre))
+    by_distance = found(ring, moments, squares, Known(distance=("cam_00", "cam_02", apart)))
+    assert by_distance.world.scale == pytest.approx(0.05, rel=1e-6)
+    assert found(ring, moments, squares, Known(height_m=HEIGHT_M)).world.scale == pytest.approx(0.05, rel=0.05)
+    assert found(ring, moments, World(), Known(height_m=HEIGHT_M)).as_it_was  # metres, near enough
+
+
+def test_points_of_the_floor_tell_up_and_their_places_everything(ring, tmp_path):
+    world = WORLDS["board squares"]
+    rig = in_world(ring, world)
+    places = np.array([[-0.5, -0.5, 0], [0.6, -0.4, 0], [0.5, 0.7, 0], [-0.6, 0.4, 0]])
+    rows = [
+        (k, camera.name, *project(camera, world.points(place))[0], *place) for k, place in enumerate(places) for camera in (rig[0], rig[1])
+    ]
+    file = tmp_path / "points.csv"
+    write_csv(file, "point,camera,u,v", [row[:4] for row in rows])
+    points = read_points(file, rig)
+    assert tilt_deg(world.rotation.T @ points.up, [0, 0, 1]) < 1e-3
+    assert find_world(rig, None, points, Known(unit_m=0.05)).world.points(world.points([0.0, 0, 1.0]))[2] == pytest.approx(1.0, abs=1e-5)
+    with pytest.raises(InputError, match="nothing tells the scale"):
+        find_world(rig, None, points, Known())
+    write_csv(file, "point,camera,u,v,x,y,z", rows)
+    assert_allclose(find_world(rig, None, read_points(file, rig), Known()).world.points(world.points(places)), places, atol=1e-5)
+
+
+def write_csv(file, header, rows):
+    file.write_text("\n".join([header, *(",".join(map(str, row)) for row in rows)]) + "\n")
+
+
+@pytest.mark.parametrize(
+    ("rows", "said"),
+    [
+        ([], "no column"),
+        ([(0, "cam_00", 1, 2)], "in one camera only"),
+        ([(0, "cam_99", 1, 2)], "no camera named 'cam_99'"),
+        ([(0, "cam_00", "x", 2)], "line 2: u, v"),
+    ],
+)
+def test_points_that_are_no_points_are_told(ring, tmp_path, rows, said):
+    write_csv(tmp_path / "points.csv", "point,camera,u,v", rows)
+    with pytest.raises(InputError, match=said):
+        read_points(tmp_path / "points.csv", ring)
+
+
+def test_a_board_on_the_floor_tells_up_and_scale():
+    world = WORLDS["board squares"]
+    rig = Rig(
+        tuple(look_at(f"cam_{k}", (640, 480), [2.2 * np.cos(a), 2.2 * np.sin(a), 1.6], [0, 0, 0], 40) for k, a in enumerate((0, 2, 4)))
+    )
+    rows, columns, square = 6, 8, 0.1
+    board = np.kron(np.indices((rows, columns)).sum(axis=0) % 2, np.ones((40, 40))).astype(np.uint8) * 255
+    board = cv2.copyMakeBorder(board, 40, 40, 40, 40, cv2.BORDER_CONSTANT, value=255)
+    corners = np.array([[-1, -1], [columns + 1, -1], [columns + 1, rows + 1], [-1, rows + 1]]) * square - 0.3
+    pixels = np.array([[0, 0], [board.shape[1], 0], [board.shape[1], board.shape[0]], [0, board.shape[0]]]) - 0.5
+    images = []
+    for camera in rig:
+        uv, _ = project(camera, np.column_stack([corners, np.zeros(4)]))
+        turn = cv2.getPerspectiveTransform(pixels.astype(np.float32), uv.astype(np.float32))
+        images.append(cv2.cvtColor(cv2.warpPerspective(board, turn, (640, 480), flags=cv2.INTER_AREA, borderValue=120), cv2.COLOR_GRAY2BGR))
+    odd = in_world(rig, world)
+    points = board_points(odd, images, (columns - 1, rows - 1), square)
+    assert tilt_deg(world.rotation.T @ points.up, [0, 0, 1]) < 0.5
+    assert points.unit_m == pytest.approx(0.05, rel=0.01)
+    with pytest.raises(InputError, match="found by no camera"):
+        board_points(odd, [np.zeros_like(image) for image in images], (7, 5))
+
+
+def test_the_command_writes_a_calibration_that_check_finds_right(ring, tmp_path, capsys):
+    folder = draw_recording(tmp_path / "take", ring, walk(9), silhouettes=True, shape=post)
+    write_calibration(folder / "calibration.toml", in_world(ring, WORLDS["first camera"]))
+    errors = [one.sentence for one in check_recording(folder) if one.severity == "error"]
+    assert len(errors) == 1 and re.search(r"people stand .* degrees.*hmc world", errors[0])
+    assert main(["check", str(folder), "--out", str(tmp_path / "check.png")]) == 2
+    assert main(["world", str(folder), "--out", str(tmp_path / "world.png"), "--dry-run"]) == 0
+    assert not list(folder.glob("*_before*"))
+    assert main(["world", str(folder), "--out", str(tmp_path / "world.png")]) == 0
+    assert (tmp_path / "world.png").stat().st_size > 10_000
+    said = capsys.readouterr().out
+    assert "by 9 hulls of people who stand" in said and "calibration_before.toml" in said
+    rig = read_calibration(folder)
+    # Distances are as they were, and every camera as high above the floor as it is.
+    assert_allclose([np.linalg.norm(a.centre - b.centre) for a, b in pairwise(rig)], 2 * 3.5 * np.sin(np.pi / 5), rtol=1e-6)
+    assert_allclose(rig.centres[:, 2], 2.0, atol=0.15)
+    assert "room" not in tomllib.loads((folder / "recording.toml").read_text())
+    assert not [one for one in check_recording(folder) if one.severity == "error"]
+    assert main(["world", str(folder), "--out", str(tmp_path / "world.png")]) == 0
+
+
+def test_a_recording_that_is_right_stays_as_it_is(ring, tmp_path, capsys):
+    folder = draw_recording(tmp_path / "take", ring, walk(9), silhouettes=True, shape=post)
+    before = {file.name: file.read_bytes() for file in folder.glob("*.toml")}
+    assert main(["world", str(folder), "--out", str(tmp_path / "world.png")]) == 0
+    assert "nothing is written" in capsys.readouterr().out
+    assert before == {file.name: file.read_bytes() for file in folder.glob("*.toml")}
+
+
+def test_units_and_rooms_that_do_not_fit_are_errors(ring, tmp_path):
+    folder = draw_recording(tmp_path / "take", ring, walk(3), silhouettes=True, shape=post)
+    write_calibration(folder / "calibration.toml", in_world(ring, World(scale=4.0)))
+    assert any("7" in one.sentence and "m tall" in one.sentence for one in check_recording(folder) if one.severity == "error")
+    write_calibration(folder / "calibration.toml", in_world(ring, World(origin=np.array([8.0, 0, 0]))))
+    assert any(one.sentence.startswith("people are not in the room") for one in check_recording(folder) if one.severity == "error")
+
+
+def test_old_terms_become_comments():
+    text = 'name = "a"  # room = 1\nroom = [\n  [0, 0, 0],\n  [1, 1, 2],\n]\nunits = "mm"\nfps = 30\n[first_frame]\nup = 3\n'
+    new, taken = without_old_terms(text)
+    assert taken == ["room", "units"]
+    assert tomllib.loads(new) == {"name": "a", "fps": 30, "first_frame": {"up": 3}}
+    assert all(line.removeprefix("# of the world before: ") == old for line, old in zip(new.splitlines(), text.splitlines(), strict=True))
