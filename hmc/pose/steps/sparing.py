@@ -41,10 +41,10 @@ class SparingSettings:
         Time over which the usual cost is a mean (of its logarithm), seconds.
     """
 
-    ratio: float = 1.2
+    ratio: float = 1.05
     far_m: float = 0.05
     outside_share: float = 0.25
-    memory_s: float = 0.3
+    memory_s: float = 1.0
 
 
 def sparing(step: PoseStep, settings: PolishSettings, when: SparingSettings) -> PoseStep:
