@@ -2,9 +2,9 @@
 
     python docs/any_rig.py RECORDING --out out/any_rig --frames 90
 
-Makes four recordings of one with truth, which differ in their calibration's world alone (the first camera's; squares of a board; Y up in
-millimetres; Z down), and runs `hmc check`, which must refuse each, `hmc world` and `hmc pose` on them, and `hmc pose` on the recording as it
-is. Poses are brought back into the recording's world by the cameras' places, and compared with the truth.
+Makes four recordings of one with truth, which differ in their calibration's world alone (the first camera's; squares of a board; Y up
+in millimetres; Z down), and runs `hmc check`, which must refuse each, `hmc world` and `hmc pose` on them, and `hmc pose` on the recording
+as it is. Poses are brought back into the recording's world by the cameras' places, and compared with the truth.
 """
 
 from __future__ import annotations
