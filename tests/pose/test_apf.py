@@ -82,7 +82,7 @@ def test_the_default_preset_follows_a_rendered_walker():
 def test_refinement_beats_the_particles_alone():
     acted = act("walk")
     subject, full = parts_of("default", acted)
-    bare = annealed_pose_step(replace(LEAN["default"], refine=None, search=None, fit_body=None, start="neutral"))
+    bare = annealed_pose_step(replace(LEAN["default"], refine=None, search=None, sparing=None, fit_body=None, start="neutral"))
     errors: dict[str, list[float]] = {}
     for name, step in (("full", full), ("bare", bare)):
         tracked, errors[name] = begin_tracking(subject, true_state(subject.body, acted)), []
@@ -113,13 +113,14 @@ def test_the_four_scores_keep_hold_of_a_person(name):
 
 
 def test_a_state_is_all_that_goes_on():
-    """With refinement the next frame depends on pose and velocity, so a stopped run can go on from them."""
+    """With refinement the next frame depends on pose, velocity and what frames usually cost, so a stopped run can go on from them."""
     acted = act("walk")
     subject, step = parts_of("default", acted)
     first, second = (view_of(target) for target in acted.targets[:2])
     tracked, _ = step(np.random.default_rng(0), begin_tracking(subject, true_state(subject.body, acted)), first)
     on, _ = step(np.random.default_rng(1), tracked, second)
-    resumed, _ = step(np.random.default_rng(1), begin_tracking(subject, tracked.state, tracked.velocity), second)
+    usual = {"usual": tracked.memory["usual"]}
+    resumed, _ = step(np.random.default_rng(1), begin_tracking(subject, tracked.state, tracked.velocity, usual), second)
     assert_array_equal(on.state, resumed.state)
 
 
