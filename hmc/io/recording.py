@@ -12,15 +12,19 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from hmc.camera.coverage import estimate_room
-from hmc.camera.model import Rig
+from hmc.camera.model import Camera, Rig
 from hmc.errors import InputError
 from hmc.io.calibration import build_camera, read_entries
-from hmc.io.footage import Footage, find_footage, number_images, read_footage, starting_at
+from hmc.io.footage import Footage, find_footage, number_files, number_images, open_files, read_footage, starting_at
+from hmc.io.naming import Found, find_files, footage_items, item_name
 from hmc.io.settings import read_settings
+from hmc.io.sizes import fit_size, size_cure
+from hmc.io.world import world_of
 
 __all__ = ["Frame", "Recording", "background_frames", "iterate_frames", "only_cameras", "open_recording", "spread_frames"]
 
@@ -29,6 +33,8 @@ logger = logging.getLogger("hmc")
 DEFAULT_FPS = 30.0
 #: Cameras are no further than this (median, metres) from the world's origin: beyond, the calibration is in millimetres.
 MAX_CAMERA_DISTANCE_M = 150.0
+#: So far away, in a unit that is not known, they are in millimetres rather than centimetres.
+LEAST_MM = 900.0
 #: Silhouettes from files that lose detail are cut at the middle; from others, anything but black counts.
 LOSSY_SUFFIXES = frozenset({".jpg", ".jpeg", ".webp"})
 
@@ -163,11 +169,11 @@ def open_recording(path: str | Path, cameras: Sequence[str] | None = None, start
         raise InputError(
             f"{path / 'recording.toml'}: `first_frame` names '{strangers[0]}', no camera of the calibration ({', '.join(all_names)})"
         )
-    footage, silhouettes = find_views(path, names, all_names, starts=starts)
+    footage, silhouettes = find_views(path, names, all_names, starts=starts, settings=settings)
     both = [image or mask for image, mask in zip(footage, silhouettes, strict=True)]
     sizes = {name: view.size for name, view in zip(names, both, strict=True) if view is not None}
     try:
-        rig = Rig(tuple(build_camera(entry, sizes) for entry in entries))
+        rig = Rig(tuple(fitted(build_camera(entry, sizes, world_of(settings)), sizes, settings) for entry in entries))
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     for problem in (*missing_views(path, names, both), *wrong_sizes(rig, footage), *wrong_sizes(rig, silhouettes), *wrong_units(rig)):
@@ -190,7 +196,7 @@ def open_recording(path: str | Path, cameras: Sequence[str] | None = None, start
             f"0 to {total - 1}: choose other --start and --frames"
         )
 
-    background = _find_background(path, rig, problems)
+    background = _find_background(path, rig, all_names, settings, problems)
     fps = settings.get("fps") or next((view.fps for view in footage if view is not None and view.fps), DEFAULT_FPS)
     room = settings.get("room")
     return Recording(
@@ -297,6 +303,7 @@ def find_views(
     count: bool = True,
     on_error: Callable[[str, str], None] | None = None,
     starts: Mapping[str, int] | None = None,
+    settings: Mapping[str, Any] | None = None,
 ) -> tuple[list[Footage | None], list[Footage | None]]:
     """The images (in ``videos/``, else in ``images/``) and the silhouettes of each camera.
 
@@ -314,11 +321,28 @@ def find_views(
         Called with a camera's name and what is wrong with its files, which then count as missing; by default that is raised.
     starts : mapping of str to int, optional
         The frame of a camera's files that is frame 0 of the recording, where it is not the first.
+    settings : mapping, optional
+        Of recording.toml, checked: which files are which camera's (`hmc.io.naming.find_files`).
     """
 
-    def find(folder: Path, name: str, first: int) -> Footage | None:
+    def located(kind: str) -> Found:
         try:
-            found = find_footage(folder, name, first, count)
+            return find_files(path, kind, all_names, settings or {})
+        except InputError as error:
+            if on_error is None:
+                raise
+            for name in names:
+                on_error(name, str(error))
+            return Found({}, {})
+
+    def find(kind: str, files: Found, name: str, first: int) -> Footage | None:
+        try:
+            if name in files.files:
+                found = open_files(files.files[name], first, count)
+                if found is not None and name in files.notes:
+                    found = replace(found, notes=(*found.notes, files.notes[name]))
+            else:
+                found = find_footage(path / kind, name, first, count)
             return found and starting_at(found, (starts or {}).get(name, 0))
         except InputError as error:
             if on_error is None:
@@ -326,26 +350,58 @@ def find_views(
             on_error(name, str(error))
             return None
 
-    images = path / "images"
-    first = _first_number(images, all_names)
-    footage = [find(path / "videos", name, 0) or find(images, name, first) for name in names]
+    videos, images, masks = located("videos"), located("images"), located("silhouettes")
+    first = _first_number(path / "images", images, all_names)
+    footage = [find("videos", videos, name, 0) or find("images", images, name, first) for name in names]
     if not any(footage):
-        first = _first_number(path / "silhouettes", all_names)
-    return footage, [find(path / "silhouettes", name, first) for name in names]
+        first = _first_number(path / "silhouettes", masks, all_names)
+    return footage, [find("silhouettes", masks, name, first) for name in names]
 
 
-def _first_number(folder: Path, names: Sequence[str]) -> int:
-    numbers = [min(number_images(folder / name), default=0) for name in names if (folder / name).is_dir()]
-    return min(numbers, default=0)
+def _first_number(folder: Path, files: Found, names: Sequence[str]) -> int:
+    places = [files.files.get(name, (folder / name,)) for name in names]
+    folders = [number_images(place[0]) for place in places if len(place) == 1 and place[0].is_dir()]
+    return min((min(numbers, default=0) for numbers in (*folders, *(number_files(place) for place in places if len(place) > 1))), default=0)
 
 
-def _find_background(path: Path, rig: Rig, problems: list[str]) -> list[Footage | None]:
+def fitted(camera: Camera, sizes: Mapping[str, tuple[int, int]], settings: Mapping[str, Any]) -> Camera:
+    """The camera for images of their size, where recording.toml says how they came to have another than the calibration's."""
+    fit, size = settings.get("image_size"), sizes.get(camera.name)
+    return camera if fit is None or size is None else fit_size(camera, size, fit)
+
+
+def read_rig(path: Path) -> Rig:
+    """The rig of a recording as `open_recording` has it, whether or not there are images. Errors as there."""
+    settings, entries = read_settings(path), read_entries(path)
+    names, sizes = [entry.name for entry in entries], {}
+    if "image_size" in settings or any(entry.size is None for entry in entries):
+        footage, masks = find_views(path, names, names, count=False, on_error=lambda name, sentence: None, settings=settings)
+        views = {name: image or mask for name, image, mask in zip(names, footage, masks, strict=True)}
+        sizes = {name: view.size for name, view in views.items() if view is not None}
+    try:
+        return Rig(tuple(fitted(build_camera(entry, sizes, world_of(settings)), sizes, settings) for entry in entries))
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+
+
+def _find_background(
+    path: Path, rig: Rig, all_names: Sequence[str], settings: Mapping[str, Any], problems: list[str]
+) -> list[Footage | None]:
     """The empty scene of each camera; what cannot be used is left out and added to the problems."""
     background: list[Footage | None] = []
+    try:
+        files = find_files(path, "background", all_names, settings)
+    except InputError as error:
+        problems.append(f"{error}; going on without background")
+        return [None] * len(rig)
+    problems.extend(note for name, note in files.notes.items() if name in rig.names)
     for camera in rig:
         found = None
         try:
-            found = find_footage(path / "background", camera.name, count=False)
+            if camera.name in files.files:
+                found = open_files(files.files[camera.name], count=False)
+            else:
+                found = find_footage(path / "background", camera.name, count=False)
         except InputError as error:
             problems.append(f"{error}; going on without this background")
         if found is not None and found.size != camera.size:
@@ -373,12 +429,17 @@ def common_length(lengths: Sequence[int]) -> int:
 
 def missing_views(path: Path, names: Sequence[str], views: Sequence[Footage | None]) -> list[str]:
     """One sentence for each camera without images and silhouettes."""
+    lost = [name for name, view in zip(names, views, strict=True) if view is None]
+    if not lost:
+        return []
+    used = {view.path for view in views if view is not None}
+    spare = next((item for item in footage_items(path / "videos") if item not in used and item_name(item) not in names), None)
+    cure = f'say whose is whose in recording.toml: videos = {{ "{lost[0]}" = "videos/{spare.name if spare else "FILE.mp4"}", ... }}'
     if not any(views):
-        return [f"{path}: no videos/, images/ or silhouettes/ with the cameras' names ({', '.join(names)})"]
+        return [f"{path}: no videos/, images/ or silhouettes/ with the cameras' names ({', '.join(names)}); name them so, or {cure}"]
     return [
-        f"{path}: camera '{name}' of the calibration has no video, images or silhouettes; name them so, or leave it out: --cameras"
-        for name, view in zip(names, views, strict=True)
-        if view is None
+        f"{path}: camera '{name}' of the calibration has no video, images or silhouettes; name them so, {cure}, or leave it out: --cameras"
+        for name in lost
     ]
 
 
@@ -386,19 +447,21 @@ def wrong_sizes(rig: Rig, views: Sequence[Footage | None]) -> list[str]:
     """One sentence for each camera whose images have not the size of its calibration."""
     return [
         f"{view.path}: images are {_by(view.size)} but the calibration of '{camera.name}' says {_by(camera.size)}; "
-        "calibrate at the images' size, or correct `size` and `matrix`"
+        f"{size_cure(camera.size, view.size)}"
         for camera, view in zip(rig, views, strict=True)
         if view is not None and view.size != camera.size
     ]
 
 
 def wrong_units(rig: Rig) -> list[str]:
-    """A sentence when the cameras stand so far away that the calibration must be in millimetres."""
+    """A sentence when the cameras stand so far away that the calibration must be in millimetres or centimetres."""
     distance = float(np.median(np.linalg.norm([camera.translation for camera in rig], axis=1)))
     if distance <= MAX_CAMERA_DISTANCE_M:
         return []
+    unit, name, other = ("cm", "centimetres", "mm") if distance < LEAST_MM else ("mm", "millimetres", "cm")
     return [
-        f"calibration: cameras stand {distance:,.0f} m from the origin, which looks like millimetres; divide every `translation` by 1000"
+        f"calibration: cameras stand {distance:,.0f} m from the origin, which looks like {name}; "
+        f'write units = "{unit}" (or "{other}") in recording.toml'
     ]
 
 
