@@ -105,7 +105,7 @@ def read_opencv(path: Path) -> list[CalibrationEntry]:
     missing: list[str] = []
     entries = [_entry(path, name, values, missing) for name, values in groups]
     if missing:
-        raise InputError(f"{path}: {listed(missing)}; {LOOKED_FOR}")
+        raise InputError(f"{path}: {listed(missing, gap='; ')}; {LOOKED_FOR}")
     return [entry for entry in entries if entry is not None]
 
 
@@ -116,14 +116,13 @@ def _groups(values: dict[str, Any], stem: str) -> list[tuple[str, dict[str, Any]
         cameras = [camera for camera in listed_cameras if isinstance(camera, dict)]
         if any(camera.get(KIND) == CHOSEN_KIND for camera in cameras):
             cameras = [camera for camera in cameras if camera.get(KIND) == CHOSEN_KIND]
-        return [(_name(camera, f"cam_{place:02d}"), camera) for place, camera in enumerate(cameras)]
+        return [(_name(camera, f"cam_{place:02d}"), _flat(camera)) for place, camera in enumerate(cameras)]
     if isinstance(listed_cameras, dict):
         values = listed_cameras
     groups = {name: _flat(group) for name, group in values.items() if isinstance(group, dict)}
     cameras_in_it = [(name, group) for name, group in groups.items() if find_array(group, MATRIX, [(3, 3)]) is not None]
-    if find_array(_flat(values), MATRIX, [(3, 3)]) is not None and len(cameras_in_it) < 2:
-        return [(stem, _flat(values))]
-    return cameras_in_it or [(stem, values)]
+    placed = [name for name, group in cameras_in_it if find_array(group, (*TRANSLATION, *EXTRINSICS)) is not None]
+    return cameras_in_it if placed or len(cameras_in_it) > 1 else [(stem, _flat(values))]
 
 
 def _flat(values: dict[str, Any]) -> dict[str, Any]:

@@ -44,7 +44,7 @@ def read_optitrack(path: Path) -> list[CalibrationEntry]:
     missing: list[str] = []
     entries = [_entry(node, missing) for node in colored or cameras]
     if missing:
-        raise InputError(f"{path}: {listed(missing)}; export the calibration again, from Motive 3.2 or later")
+        raise InputError(f"{path}: {listed(missing, gap='; ')}; export the calibration again, from Motive 3.2 or later")
     return sorted((entry for entry in entries if entry is not None), key=lambda entry: natural_key(entry.name))
 
 
@@ -54,7 +54,7 @@ def _entry(node: ElementTree.Element, missing: list[str]) -> CalibrationEntry | 
     for tag, keys in NEEDED.items():
         part = node.find(tag)
         attributes = {} if part is None else part.attrib
-        lacking = [key for key in keys if as_numbers(attributes.get(key)) is None]
+        lacking = [key for key in keys if not _is_number(attributes.get(key))]
         if lacking:
             missing.append(f"camera '{name}' has no <{tag}>" if part is None else f"<{tag}> of camera '{name}' has no {listed(lacking)}")
         else:
@@ -62,11 +62,12 @@ def _entry(node: ElementTree.Element, missing: list[str]) -> CalibrationEntry | 
     if len(found) < len(NEEDED):
         return None
     size, lens, place = found.values()
-    if not np.all(np.isfinite(size)):
-        missing.append(f"camera '{name}' has no size")
-        return None
     matrix = np.array([[lens[0], 0, lens[2]], [0, lens[1], lens[3]], [0, 0, 1]])
     rotation = OPENCV_FROM_MOTIVE @ place[3:].reshape(3, 3).T
     sides = (round(float(size[0])), round(float(size[1])))
-    with np.errstate(invalid="ignore", over="ignore"):
-        return CalibrationEntry(name, sides, matrix, lens[4:], rotation, -rotation @ place[:3], True)
+    return CalibrationEntry(name, sides, matrix, lens[4:], rotation, -rotation @ place[:3], True)
+
+
+def _is_number(text: str | None) -> bool:
+    value = as_numbers(text)
+    return value is not None and bool(np.isfinite(value))

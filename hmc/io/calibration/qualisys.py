@@ -43,7 +43,7 @@ def read_qualisys(path: Path) -> list[CalibrationEntry]:
     missing: list[str] = []
     entries = [_entry(node, missing) for node in root.iter("camera") if _is_active_video(node)]
     if missing:
-        raise InputError(f"{path}: {listed(missing)}")
+        raise InputError(f"{path}: {listed(missing, gap='; ')}")
     return sorted((entry for entry in entries if entry is not None), key=lambda entry: natural_key(entry.name))
 
 
@@ -60,12 +60,13 @@ def _entry(node: ElementTree.Element, missing: list[str]) -> CalibrationEntry | 
         nonlocal whole
         part = node.find(tag)
         attributes = {} if part is None else {**dict.fromkeys(optional.split(), "0"), **part.attrib}
-        found = [as_numbers(attributes.get(key)) for key in (*keys, *optional.split())]
-        if any(value is None or not np.isfinite(value) for value in found):
-            missing.append(f"camera '{name}' needs <{tag}> with the numbers {', '.join(keys)}")
+        found = {key: as_numbers(attributes.get(key)) for key in (*keys, *optional.split())}
+        lacking = [key for key, value in found.items() if value is None or not np.isfinite(value)]
+        if lacking:
+            missing.append(f"camera '{name}' needs <{tag}> with the numbers {', '.join(lacking)}")
             whole = False
             return np.zeros(len(found))
-        return np.array(found, float)
+        return np.array(list(found.values()), float)
 
     theia = node.find("fov_video") is None
     left, top, right, bottom = numbers("intrinsic", *SENSOR) if theia else numbers("fov_video", *SIDES)

@@ -47,7 +47,8 @@ WHOLE_RIG = (".toml", ".qca.txt", ".xcp", ".mcal", ".csv", ".txt")
 KNOWN = (
     "Anipose, Pose2Sim and FreeMoCap (calibration.toml, Calib*.toml, *_camera_calibration.toml), Caliscope (camera_array.toml, "
     "config.toml), EasyMocap (intri.yml with extri.yml), Qualisys and Theia (*.qca.txt), Vicon (*.xcp), OptiTrack (*.mcal), "
-    "HumanEva and bodytrack (*.cal), CMU Panoptic (calib*.json), OpenCV (*.yml, *.xml, cam*.json), projection matrices (projections.csv, *_par.txt)"
+    "HumanEva and bodytrack (*.cal), CMU Panoptic (calib*.json), OpenCV (*.yml, *.xml, cam*.json), projection matrices "
+    "(projections.csv, *_par.txt)"
 )
 XML_READERS = {"<calibrationProfile": read_optitrack, "<Cameras": read_vicon, "<calibration": read_qualisys}
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import cv2
+import numpy as np
 
 from hmc.errors import InputError
 from hmc.io.calibration.text import as_numbers, read_json, read_text
@@ -43,13 +44,10 @@ def read_storage(path: Path) -> dict[str, Any]:
 
 def _value(node: cv2.FileNode) -> Any:
     if node.isMap():
-        names = node.keys()
-        if {"rows", "cols", "data"} <= set(names):
-            dimensions = node.getNode("data")
-            if "dt" not in names:  # ROS writes matrices so
-                return as_numbers([dimensions.at(i).real() for i in range(dimensions.size())])
-            return node.mat()
-        return {name: _value(node.getNode(name)) for name in names}
+        # Matrices too are put together here: OpenCV's own way from a damaged one leads out of the memory.
+        values = {name: _value(node.getNode(name)) for name in node.keys()}
+        sizes = values.get("sizes", [values.get("rows"), values.get("cols")])
+        return _shaped(values["data"], sizes) if "data" in values and not {"rows", "sizes"}.isdisjoint(values) else values
     if node.isSeq():
         return [_value(node.at(i)) for i in range(node.size())]
     if node.isString():
@@ -64,7 +62,22 @@ def _plain(value: Any) -> Any:
     if not isinstance(value, dict):
         return value
     if value.get("type_id") == "opencv-matrix":
-        shape, numbers = as_numbers([value.get("rows"), value.get("cols")]), as_numbers(value.get("data"))
-        fits = shape is not None and numbers is not None and shape.shape == (2,) and shape.prod() == numbers.size and shape.min() > 0
-        return numbers.reshape(shape.astype(int)) if fits else None  # type: ignore[union-attr]
+        return _shaped(value.get("data"), [value.get("rows"), value.get("cols")])
+    if value.get("type_id") == "opencv-nd-matrix":
+        return _shaped(value.get("data"), value.get("sizes"))
     return {name: _plain(item) for name, item in value.items()}
+
+
+def _shaped(items: Any, sizes: Any) -> np.ndarray | None:
+    """Numbers in a row as an array of so many rows, columns ... (and channels, where there are more); None where they do not fit."""
+    numbers, shape = as_numbers(items), as_numbers(sizes)
+    if (
+        numbers is None
+        or not numbers.size
+        or shape is None
+        or not 1 <= shape.size <= 4
+        or not np.all((shape >= 1) & (shape <= numbers.size))
+    ):
+        return None
+    shape = shape.ravel().astype(int)
+    return numbers.reshape(*shape, -1) if numbers.size % shape.prod() == 0 else None

@@ -82,6 +82,6 @@ def as_numbers(value: Any) -> np.ndarray | None:
         return None
 
 
-def listed(words: list[str], most: int = 4) -> str:
+def listed(words: list[str], most: int = 4, gap: str = ", ") -> str:
     """Words in a row, the first few of many."""
-    return ", ".join(words[:most]) + (f" and {len(words) - most} more" if len(words) > most else "")
+    return gap.join(words[:most]) + (f" and {len(words) - most} more" if len(words) > most else "")

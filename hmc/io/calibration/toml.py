@@ -53,7 +53,7 @@ def read_toml(path: Path) -> list[CalibrationEntry]:
     lacking = {label: [key for key in KEYS if key not in table] for label, table in cameras.items()}
     gaps = [f"[{label}] has no {', '.join(f'`{key}`' for key in keys)}" for label, keys in lacking.items() if keys]
     if gaps:
-        raise InputError(f"{path}: {listed(gaps)}; each camera needs {', '.join(KEYS)}")
+        raise InputError(f"{path}: {listed(gaps, gap='; ')}; each camera needs {', '.join(KEYS)}")
     return [_entry(path, label, table) for label, table in cameras.items()]
 
 

@@ -40,7 +40,7 @@ def read_vicon(path: Path) -> list[CalibrationEntry]:
     missing: list[str] = []
     entries = [_entry(path, node, missing) for node in films or cameras]
     if missing:
-        raise InputError(f"{path}: {listed(missing)}")
+        raise InputError(f"{path}: {listed(missing, gap='; ')}")
     return sorted((entry for entry in entries if entry is not None), key=lambda entry: natural_key(entry.name))
 
 
