@@ -79,7 +79,7 @@ def find_files(recording: Path, kind: str, names: Sequence[str], settings: Mappi
     wanted = [name for name in names if name not in said and name not in exact]
     free = [item for item in items if item_name(item) not in names]
     guessed = _guess(recording, kind, wanted, free, _same)
-    if not guessed and len(wanted) == len(names):
+    if not guessed and len(wanted) == len(names) - len(said):
         guessed = _guess(recording, kind, wanted, free, _contained)
     notes = {name: f"{item}: taken for camera '{name}', by their names" for name, item in guessed.items()}
     return Found({**files, **{name: (item,) for name, item in guessed.items()}}, notes)

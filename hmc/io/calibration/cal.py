@@ -29,9 +29,9 @@ def read_cal(path: Path) -> CalibrationEntry:
     """
     words = read_text(path).replace(",", " ").split()
     values = as_numbers(words)
-    if values is None or len(values) not in (N_HUMANEVA, N_BODYTRACK):
+    if values is None or len(values) not in (N_HUMANEVA, N_BODYTRACK) or not np.all(np.isfinite(values)):
         raise InputError(
-            f"{path}: a .cal file holds {N_HUMANEVA} numbers (HumanEva) or {N_BODYTRACK} (bodytrack); found {len(words)} words"
+            f"{path}: a .cal file holds {N_HUMANEVA} numbers (HumanEva) or {N_BODYTRACK} (bodytrack), all finite; found {len(words)} words"
         )
     fx, fy, cx, cy, skew = values[:5]
     matrix = np.array([[fx, skew * fx, cx], [0, fy, cy], [0, 0, 1]])
