@@ -38,8 +38,8 @@ def find_files(recording: Path, kind: str, names: Sequence[str], settings: Mappi
     """Find the cameras' files in one of a recording's folders.
 
     What recording.toml says stands. Otherwise a file or folder that is called like the camera is the camera's. For cameras without one,
-    names that differ in case, punctuation, leading zeros, or camera for cam, are the same; and where nobody has a file by now, a file with
-    just one camera's name in its own is that camera's. Either must be clear: one file a camera, one camera a file.
+    names that differ in case, punctuation, leading zeros, or camera for cam, are the same; and where no camera has a file by now, a file
+    with just one camera's name in its own is that camera's, if so all have one. Either must be clear: one file a camera, one camera a file.
 
     Parameters
     ----------
@@ -76,11 +76,14 @@ def find_files(recording: Path, kind: str, names: Sequence[str], settings: Mappi
     given = {path.resolve() for paths in files.values() for path in paths}
     items = [item for item in footage_items(recording / kind) if item.resolve() not in given]
     exact = {item_name(item) for item in items}
+    if kind == "videos":  # no guess goes before images that bear the camera's name
+        exact |= {item_name(item) for item in footage_items(recording / "images")}
     wanted = [name for name in names if name not in said and name not in exact]
     free = [item for item in items if item_name(item) not in names]
     guessed = _guess(recording, kind, wanted, free, _same)
     if not guessed and len(wanted) == len(names) - len(said):
         guessed = _guess(recording, kind, wanted, free, _contained)
+        guessed = guessed if len(guessed) == len(wanted) else {}
     notes = {name: f"{item}: taken for camera '{name}', by their names" for name, item in guessed.items()}
     return Found({**files, **{name: (item,) for name, item in guessed.items()}}, notes)
 

@@ -149,6 +149,20 @@ def test_exact_names_come_first(told_apart):
     assert recording.problems == ()
 
 
+def test_no_guess_goes_before_images_by_name(told_apart):
+    """Nor is a guess made for some cameras only."""
+    rename(told_apart, [f"preview_cam{place}.avi" for place in range(5)])
+    (told_apart / "videos" / "preview_cam4.avi").unlink()
+    with pytest.raises(InputError, match="no videos/"):
+        open_recording(told_apart)
+    write_video(told_apart / "videos" / "late_cam0.avi", 2, (160, 120))
+    for place in range(5):
+        write_images(told_apart / "images" / f"cam_0{place}", range(3), (160, 120), lambda index, place=place: 50 + 30 * place)
+    recording = open_recording(told_apart)
+    assert_right_videos(recording)
+    assert recording.n_frames == 3 and not any("videos" in problem for problem in recording.problems)
+
+
 def test_what_is_not_clear_proposes_a_table(told_apart):
     rename(told_apart, [f"walk_cam{place}.avi" for place in range(5)])
     write_video(told_apart / "videos" / "run_cam3.avi", 2, (160, 120))
