@@ -18,6 +18,8 @@ __all__ = ["Camera", "Rig", "backproject", "look_at", "project", "undistort"]
 
 #: Points nearer than this to the camera's plane (metres) count as behind it.
 NEAR_M = 1e-6
+#: No image is larger than this on a side.
+MAX_SIDE_PX = 100_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,9 +35,10 @@ class Camera:
     matrix : ndarray, shape (3, 3)
         Intrinsic matrix K.
     distortions : ndarray, shape (5,)
-        k1, k2, p1, p2, k3 in OpenCV's model. Four values or fewer are padded with zeros.
+        k1, k2, p1, p2, k3 in OpenCV's model. Four values or fewer are padded with zeros; OpenCV's longer models (8, 12 or 14 values) are
+        taken where what follows k3 is zero.
     rotation : ndarray, shape (3, 3)
-        World to camera. A rotation vector (Rodrigues) is accepted too.
+        World to camera. A rotation vector (Rodrigues; 3, 3 x 1 or 1 x 3) is accepted too.
     translation : ndarray, shape (3,)
         World to camera, metres.
 
@@ -43,6 +46,15 @@ class Camera:
     ------
     InputError
         When a shape is wrong, a number is not finite or the rotation is not one.
+
+    Examples
+    --------
+    What ``cv2.calibrateCamera`` and ``cv2.solvePnP`` return is taken as it is:
+
+    >>> import numpy as np
+    >>> matrix, rvec, tvec = np.array([[500, 0, 319.5], [0, 500, 239.5], [0, 0, 1]]), np.zeros((3, 1)), np.array([[0.0], [0.0], [4.0]])
+    >>> Camera("cam_00", [640, 480], matrix, np.zeros((1, 5)), rvec, tvec).centre
+    array([ 0.,  0., -4.])
     """
 
     name: str
@@ -56,22 +68,32 @@ class Camera:
         def say(what: str) -> InputError:
             return InputError(f"camera '{self.name}': {what}")
 
-        if len(self.size) != 2 or min(self.size) < 1:
-            raise say(f"`size` must be [width, height] in pixels; got {list(self.size)}")
-        size = (int(self.size[0]), int(self.size[1]))
-        matrix = np.array(self.matrix, float)
+        def array(label: str) -> np.ndarray:
+            try:
+                return np.array(getattr(self, label), float)
+            except (ValueError, TypeError):
+                raise say(f"`{label}` must be numbers; got {str(getattr(self, label))[:60]!r}") from None
+
+        sides = array("size").ravel()
+        if sides.shape != (2,) or not np.all(np.isfinite(sides)) or sides.min() < 1 or sides.max() > MAX_SIDE_PX:
+            raise say(f"`size` must be [width, height] in pixels; got {sides.tolist()}")
+        size = (round(float(sides[0])), round(float(sides[1])))
+        matrix = array("matrix")
         if matrix.shape != (3, 3):
             raise say(f"`matrix` must be 3 x 3; got shape {matrix.shape}")
-        distortions = np.array(self.distortions, float).ravel()
-        if distortions.size > 5:
-            raise say(f"`distortions` takes k1, k2, p1, p2 and k3; got {distortions.size} numbers")
-        distortions = np.pad(distortions, (0, 5 - distortions.size))
-        rotation = np.array(self.rotation, float)
-        if rotation.shape == (3,):
-            rotation = _rotation_from_vector(rotation)
+        distortions = array("distortions").ravel()
+        if distortions[5:].any():
+            raise say(
+                f"`distortions` takes k1, k2, p1, p2 and k3; got {distortions.size} numbers, with {_beyond_k3(distortions)}: calibrate "
+                "without those terms"
+            )
+        distortions = np.pad(distortions[:5], (0, max(0, 5 - distortions.size)))
+        rotation = array("rotation")
+        if rotation.size == 3:
+            rotation = _rotation_from_vector(rotation.ravel())
         if rotation.shape != (3, 3):
             raise say(f"`rotation` must be a rotation vector (3) or a matrix (3 x 3); got shape {rotation.shape}")
-        translation = np.array(self.translation, float).ravel()
+        translation = array("translation").ravel()
         if translation.shape != (3,):
             raise say(f"`translation` must be 3 numbers in metres; got {translation.size}")
         for label, value in (("matrix", matrix), ("distortions", distortions), ("rotation", rotation), ("translation", translation)):
@@ -317,6 +339,13 @@ def look_at(name: str, size: tuple[int, int], position, target, fov_deg: float, 
     focal = size[0] / 2 / np.tan(np.radians(fov_deg) / 2)
     matrix = np.array([[focal, 0, (size[0] - 1) / 2], [0, focal, (size[1] - 1) / 2], [0, 0, 1]])
     return Camera(name, size, matrix, np.asarray(distortions, float), rotation, -rotation @ position)
+
+
+def _beyond_k3(distortions: np.ndarray) -> str:
+    """What a lens model longer than five numbers has that is not zero, in OpenCV's order."""
+    names = ("k4, k5, k6 (the rational model)", "s1 to s4 (thin prism)", "tilt")
+    parts = (distortions[5:8], distortions[8:12], distortions[12:])
+    return " and ".join(name for name, part in zip(names, parts, strict=True) if part.any())
 
 
 def _rotation_from_vector(vector: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ import numpy as np
 
 from hmc.camera.model import Camera, Rig
 
-__all__ = ["World", "in_world"]
+__all__ = ["World", "in_world", "moved_camera"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,21 +42,18 @@ class World:
         return World(self.rotation @ first.rotation, first.old_points(self.origin), self.scale * first.scale)
 
 
-def in_world(rig: Rig, world: World) -> Rig:
-    """The same cameras in new coordinates: a point and the new one of it fall on the same pixel.
+def moved_camera(camera: Camera, world: World) -> Camera:
+    """A camera in new coordinates: a point and the new one of it fall on the same pixel.
 
     Parameters
     ----------
-    rig : Rig
+    camera : Camera
     world : World
-
-    Returns
-    -------
-    Rig
     """
+    translation = world.scale * (camera.rotation @ world.origin + camera.translation)
+    return replace(camera, rotation=camera.rotation @ world.rotation.T, translation=translation)
 
-    def moved(camera: Camera) -> Camera:
-        translation = world.scale * (camera.rotation @ world.origin + camera.translation)
-        return replace(camera, rotation=camera.rotation @ world.rotation.T, translation=translation)
 
-    return Rig(tuple(moved(camera) for camera in rig))
+def in_world(rig: Rig, world: World) -> Rig:
+    """The same cameras in new coordinates (`moved_camera`)."""
+    return Rig(tuple(moved_camera(camera, world) for camera in rig))

@@ -7,9 +7,10 @@ merely odd is told too.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -21,10 +22,23 @@ from hmc.check.silhouettes import hull_findings
 from hmc.check.world_findings import world_findings
 from hmc.errors import InputError
 from hmc.io.calibration import CalibrationEntry, build_camera, read_entries
-from hmc.io.footage import IMAGE_SUFFIXES, VIDEO_SUFFIXES, Footage, read_footage
+from hmc.io.footage import Footage, read_footage
 from hmc.io.keypoints import open_keypoints
-from hmc.io.recording import Frame, Recording, find_views, gaps, iterate_frames, open_recording, wrong_sizes, wrong_units
+from hmc.io.naming import FILES, find_files, footage_items, item_name
+from hmc.io.recording import (
+    Frame,
+    Recording,
+    fitted,
+    gaps,
+    iterate_frames,
+    missing_views,
+    open_recording,
+    wrong_sizes,
+    wrong_units,
+)
 from hmc.io.settings import read_settings
+from hmc.io.views import find_views
+from hmc.io.world import world_of
 
 __all__ = ["Finding", "Inspection", "check_recording", "inspect_recording"]
 
@@ -99,11 +113,12 @@ def inspect_recording(path: str | Path, cameras: Sequence[str] | None = None, re
 
     if not path.is_dir():
         return Inspection((Finding("error", f"{path}: no such folder"),))
-    room = None
+    settings: dict[str, Any] = {}
     try:
-        room = read_settings(path).get("room")
+        settings = read_settings(path)
     except InputError as error:
         say("error", [str(error)])
+    room = settings.get("room")
     try:
         entries = read_entries(path)
     except InputError as error:
@@ -112,13 +127,14 @@ def inspect_recording(path: str | Path, cameras: Sequence[str] | None = None, re
     unknown = [name for name in cameras or () if name not in {entry.name for entry in entries}]
     if unknown:
         say("error", [f"{path}: no camera named '{unknown[0]}' in the calibration; it has {', '.join(entry.name for entry in entries)}"])
-    if cameras is None:
-        say("note", unused_views(path, [entry.name for entry in entries]))
     all_names = [entry.name for entry in entries]
+    files, guesses = named_files(path, all_names, settings)
+    if cameras is None:
+        say("note", unused_views(path, all_names, files))
     entries = [entry for entry in entries if cameras is None or entry.name in cameras]
 
-    views = _views_by_camera(path, [entry.name for entry in entries], all_names, say)
-    rig = _usable_rig(entries, {name: view.size for name, view in views.items()}, say)
+    views = _views_by_camera(path, [entry.name for entry in entries], all_names, settings, say)
+    rig = _usable_rig(entries, {name: view.size for name, view in views.items()}, settings, say)
     if rig is None:
         return Inspection(_sorted(found))
     own = [views.get(camera.name) for camera in rig]
@@ -141,7 +157,8 @@ def inspect_recording(path: str | Path, cameras: Sequence[str] | None = None, re
         except InputError as error:
             say("error", [str(error)])
     if recording is not None:
-        say("warning", recording.problems)
+        say("warning", [problem for problem in recording.problems if problem not in guesses])
+        say("note", [problem for problem in recording.problems if problem in guesses])
         if recording.room_is_estimated:
             low, high = recording.room.round(1).tolist()
             say("note", [f"recording.toml gives no `room`; estimated from the rig: {low} to {high} m"])
@@ -167,7 +184,9 @@ def _sorted(found: Sequence[Finding]) -> tuple[Finding, ...]:
     return tuple(sorted(dict.fromkeys(found), key=lambda finding: order.index(finding.severity)))
 
 
-def _views_by_camera(path: Path, names: Sequence[str], all_names: Sequence[str], say: Say) -> dict[str, Footage]:
+def _views_by_camera(
+    path: Path, names: Sequence[str], all_names: Sequence[str], settings: Mapping[str, Any], say: Say
+) -> dict[str, Footage]:
     """The images, or else the silhouettes, of each camera that has some; what is wrong with the others is told."""
     unreadable = set()
 
@@ -175,19 +194,20 @@ def _views_by_camera(path: Path, names: Sequence[str], all_names: Sequence[str],
         unreadable.add(name)
         say("error", [sentence])
 
-    footage, silhouettes = find_views(path, names, all_names, count=False, on_error=on_error)
+    footage, silhouettes = find_views(path, names, all_names, count=False, on_error=on_error, settings=settings)
     views = {name: image or mask for name, image, mask in zip(names, footage, silhouettes, strict=True)}
-    for name in names:
-        if views[name] is None and name not in unreadable:
-            say("error", [f"{path}: camera '{name}' has no video, images or silhouettes; name them {name}.* or leave it out: --cameras"])
+    known = [name for name in names if name not in unreadable]
+    say("error", missing_views(path, known, [views[name] for name in known]))
     return {name: view for name, view in views.items() if view is not None}
 
 
-def _usable_rig(entries: Sequence[CalibrationEntry], sizes: dict, say: Say) -> Rig | None:
+def _usable_rig(
+    entries: Sequence[CalibrationEntry], sizes: dict[str, tuple[int, int]], settings: Mapping[str, Any], say: Say
+) -> Rig | None:
     cameras: list[Camera] = []
     for entry in entries:
         try:
-            cameras.append(build_camera(entry, sizes))
+            cameras.append(fitted(build_camera(entry, sizes, world_of(settings)), sizes, settings))
         except InputError as error:
             say("error", [str(error)])
     try:
@@ -198,15 +218,27 @@ def _usable_rig(entries: Sequence[CalibrationEntry], sizes: dict, say: Say) -> R
         return None
 
 
-def unused_views(path: Path, names: Sequence[str]) -> list[str]:
+def named_files(path: Path, names: Sequence[str], settings: Mapping[str, Any]) -> tuple[set[Path], set[str]]:
+    """Files that are cameras' without bearing their names, and the sentences on those that were guessed."""
+    files: set[Path] = set()
+    guesses: set[str] = set()
+    for kind in FILES:
+        try:
+            found = find_files(path, kind, names, settings)
+        except InputError:
+            continue  # told where the files are opened
+        files.update(file.resolve() for own in found.files.values() for file in own)
+        guesses.update(found.notes.values())
+    return files, guesses
+
+
+def unused_views(path: Path, names: Sequence[str], files: set[Path]) -> list[str]:
     """A sentence for each video or image folder without a camera in the calibration."""
-    folders = [path / name for name in ("videos", "images", "silhouettes", "background") if (path / name).is_dir()]
-    suffixes = VIDEO_SUFFIXES | IMAGE_SUFFIXES
     return [
         f"{item}: no camera of this name in the calibration; it is not used"
-        for folder in folders
-        for item in sorted(folder.iterdir())
-        if (item.is_dir() or item.suffix.lower() in suffixes) and item.stem not in names
+        for kind in FILES
+        for item in footage_items(path / kind)
+        if item_name(item) not in names and not any(file == item.resolve() or item.resolve() in file.parents for file in files)
     ]
 
 

@@ -157,12 +157,12 @@ def run(args: argparse.Namespace) -> int:
 
 def _in_images(args: argparse.Namespace, estimated, true_poses, truth_images: Path | None, selected):
     """Scores in images, against marked landmarks or the projected true joints."""
-    from hmc.io.calibration.read import read_calibration
+    from hmc.io.recording import read_rig
     from hmc.metrics.scores.images import THRESHOLDS_PX, evaluate_images, image_landmarks, read_image_landmarks
 
     if args.recording is None:
         raise InputError("scores in images need the RECORDING, for its calibration")
-    rig = read_calibration(args.recording)
+    rig = read_rig(args.recording)
     if truth_images is not None:
         truth = selected(read_image_landmarks(truth_images, rig.names))
     else:

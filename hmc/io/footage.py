@@ -6,7 +6,7 @@ Frames stream: a reader holds one decoder and one image. A frame that cannot be 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,11 +15,19 @@ import numpy as np
 
 from hmc.errors import InputError
 from hmc.io.calibration import natural_key
+from hmc.io.naming import IMAGE_SUFFIXES, VIDEO_SUFFIXES
 
-__all__ = ["IMAGE_SUFFIXES", "VIDEO_SUFFIXES", "Footage", "find_footage", "open_images", "open_video", "read_footage", "starting_at"]
-
-VIDEO_SUFFIXES = frozenset({".mp4", ".avi", ".mov", ".mkv", ".m4v", ".mpg", ".mpeg", ".webm", ".wmv", ".mts", ".ts", ".h264"})
-IMAGE_SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp", ".pgm", ".ppm"})
+__all__ = [
+    "IMAGE_SUFFIXES",
+    "VIDEO_SUFFIXES",
+    "Footage",
+    "find_footage",
+    "open_files",
+    "open_images",
+    "open_video",
+    "read_footage",
+    "starting_at",
+]
 
 #: A video is over when this many frames in a row cannot be decoded.
 MAX_FAILURES = 25
@@ -88,6 +96,20 @@ def find_footage(folder: Path, name: str, first_number: int | None = None, count
         if path.stem == name and path.suffix.lower() in IMAGE_SUFFIXES:
             return _footage_of_images(path, {0: path})
     return None
+
+
+def open_files(files: Sequence[Path], first_number: int | None = None, count: bool = True) -> Footage | None:
+    """The footage in the given place: a video, a folder of images, or images. Arguments and errors as `find_footage`."""
+    if not files:
+        return None
+    path = files[0]
+    if path.is_dir():
+        return open_images(path, first_number)
+    if path.suffix.lower() not in IMAGE_SUFFIXES:
+        return open_video(path, count)
+    if len(files) == 1:
+        return _footage_of_images(path, {0: path})
+    return _footage_of_images(path.parent, number_files(files), first_number or 0)
 
 
 def open_video(path: Path, count: bool = True) -> Footage:
@@ -173,7 +195,12 @@ def open_images(folder: Path, first_number: int | None = None) -> Footage:
 
 def number_images(folder: Path) -> dict[int, Path]:
     """The images of a folder by the number in their names (or their place in the natural order), before any shift."""
-    files = sorted((path for path in folder.iterdir() if path.suffix.lower() in IMAGE_SUFFIXES), key=lambda path: natural_key(path.name))
+    return number_files(path for path in folder.iterdir() if path.suffix.lower() in IMAGE_SUFFIXES)
+
+
+def number_files(files: Iterable[Path]) -> dict[int, Path]:
+    """As `number_images`, of the images given."""
+    files = sorted(files, key=lambda path: natural_key(path.name))
     numbers = [re.findall(r"\d+", path.stem) for path in files]
     by_number = {int(found[-1]): path for found, path in zip(numbers, files, strict=True) if found}
     return by_number if len(by_number) == len(files) else dict(enumerate(files))

@@ -9,20 +9,25 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from hmc.camera.coverage import estimate_room
-from hmc.camera.model import Rig
+from hmc.camera.model import Camera, Rig
 from hmc.camera.reduction import reduce_image, reduce_mask, reduced_camera, reduction_factors
+from hmc.camera.world import World
 from hmc.errors import InputError
 from hmc.io.calibration import build_camera, read_entries
-from hmc.io.footage import Footage, find_footage, number_images, read_footage, starting_at
+from hmc.io.footage import Footage, read_footage
+from hmc.io.naming import footage_items, item_name
 from hmc.io.settings import read_settings
+from hmc.io.sizes import fit_size, size_cure
+from hmc.io.views import find_background, find_views
+from hmc.io.world import world_of
 
 __all__ = [
     "Frame",
@@ -42,6 +47,8 @@ logger = logging.getLogger("hmc")
 DEFAULT_FPS = 30.0
 #: Cameras are no further than this (median, metres) from the world's origin: beyond, the calibration is in millimetres.
 MAX_CAMERA_DISTANCE_M = 150.0
+#: So far away, in a unit that is not known, they are in millimetres rather than centimetres.
+LEAST_MM = 900.0
 #: Silhouettes from files that lose detail are cut at the middle; from others, anything but black counts.
 LOSSY_SUFFIXES = frozenset({".jpg", ".jpeg", ".webp"})
 
@@ -184,11 +191,12 @@ def open_recording(
         raise InputError(
             f"{path / 'recording.toml'}: `first_frame` names '{strangers[0]}', no camera of the calibration ({', '.join(all_names)})"
         )
-    footage, silhouettes = find_views(path, names, all_names, starts=starts)
+    footage, silhouettes = find_views(path, names, all_names, starts=starts, settings=settings)
     both = [image or mask for image, mask in zip(footage, silhouettes, strict=True)]
     sizes = {name: view.size for name, view in zip(names, both, strict=True) if view is not None}
     try:
-        rig = Rig(tuple(build_camera(entry, sizes) for entry in entries))
+        world = World() if any_world else world_of(settings)
+        rig = Rig(tuple(fitted(build_camera(entry, sizes, world), sizes, settings) for entry in entries))
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     units = () if any_world else wrong_units(rig)
@@ -212,7 +220,7 @@ def open_recording(
             f"0 to {total - 1}: choose other --start and --frames"
         )
 
-    background = _find_background(path, rig, problems)
+    background = find_background(path, rig, all_names, settings, problems)
     fps = settings.get("fps") or next((view.fps for view in footage if view is not None and view.fps), DEFAULT_FPS)
     room = settings.get("room")
     return Recording(
@@ -356,85 +364,24 @@ def background_frames(recording: Recording, camera_index: int, limit: int | None
         yield from (reduce_image(image, recording.factors[camera_index]) for image in reader if image is not None)
 
 
-def find_views(
-    path: Path,
-    names: Sequence[str],
-    all_names: Sequence[str],
-    count: bool = True,
-    on_error: Callable[[str, str], None] | None = None,
-    starts: Mapping[str, int] | None = None,
-) -> tuple[list[Footage | None], list[Footage | None]]:
-    """The images (in ``videos/``, else in ``images/``) and the silhouettes of each camera.
-
-    Parameters
-    ----------
-    path : Path
-        Folder of the recording.
-    names : sequence of str
-        The cameras wanted.
-    all_names : sequence of str
-        All cameras of the calibration: numbered images count from the smallest number of all, whichever are wanted.
-    count : bool
-        As `hmc.io.footage.open_video`.
-    on_error : callable, optional
-        Called with a camera's name and what is wrong with its files, which then count as missing; by default that is raised.
-    starts : mapping of str to int, optional
-        The frame of a camera's files that is frame 0 of the recording, where it is not the first.
-    """
-
-    def find(folder: Path, wanted: Sequence[str], first: int) -> list[Footage | None]:
-        def one(name: str) -> Footage | None:
-            found = find_footage(folder, name, first, count)
-            return found and starting_at(found, (starts or {}).get(name, 0))
-
-        return [settled(name, found) for name, found in zip(wanted, _side_by_side(one, wanted), strict=True)]
-
-    def settled(name: str, found: Future[Footage | None]) -> Footage | None:
-        try:
-            return found.result()
-        except InputError as error:
-            if on_error is None:
-                raise
-            on_error(name, str(error))
-            return None
-
-    images = path / "images"
-    first = _first_number(images, all_names)
-    footage = find(path / "videos", names, 0)
-    left = [name for name, found in zip(names, footage, strict=True) if found is None]
-    others = dict(zip(left, find(images, left, first), strict=True))
-    footage = [found or others[name] for name, found in zip(names, footage, strict=True)]
-    if not any(footage):
-        first = _first_number(path / "silhouettes", all_names)
-    return footage, find(path / "silhouettes", names, first)
+def fitted(camera: Camera, sizes: Mapping[str, tuple[int, int]], settings: Mapping[str, Any]) -> Camera:
+    """The camera for images of their size, where recording.toml says how they came to have another than the calibration's."""
+    fit, size = settings.get("image_size"), sizes.get(camera.name)
+    return camera if fit is None or size is None else fit_size(camera, size, fit)
 
 
-def _side_by_side(find: Callable[[str], Footage | None], names: Sequence[str]) -> list[Future[Footage | None]]:
-    """What is found of each camera, in threads: decoders, which do most of the work, let each other run."""
-    with ThreadPoolExecutor() as pool:
-        return [pool.submit(find, name) for name in names]
-
-
-def _first_number(folder: Path, names: Sequence[str]) -> int:
-    numbers = [min(number_images(folder / name), default=0) for name in names if (folder / name).is_dir()]
-    return min(numbers, default=0)
-
-
-def _find_background(path: Path, rig: Rig, problems: list[str]) -> list[Footage | None]:
-    """The empty scene of each camera; what cannot be used is left out and added to the problems."""
-    background: list[Footage | None] = []
-    coming = _side_by_side(lambda name: find_footage(path / "background", name, count=False), rig.names)
-    for camera, outcome in zip(rig, coming, strict=True):
-        found = None
-        try:
-            found = outcome.result()
-        except InputError as error:
-            problems.append(f"{error}; going on without this background")
-        if found is not None and found.size != camera.size:
-            problems.append(f"{found.path}: background is {_by(found.size)} and the camera {_by(camera.size)}; going on without it")
-            found = None
-        background.append(found)
-    return background
+def read_rig(path: Path) -> Rig:
+    """The rig of a recording as `open_recording` has it, whether or not there are images. Errors as there."""
+    settings, entries = read_settings(path), read_entries(path)
+    names, sizes = [entry.name for entry in entries], {}
+    if "image_size" in settings or any(entry.size is None for entry in entries):
+        footage, masks = find_views(path, names, names, count=False, on_error=lambda name, sentence: None, settings=settings)
+        views = {name: image or mask for name, image, mask in zip(names, footage, masks, strict=True)}
+        sizes = {name: view.size for name, view in views.items() if view is not None}
+    try:
+        return Rig(tuple(fitted(build_camera(entry, sizes, world_of(settings)), sizes, settings) for entry in entries))
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
 
 
 def gaps(views: Sequence[Footage | None]) -> list[str]:
@@ -455,12 +402,17 @@ def common_length(lengths: Sequence[int]) -> int:
 
 def missing_views(path: Path, names: Sequence[str], views: Sequence[Footage | None]) -> list[str]:
     """One sentence for each camera without images and silhouettes."""
+    lost = [name for name, view in zip(names, views, strict=True) if view is None]
+    if not lost:
+        return []
+    used = {view.path for view in views if view is not None}
+    spare = next((item for item in footage_items(path / "videos") if item not in used and item_name(item) not in names), None)
+    cure = f'say whose is whose in recording.toml: videos = {{ "{lost[0]}" = "videos/{spare.name if spare else "FILE.mp4"}", ... }}'
     if not any(views):
-        return [f"{path}: no videos/, images/ or silhouettes/ with the cameras' names ({', '.join(names)})"]
+        return [f"{path}: no videos/, images/ or silhouettes/ with the cameras' names ({', '.join(names)}); name them so, or {cure}"]
     return [
-        f"{path}: camera '{name}' of the calibration has no video, images or silhouettes; name them so, or leave it out: --cameras"
-        for name, view in zip(names, views, strict=True)
-        if view is None
+        f"{path}: camera '{name}' of the calibration has no video, images or silhouettes; name them so, {cure}, or leave it out: --cameras"
+        for name in lost
     ]
 
 
@@ -468,20 +420,21 @@ def wrong_sizes(rig: Rig, views: Sequence[Footage | None]) -> list[str]:
     """One sentence for each camera whose images have not the size of its calibration."""
     return [
         f"{view.path}: images are {_by(view.size)} but the calibration of '{camera.name}' says {_by(camera.size)}; "
-        "calibrate at the images' size, or correct `size` and `matrix`"
+        f"{size_cure(camera.size, view.size)}"
         for camera, view in zip(rig, views, strict=True)
         if view is not None and view.size != camera.size
     ]
 
 
 def wrong_units(rig: Rig) -> list[str]:
-    """A sentence when the cameras stand so far away that the calibration must be in millimetres."""
+    """A sentence when the cameras stand so far away that the calibration must be in millimetres or centimetres."""
     distance = float(np.median(np.linalg.norm([camera.translation for camera in rig], axis=1)))
     if distance <= MAX_CAMERA_DISTANCE_M:
         return []
+    unit, name, other = ("cm", "centimetres", "mm") if distance < LEAST_MM else ("mm", "millimetres", "cm")
     return [
-        f"calibration: cameras stand {distance:,.0f} m from the origin, which looks like millimetres; "
-        "write the calibration in metres by: hmc world RECORDING"
+        f"calibration: cameras stand {distance:,.0f} m from the origin, which looks like {name}; "
+        f'write units = "{unit}" (or "{other}") in recording.toml, or let it be found out by: hmc world RECORDING'
     ]
 
 

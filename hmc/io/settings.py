@@ -1,4 +1,4 @@
-"""The optional ``recording.toml`` of a recording: name, rate, room, persons."""
+"""The optional ``recording.toml`` of a recording: name, rate, room, persons; the calibration's units and axes; whose files are whose."""
 
 from __future__ import annotations
 
@@ -12,10 +12,13 @@ from typing import Any
 import numpy as np
 
 from hmc.errors import InputError
+from hmc.io.naming import FILES, PLACE
+from hmc.io.sizes import FITS
+from hmc.io.world import UNITS, UPS
 
 __all__ = ["read_settings"]
 
-SETTINGS = ("name", "fps", "frames", "units", "up", "room", "persons", "subject_height_m", "first_frame")
+SETTINGS = ("name", "fps", "frames", "units", "up", "room", "persons", "subject_height_m", "first_frame", "image_size", *FILES)
 #: No room is wider (metres): beyond, it is in millimetres.
 MAX_ROOM_M = 300.0
 
@@ -32,8 +35,8 @@ def read_settings(path: Path) -> dict[str, Any]:
     if not file.is_file():
         return {}
     try:
-        settings = tomllib.loads(file.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        settings = tomllib.loads(file.read_text(encoding="utf-8-sig"))
+    except (ValueError, RecursionError) as error:
         raise InputError(f"{file}: not a TOML file ({error}); mend or remove it") from None
     for key in settings:
         if key not in SETTINGS:
@@ -53,8 +56,17 @@ def _checked(settings: Mapping[str, Any], file: Path) -> dict[str, Any]:
     checked = dict(settings)
     fps: Any = settings.get("fps")
     demand("name", isinstance(settings.get("name"), str), "a text")
-    demand("units", settings.get("units") == "m", 'in metres, units = "m": convert the calibration and the room')
-    demand("up", settings.get("up") == "z", 'the z axis, up = "z": turn the calibration')
+    units: Any = settings.get("units")
+    up = settings.get("up")
+    known = isinstance(units, str) and units in UNITS
+    demand("units", known or (is_number(units) and 0 < units < 1e6), 'those of the calibration: "m", "cm", "mm" or metres a unit')
+    demand("up", isinstance(up, str) and up in UPS, f"the calibration's axis that points up, one of {', '.join(UPS)}")
+    demand("image_size", settings.get("image_size") in FITS, f"one of {', '.join(FITS)}")
+    for key in FILES:
+        files = settings.get(key)
+        pattern = isinstance(files, str) and files.count(PLACE) == 1
+        table = isinstance(files, dict) and all(isinstance(file, str) and file for file in files.values())
+        demand(key, pattern or table, f'a table {{ cam_00 = "{key}/FILE" }} or a pattern such as "{key}/{PLACE}_*.mp4"')
     demand("fps", is_number(fps) and fps > 0, "a number above 0")
     for key, least in (("frames", 1), ("persons", 0)):
         value = settings.get(key)

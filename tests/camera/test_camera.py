@@ -159,7 +159,13 @@ GOOD = {
         ("matrix", np.eye(2), "`matrix` must be 3 x 3"),
         ("matrix", np.diag([-500.0, 500, 1]), "no intrinsic matrix"),
         ("matrix", np.diag([np.nan, 500, 1]), "`matrix` holds a number that is not finite"),
-        ("distortions", np.zeros(8), "k1, k2, p1, p2 and k3; got 8"),
+        ("size", "wide", "`size` must be numbers"),
+        ("size", (1e12, 480), "`size` must be"),
+        ("matrix", [["a", 0, 0]], "`matrix` must be numbers"),
+        ("matrix", [[500, 0], [0]], "`matrix` must be numbers"),
+        ("distortions", [[0, 0, 0, 0, 0, 0.1, 0, 0]], "got 8 numbers, with k4, k5, k6"),
+        ("distortions", [*[0] * 8, 0.1, 0, 0, 0], r"got 12 numbers, with s1 to s4 \(thin prism\): calibrate"),
+        ("distortions", [*[0] * 13, 0.1], "got 14 numbers, with tilt"),
         ("distortions", [np.inf], "`distortions` holds"),
         ("rotation", np.zeros((2, 2)), "rotation vector"),
         ("rotation", np.diag([1.0, 1, -1]), "not a rotation"),
@@ -181,6 +187,22 @@ def test_a_rotation_vector_is_a_rotation():
     camera = Camera(**{**GOOD, "rotation": vector})
     assert_allclose(camera.rotation, cv2.Rodrigues(vector)[0], atol=1e-12)
     assert_allclose(camera.rotation, Rotation.from_rotvec(vector).as_matrix())
+
+
+@pytest.mark.parametrize("length", [0, 4, 5, 8, 12, 14])
+def test_what_opencv_returns_is_taken(length):
+    """Columns from `calibrateCamera` and `solvePnP`, a row of distortions of any of its lengths, a size in any form."""
+    rvec, tvec = np.array([[0.3], [-1.2], [0.5]]), np.array([[0.1], [0.2], [4.0]])
+    distortions = np.array([-0.2, 0.05, 0.001, -0.002, 0.01, *[0.0] * 9])[None, :length]
+    points = np.random.default_rng(0).uniform(-1, 1, (20, 3))
+    for size in ([640, 480], np.array([640, 480]), (640.0, 480.0), np.array([[640], [480]])):
+        camera = Camera("a", size, GOOD["matrix"], distortions, rvec, tvec)
+        assert camera.size == (640, 480) and all(type(side) is int for side in camera.size)
+        expected = cv2.projectPoints(points, rvec, tvec, GOOD["matrix"], distortions if length else None)[0][:, 0]
+        assert_allclose(project(camera, points)[0], expected, atol=1e-9)
+    for turned in (rvec.T, rvec.ravel(), cv2.Rodrigues(rvec)[0]):
+        again = Camera("a", (640, 480), GOOD["matrix"], distortions, turned, tvec.T)
+        assert_allclose(again.projection, camera.projection, atol=1e-12)
 
 
 def test_cameras_cannot_be_changed_from_outside():

@@ -134,7 +134,7 @@ def test_many_faults_at_once(recording_folder):
     for words in (
         "unknown key `fsp`; did you mean `fps`?",
         "camera 'cam_00': `translation` holds a number that is not finite",
-        "camera 'cam_01' has no video",
+        "camera 'cam_01' of the calibration has no video",
         "cam_02.avi: this video cannot be read",
         "cam_04.avi: images are 80 x 60 but the calibration of 'cam_04' says 160 x 120",
     ):

@@ -300,7 +300,7 @@ def test_what_cannot_be_used_is_refused(recording_folder, spoil, message):
 def test_millimetres_are_refused(recording_folder, ring):
     far = Rig(tuple(replace(camera, translation=1000 * camera.translation) for camera in ring))
     write_calibration(recording_folder / "calibration.toml", far)
-    with pytest.raises(InputError, match="looks like millimetres; divide every `translation` by 1000"):
+    with pytest.raises(InputError, match='looks like millimetres; write units = "mm"'):
         open_recording(recording_folder)
 
 
@@ -334,8 +334,20 @@ def test_no_such_folder(tmp_path):
         ("persons = -1", "`persons` must be a whole number"),
         ("persons = 1.5", "`persons` must be a whole number"),
         ("name = 3", "`name` must be a text"),
-        ('units = "mm"', "`units` must be in metres"),
-        ('up = "y"', "`up` must be the z axis"),
+        ('units = "inch"', '`units` must be those of the calibration: "m", "cm", "mm" or metres a unit; got \'inch\''),
+        ("units = 0", "`units` must be those"),
+        ("units = inf", "`units` must be those"),
+        ("units = true", "`units` must be those"),
+        ('units = ["mm"]', "`units` must be those"),
+        ('up = "w"', "`up` must be the calibration's axis that points up, one of z, -z, y, -y, x, -x"),
+        ('up = ["y"]', "`up` must be"),
+        ('image_size = "half"', "`image_size` must be one of scaled, padded"),
+        ('videos = "videos/a.mp4"', r'`videos` must be a table \{ cam_00 = "videos/FILE" \} or a pattern'),
+        ("videos = { cam_00 = 3 }", "`videos` must be a table"),
+        ("silhouettes = []", "`silhouettes` must be a table"),
+        ('videos = { cam_77 = "a.mp4" }', "`videos` names 'cam_77', no camera of the calibration"),
+        ('videos = { cam_00 = "gone.mp4" }', "`videos` gives camera 'cam_00' the file .*gone.mp4, which is not there"),
+        ('videos = "/{camera}.mp4"', "`videos` is no pattern"),
         ("subject_height_m = [177]", "`subject_height_m` must be statures in metres"),
         ("room = [[0, 0, 0], [1, 1]]", r"`room` must be \[\[x0"),
         ("room = [[0, 0, 0], [1, -1, 2]]", r"`room` must be \[\[x0"),

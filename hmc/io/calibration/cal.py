@@ -8,6 +8,7 @@ import numpy as np
 
 from hmc.errors import InputError
 from hmc.io.calibration.entry import MM, CalibrationEntry
+from hmc.io.calibration.text import as_numbers, read_text
 
 __all__ = ["read_cal"]
 
@@ -26,15 +27,12 @@ def read_cal(path: Path) -> CalibrationEntry:
     InputError
         When there are not 22 or 25 numbers.
     """
-    words = path.read_text(encoding="utf-8", errors="replace").replace(",", " ").split()
-    try:
-        values = np.array([float(word) for word in words])
-    except ValueError:
-        values = np.zeros(0)
-    if len(values) not in (N_HUMANEVA, N_BODYTRACK):
+    words = read_text(path).replace(",", " ").split()
+    values = as_numbers(words)
+    if values is None or len(values) not in (N_HUMANEVA, N_BODYTRACK) or not np.all(np.isfinite(values)):
         raise InputError(
-            f"{path}: a .cal file holds {N_HUMANEVA} numbers (HumanEva) or {N_BODYTRACK} (bodytrack); found {len(words)} words"
+            f"{path}: a .cal file holds {N_HUMANEVA} numbers (HumanEva) or {N_BODYTRACK} (bodytrack), all finite; found {len(words)} words"
         )
     fx, fy, cx, cy, skew = values[:5]
     matrix = np.array([[fx, skew * fx, cx], [0, fy, cy], [0, 0, 1]])
-    return CalibrationEntry(path.stem, None, matrix, values[5:10], values[10:19].reshape(3, 3), values[19:22] * MM)
+    return CalibrationEntry(path.stem, None, matrix, values[5:10], values[10:19].reshape(3, 3), values[19:22] * MM, True)

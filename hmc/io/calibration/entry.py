@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from hmc.camera.model import Camera
+from hmc.camera.world import World, moved_camera
 from hmc.errors import InputError
 
 __all__ = ["CalibrationEntry", "build_camera", "natural_key"]
@@ -19,7 +21,8 @@ MM = 1e-3
 class CalibrationEntry(NamedTuple):
     """One camera as a file states it; the fields are those of `hmc.camera.model.Camera`, unchecked.
 
-    ``size`` is None where the format has no place for it: it then comes from the images.
+    ``size`` is None where the format has no place for it: it then comes from the images. ``metric`` says that the format fixes its unit, so
+    that ``translation`` is in metres, whatever recording.toml says.
     """
 
     name: str
@@ -28,16 +31,19 @@ class CalibrationEntry(NamedTuple):
     distortions: np.ndarray
     rotation: np.ndarray
     translation: np.ndarray
+    metric: bool = False
 
 
-def build_camera(entry: CalibrationEntry, sizes: Mapping[str, tuple[int, int]] | None = None) -> Camera:
-    """Check an entry and make it a camera.
+def build_camera(entry: CalibrationEntry, sizes: Mapping[str, tuple[int, int]] | None = None, world: World | None = None) -> Camera:
+    """Check an entry and make it a camera, in metres and with z up.
 
     Parameters
     ----------
     entry : CalibrationEntry
     sizes : mapping from camera name to (width, height), optional
         Used where the file states no size.
+    world : World, optional
+        The package's from the calibration's own; by default they are the same.
 
     Raises
     ------
@@ -49,7 +55,10 @@ def build_camera(entry: CalibrationEntry, sizes: Mapping[str, tuple[int, int]] |
         raise InputError(
             f"camera '{entry.name}': the calibration states no image size and there are no images to take it from; give `size`"
         )
-    return Camera(entry.name, size, entry.matrix, entry.distortions, entry.rotation, entry.translation)
+    camera = Camera(entry.name, size, entry.matrix, entry.distortions, entry.rotation, entry.translation)
+    if world is None:
+        return camera
+    return moved_camera(camera, replace(world, scale=1.0) if entry.metric else world)
 
 
 def natural_key(text: str) -> list:

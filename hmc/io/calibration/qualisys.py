@@ -1,4 +1,4 @@
-"""Qualisys' calibration export, ``.qca.txt``: XML; 1/64 pixel, millimetres, camera axes in the room's frame."""
+"""Qualisys' calibration export, ``.qca.txt``, and Theia's file that looks like it: XML, millimetres."""
 
 from __future__ import annotations
 
@@ -9,33 +9,42 @@ import numpy as np
 
 from hmc.errors import InputError
 from hmc.io.calibration.entry import MM, CalibrationEntry, natural_key
+from hmc.io.calibration.text import as_numbers, listed, read_xml
 
 __all__ = ["read_qualisys"]
 
 SUBPIXELS = 64
 #: Qualisys' camera looks along -z with y up; OpenCV's looks along z with y down.
 OPENCV_FROM_QUALISYS = np.diag([1.0, -1.0, -1.0])
+SIDES = ("left", "top", "right", "bottom")
+SENSOR = ("sensorMinU", "sensorMinV", "sensorMaxU", "sensorMaxV")
+LENS = ("focalLengthU", "focalLengthV", "centerPointU", "centerPointV")
+DISTORTIONS = ("radialDistortion1", "radialDistortion2", "tangentalDistortion1", "tangentalDistortion2")
+PLACE = ("x", "y", "z", *(f"r{row}{column}" for row in (1, 2, 3) for column in (1, 2, 3)))
 
 
 def read_qualisys(path: Path) -> list[CalibrationEntry]:
     """Read a Qualisys calibration the way Pose2Sim's converter does, so that both give the same cameras.
 
     Video cameras only (model "... Video ..." or "none"), active ones, in the natural order of their serial numbers, which are their names.
-    The transform holds the camera's place in the room (mm) and a rotation whose rows are the camera's axes. Focal lengths and centres are
-    in 1/64 pixel; the converter divides the distortion coefficients by 64 too, which makes them all but vanish, and so do we: the
+    The transform holds the camera's place in the room (mm) and a rotation whose rows are the camera's axes. Focal lengths, centres and skew
+    are in 1/64 pixel; the converter divides the distortion coefficients by 64 too, which makes them all but vanish, and so do we: the
     recordings in circulation were converted so. ``viewrotation`` is not applied: images must be as the sensor has them.
+
+    A camera without ``fov_video`` is Theia's: there the transform is that of points, room to camera, in OpenCV's axes, the lens
+    is in pixels, and the distortion coefficients are OpenCV's.
 
     Raises
     ------
     InputError
-        When the file is not of this form or a number is not in it.
+        When the file is not of this form or numbers are not in it.
     """
-    try:
-        root = ElementTree.fromstring(path.read_text(encoding="utf-8").strip())
-    except (ElementTree.ParseError, ValueError) as error:
-        raise InputError(f"{path}: not a Qualisys calibration ({error})") from None
-    cameras = [node for node in root.iter("camera") if _is_active_video(node)]
-    return sorted((_entry(path, node) for node in cameras), key=lambda entry: natural_key(entry.name))
+    root = read_xml(path, "a Qualisys calibration")
+    missing: list[str] = []
+    entries = [_entry(node, missing) for node in root.iter("camera") if _is_active_video(node)]
+    if missing:
+        raise InputError(f"{path}: {listed(missing, gap='; ')}")
+    return sorted((entry for entry in entries if entry is not None), key=lambda entry: natural_key(entry.name))
 
 
 def _is_active_video(node: ElementTree.Element) -> bool:
@@ -43,22 +52,32 @@ def _is_active_video(node: ElementTree.Element) -> bool:
     return node.get("active", "1") != "0" and (model == "none" or "Video" in model)
 
 
-def _entry(path: Path, node: ElementTree.Element) -> CalibrationEntry:
+def _entry(node: ElementTree.Element, missing: list[str]) -> CalibrationEntry | None:
     name = node.get("serial", "")
+    whole = True
 
-    def numbers(tag: str, *keys: str) -> np.ndarray:
-        found = node.find(tag)
-        try:
-            return np.array([float(found.attrib[key]) for key in keys])  # type: ignore[union-attr]
-        except (AttributeError, KeyError, ValueError):
-            raise InputError(f"{path}: camera '{name}' needs <{tag}> with the numbers {', '.join(keys)}") from None
+    def numbers(tag: str, *keys: str, optional: str = "") -> np.ndarray:
+        nonlocal whole
+        part = node.find(tag)
+        attributes = {} if part is None else {**dict.fromkeys(optional.split(), "0"), **part.attrib}
+        found = {key: as_numbers(attributes.get(key)) for key in (*keys, *optional.split())}
+        lacking = [key for key, value in found.items() if value is None or not np.isfinite(value)]
+        if lacking:
+            missing.append(f"camera '{name}' needs <{tag}> with the numbers {', '.join(lacking)}")
+            whole = False
+            return np.zeros(len(found))
+        return np.array(list(found.values()), float)
 
-    left, top, right, bottom = numbers("fov_video", "left", "top", "right", "bottom")
-    fx, fy, cx, cy = numbers("intrinsic", "focalLengthU", "focalLengthV", "centerPointU", "centerPointV") / SUBPIXELS
-    distortions = numbers("intrinsic", "radialDistortion1", "radialDistortion2", "tangentalDistortion1", "tangentalDistortion2")
-    axes = numbers("transform", *(f"r{row}{column}" for row in (1, 2, 3) for column in (1, 2, 3))).reshape(3, 3)
-    centre = numbers("transform", "x", "y", "z") * MM
-    rotation = OPENCV_FROM_QUALISYS @ axes
-    matrix = np.array([[fx, 0, cx - left], [0, fy, cy - top], [0, 0, 1]])
-    size = (round(right - left) + 1, round(bottom - top) + 1)
-    return CalibrationEntry(name, size, matrix, distortions / SUBPIXELS, rotation, -rotation @ centre)
+    theia = node.find("fov_video") is None
+    left, top, right, bottom = numbers("intrinsic", *SENSOR) if theia else numbers("fov_video", *SIDES)
+    lens = numbers("intrinsic", *LENS, *DISTORTIONS, optional="radialDistortion3 skew")
+    place = numbers("transform", *PLACE)
+    if not whole:
+        return None
+    lens, axes, centre = lens if theia else lens / SUBPIXELS, place[3:].reshape(3, 3), place[:3] * MM
+    fx, fy, cx, cy, *distortions, skew = lens
+    rotation = axes if theia else OPENCV_FROM_QUALISYS @ axes
+    translation = centre if theia else -rotation @ centre
+    matrix = np.array([[fx, skew, cx - left], [0, fy, cy - top], [0, 0, 1]])
+    size = (round(right - left) + (not theia), round(bottom - top) + (not theia))
+    return CalibrationEntry(name, size, matrix, np.array(distortions), rotation, translation, True)

@@ -11,17 +11,50 @@ from hmc.io.calibration.cal import read_cal
 from hmc.io.calibration.easymocap import read_easymocap
 from hmc.io.calibration.entry import CalibrationEntry, build_camera, natural_key
 from hmc.io.calibration.opencv import read_opencv
+from hmc.io.calibration.optitrack import read_optitrack
+from hmc.io.calibration.projections import read_projections
 from hmc.io.calibration.qualisys import read_qualisys
+from hmc.io.calibration.text import read_text
 from hmc.io.calibration.toml import read_toml
+from hmc.io.calibration.vicon import read_vicon
+from hmc.io.settings import read_settings
+from hmc.io.world import world_of
 
 __all__ = ["find_calibration", "read_calibration", "read_entries"]
 
 #: What a folder is searched for, in this order; all files of the first pattern that matches belong together.
-PATTERNS = ("calibration.toml", "intri.y*ml", "*.qca.txt", "*.cal", "[Cc]alib*.toml", "*.xml", "*.y*ml")
+PATTERNS = (
+    "calibration.toml",
+    "camera_array.toml",
+    "intri.y*ml",
+    "*.qca.txt",
+    "*.xcp",
+    "*.mcal",
+    "*.cal",
+    "[Cc]alib*.toml",
+    "*_camera_calibration.toml",
+    "[Cc]alib*.json",
+    "[Cc]am*.json",
+    "[Pp]rojection*.csv",
+    "[Pp]rojection*.txt",
+    "*_par.txt",
+    "*.xml",
+    "*.y*ml",
+    "config.toml",
+)
+#: Patterns of files that hold a whole rig: there must be one only.
+WHOLE_RIG = (".toml", ".qca.txt", ".xcp", ".mcal", ".csv", ".txt")
+KNOWN = (
+    "Anipose, Pose2Sim and FreeMoCap (calibration.toml, Calib*.toml, *_camera_calibration.toml), Caliscope (camera_array.toml, "
+    "config.toml), EasyMocap (intri.yml with extri.yml), Qualisys and Theia (*.qca.txt), Vicon (*.xcp), OptiTrack (*.mcal), "
+    "HumanEva and bodytrack (*.cal), CMU Panoptic (calib*.json), OpenCV (*.yml, *.xml, cam*.json), projection matrices "
+    "(projections.csv, *_par.txt)"
+)
+XML_READERS = {"<calibrationProfile": read_optitrack, "<Cameras": read_vicon, "<calibration": read_qualisys}
 
 
 def read_calibration(path: str | Path, sizes: Mapping[str, tuple[int, int]] | None = None) -> Rig:
-    """Read a rig from any calibration format the package knows.
+    """Read a rig from any calibration format the package knows. For a folder with recording.toml, its ``units`` and ``up`` hold.
 
     Parameters
     ----------
@@ -40,8 +73,9 @@ def read_calibration(path: str | Path, sizes: Mapping[str, tuple[int, int]] | No
         When there is no calibration, its form is not known, or its numbers describe no camera.
     """
     entries = read_entries(path)
+    world = world_of(read_settings(Path(path)))
     try:
-        return Rig(tuple(build_camera(entry, sizes) for entry in entries))
+        return Rig(tuple(build_camera(entry, sizes, world) for entry in entries))
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
 
@@ -57,8 +91,8 @@ def read_entries(path: str | Path) -> list[CalibrationEntry]:
 def find_calibration(path: str | Path) -> list[Path]:
     """The calibration files of a folder (or of its subfolder ``calibration``), or the file itself.
 
-    ``calibration.toml`` comes first, then EasyMocap's pair, Qualisys' export, ``.cal`` files (one a camera), another ``Calib*.toml``, and
-    OpenCV's XML or YAML (one a camera).
+    ``calibration.toml`` comes first, then the forms that bear names of their own (Caliscope's, EasyMocap's pair, Qualisys', Vicon's and
+    OptiTrack's exports, ``.cal`` files, one a camera), then the others, OpenCV's XML and YAML (one a camera) nearly at the end.
 
     Raises
     ------
@@ -70,32 +104,35 @@ def find_calibration(path: str | Path) -> list[Path]:
         return [path]
     for folder in (path, path / "calibration"):
         for pattern in PATTERNS:
-            files = sorted(folder.glob(pattern), key=lambda file: natural_key(file.name))
-            if len(files) > 1 and pattern.endswith((".toml", ".qca.txt")):
+            files = sorted((file for file in folder.glob(pattern) if file.is_file()), key=lambda file: natural_key(file.name))
+            if pattern == "config.toml":
+                files = [file for file in files if "translation" in read_text(file)]  # other programs have a config.toml too
+            if len(files) > 1 and pattern.endswith(WHOLE_RIG):
                 raise InputError(
-                    f"{folder}: more than one calibration ({', '.join(file.name for file in files)}); rename one to calibration.toml"
+                    f"{folder}: more than one calibration ({', '.join(file.name for file in files)}); keep the one that is meant"
                 )
             if files:
                 return files
-    raise InputError(f"{path}: no calibration found; a recording needs calibration.toml, or a file of another known format in its place")
+    raise InputError(f"{path}: no calibration found here or in calibration/; what can be read is {KNOWN}")
 
 
 def _read_file(path: Path) -> list[CalibrationEntry]:
-    text = path.read_text(encoding="utf-8", errors="replace").lstrip("\ufeff \t\r\n")
     if path.stem.lower() in ("intri", "extri"):
         intri, extri = (path.with_stem(stem) for stem in ("intri", "extri"))
         missing = [file for file in (intri, extri) if not file.is_file()]
         if missing:
             raise InputError(f"{missing[0]}: EasyMocap's calibration is a pair, and this file is missing")
         return read_easymocap(intri, extri)
-    if path.suffix.lower() == ".toml":
+    kind, text = path.suffix.lower(), read_text(path).lstrip()
+    if kind == ".toml":
         return read_toml(path)
-    if path.suffix.lower() == ".cal":
+    if kind == ".cal":
         return [read_cal(path)]
-    if text.startswith("%YAML") or "<opencv_storage" in text:
-        return [read_opencv(path)]
-    if "<calibration" in text:
-        return read_qualisys(path)
-    raise InputError(
-        f"{path}: not a calibration of a known form (Anipose / Pose2Sim .toml, OpenCV YAML or XML, EasyMocap, Qualisys .qca.txt, .cal)"
-    )
+    for tag, reader in XML_READERS.items():
+        if text.startswith("<") and tag in text:
+            return reader(path)
+    if kind in (".json", ".yml", ".yaml") or text.startswith("%YAML") or "<opencv_storage" in text:
+        return read_opencv(path)
+    if kind in (".csv", ".txt"):
+        return read_projections(path)
+    raise InputError(f"{path}: not a calibration of a known form, which are {KNOWN}")

@@ -1,4 +1,4 @@
-"""The Anipose / Pose2Sim calibration file: TOML, one table a camera, metres, world to camera."""
+"""The Anipose / Pose2Sim calibration file, which FreeMoCap and Caliscope have too: TOML, one table a camera, world to camera."""
 
 from __future__ import annotations
 
@@ -11,7 +11,9 @@ from scipy.spatial.transform import Rotation
 
 from hmc.camera.model import Camera
 from hmc.errors import InputError
+from hmc.io.calibration.caliscope import caliscope_tables
 from hmc.io.calibration.entry import CalibrationEntry, natural_key
+from hmc.io.calibration.text import as_numbers, listed, read_text
 
 __all__ = ["read_toml", "write_calibration"]
 
@@ -19,10 +21,10 @@ KEYS = ("size", "matrix", "distortions", "rotation", "translation")
 
 
 def read_toml(path: Path) -> list[CalibrationEntry]:
-    """Read a calibration TOML.
+    """Read a calibration TOML: Anipose's, Pose2Sim's, FreeMoCap's or Caliscope's (`caliscope_tables`).
 
-    Tables without a `matrix` (such as ``[metadata]``) are passed over; so are keys that are not needed. Cameras come in the
-    natural order of their tables' names.
+    Tables without a `matrix` (such as ``[metadata]``) are passed over; so are keys that are not needed, and cameras that say ``ignore``.
+    Cameras come in the natural order of their tables' names.
 
     Parameters
     ----------
@@ -35,36 +37,40 @@ def read_toml(path: Path) -> list[CalibrationEntry]:
     Raises
     ------
     InputError
-        When the file is no TOML, a key is missing or not numbers, or a camera is a fisheye camera.
+        When the file is no TOML, keys are missing or not numbers, or a camera is a fisheye camera.
     """
     try:
-        tables = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        tables = caliscope_tables(tomllib.loads(read_text(path)))
+    except (ValueError, RecursionError) as error:
         raise InputError(f"{path}: not a TOML file ({error}); mend or remove it") from None
-    return [
-        _entry(path, label, table)
+    cameras = {
+        label: table
         for label, table in sorted(tables.items(), key=lambda item: natural_key(item[0]))
-        if isinstance(table, dict) and not table.keys().isdisjoint(("matrix", "rotation", "translation"))
-    ]
+        if isinstance(table, dict)
+        and not table.keys().isdisjoint(("matrix", "rotation", "translation"))
+        and table.get("ignore") is not True
+    }
+    lacking = {label: [key for key in KEYS if key not in table] for label, table in cameras.items()}
+    gaps = [f"[{label}] has no {', '.join(f'`{key}`' for key in keys)}" for label, keys in lacking.items() if keys]
+    if gaps:
+        raise InputError(f"{path}: {listed(gaps, gap='; ')}; each camera needs {', '.join(KEYS)}")
+    return [_entry(path, label, table) for label, table in cameras.items()]
 
 
 def _entry(path: Path, label: str, table: dict) -> CalibrationEntry:
-    missing = [key for key in KEYS if key not in table]
-    if missing:
-        raise InputError(f"{path}: [{label}] has no `{missing[0]}`; each camera needs {', '.join(KEYS)}")
     if table.get("fisheye"):
         raise InputError(
             f"{path}: [{label}] is a fisheye camera, which is not supported; undistort its videos, or calibrate it with k1, k2, p1, p2"
         )
     arrays = {}
     for key in KEYS:
-        try:
-            arrays[key] = np.array(table[key], float)
-        except (ValueError, TypeError):
-            raise InputError(f"{path}: [{label}] `{key}` must be numbers; got {table[key]!r}") from None
+        value = as_numbers(table[key])
+        if value is None:
+            raise InputError(f"{path}: [{label}] `{key}` must be numbers; got {str(table[key])[:60]!r}")
+        arrays[key] = value
     size = arrays["size"]
     if size.shape != (2,) or not np.all(np.isfinite(size)):
-        raise InputError(f"{path}: [{label}] `size` must be [width, height] in pixels; got {table['size']!r}")
+        raise InputError(f"{path}: [{label}] `size` must be [width, height] in pixels; got {str(table['size'])[:60]}")
     width, height = (round(float(n)) for n in size)
     name = str(table.get("name", label))
     return CalibrationEntry(name, (width, height), arrays["matrix"], arrays["distortions"], arrays["rotation"], arrays["translation"])
