@@ -241,7 +241,7 @@ class StartPose:
     memory : mapping of str to ndarray
         What steps are to know in that frame.
     costs : ndarray, shape (n,)
-        Mean cost of each candidate that was followed, the winner first; square metres.
+        Mean cost of each candidate that was followed to the end, the winner first; square metres.
     """
 
     subject: Subject

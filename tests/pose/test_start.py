@@ -87,6 +87,18 @@ def test_every_frame_of_the_window_has_a_state_within_the_limits(walker):
     assert np.all(np.diff(costs) >= 0) and 1 <= len(costs) <= QUICK.candidates
 
 
+def test_candidates_that_fall_behind_are_given_up_and_the_winner_is_the_same():
+    acted = act("walk", frames=12)
+    views = views_of_act(acted)
+    settings = replace(QUICK, trial_s=0.07, follow_s=0.2)
+    few, all_of_them = (
+        start_person(rng_of(1), LEAN, views, capture_of(acted), settings=replace(settings, behind=behind)).started for behind in (1.0, 1e6)
+    )
+    assert len(few.costs) == 1 < len(all_of_them.costs)
+    assert_array_equal(few.state, all_of_them.state)
+    assert few.costs[0] == all_of_them.costs[0]
+
+
 def test_the_same_seed_gives_the_same_start():
     acted = act("walk")
     views = views_of_act(acted)[:2]

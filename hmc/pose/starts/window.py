@@ -67,8 +67,10 @@ class StartSettings:
         Frames of the window from which candidates are taken.
     candidates : int
         Candidates followed.
-    follow_s : float
-        How long each is followed, seconds.
+    trial_s, follow_s : float
+        How long each is followed, to both sides, seconds: all for a trial, and then those whose cost is not ...
+    behind : float
+        ... more than so many times the least.
     walk_speed_m_s : float
         Above this speed of the track, a body is taken to face where it goes.
     walk_penalty : float
@@ -79,7 +81,9 @@ class StartSettings:
 
     anchors: int = 3
     candidates: int = 5
+    trial_s: float = 0.13
     follow_s: float = 0.4
+    behind: float = 1.25
     walk_speed_m_s: float = 0.5
     walk_penalty: float = 2.0
     body_frames: int = 12
@@ -339,28 +343,38 @@ def _best_hypothesis(subject: Subject, window: _Window, preset: PosePreset, sett
         chosen = [state for state, _ in share_out(searches, workers)]
     scores, paths = _followed(subject, window, preset, settings, anchor, chosen)
     order = np.argsort(scores)
-    return StartPose(subject, anchor, chosen[order[0]], costs=np.array(scores)[order]), paths[order[0]]
+    ended = np.sort(scores)
+    return StartPose(subject, anchor, chosen[order[0]], costs=ended[~np.isinf(ended)]), paths[order[0]]
 
 
 def _followed(subject, window, preset, settings, anchor, chosen) -> tuple[list[float], list[_Path]]:
-    """Every candidate over the frames around that in which they were found: its mean cost, and its poses."""
-    reach = max(2, round(settings.follow_s * window.capture.fps))
-    first, last = max(0, anchor - reach), min(len(window.views), anchor + reach + 1)
+    """Every candidate over the frames around that in which they were found: its mean cost, and its poses.
 
-    def follow(state: np.ndarray, frames: range) -> list[tuple[Tracked, StepInfo]]:
-        begin, views = frames[0], window.views[frames[0] : frames[-1] + 1]
-        return walk(lambda k: window.frame_rng(begin + k), quick_step(preset), subject, state, anchor - begin, views)
+    First all for a short while, and then those that are not far behind by then; the others cost infinitely much.
+    """
+    frame_rng, step = window.frame_rng, quick_step(preset)
+    paths: list[_Path] = [{} for _ in chosen]
+    scores = np.zeros(len(chosen))
+    for follow_s in (settings.trial_s, settings.follow_s):
+        reach = max(2, round(follow_s * window.capture.fps))
+        first, last = max(0, anchor - reach), min(len(window.views), anchor + reach + 1)
+        left = np.flatnonzero(~(scores > settings.behind * scores.min())).tolist()
 
-    halves = range(first, anchor + 1), range(anchor, last)
-    found = share_out([partial(follow, state, half) for state in chosen for half in halves], window.capture.workers)
-    scores, paths = [], []
-    for before, after in zip(found[::2], found[1::2], strict=True):
-        path = [*before, *after[1:]]
-        followed = np.array([info.cost for _, info in path])
-        headings = np.array([one.state[3] for one, _ in path])
-        scores.append(float(np.nanmean(followed * walk_factor(headings, window.velocities[first:last], settings))))
-        paths.append(dict(enumerate(path, first)))
-    return scores, paths
+        def follow(k: int, part: range) -> list[tuple[Tracked, StepInfo]]:
+            begin, views = part[0], window.views[part[0] : part[-1] + 1]
+            known = {frame - begin: one for frame, one in paths[k].items()}
+            return walk(lambda frame: frame_rng(begin + frame), step, subject, chosen[k], anchor - begin, views, known)
+
+        halves = range(first, anchor + 1), range(anchor, last)
+        found = share_out([partial(follow, k, half) for k in left for half in halves], window.capture.workers)
+        scores[:] = np.inf
+        for k, before, after in zip(left, found[::2], found[1::2], strict=True):
+            path = [*before, *after[1:]]
+            followed = np.array([info.cost for _, info in path])
+            headings = np.array([one.state[3] for one, _ in path])
+            scores[k] = np.nanmean(followed * walk_factor(headings, window.velocities[first:last], settings))
+            paths[k] = dict(enumerate(path, first))
+    return scores.tolist(), paths
 
 
 def search_all(rng: np.random.Generator, objective: Objective, state: np.ndarray, settings: PolishSettings) -> tuple[np.ndarray, float]:
