@@ -5,6 +5,7 @@ What is wrong with a calibration shows here at once: a floor that does not lie o
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -18,6 +19,8 @@ __all__ = ["draw_rig", "draw_view", "save_rig_picture"]
 
 #: Points along a drawn line; enough that a distorted one looks curved.
 LINE_POINTS = 60
+#: Below the title of a picture stand so many lines of so many letters, at most.
+MOST_LINES, MOST_LETTERS = 5, 150
 
 
 def draw_rig(rig: Rig, room: np.ndarray, ax=None):
@@ -62,8 +65,10 @@ def draw_rig(rig: Rig, room: np.ndarray, ax=None):
         where = {"xytext": (7 * side, 7), "textcoords": "offset points", "ha": "left" if side > 0 else "right"}
         box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 1.5}
         ax.annotate(f"{camera.name} ({z:.1f} m)", (x, y), color=color, weight="bold", bbox=box, **where)
-    ax.plot(0, 0, "k+", markersize=12)
-    ax.annotate("origin", (0, 0), xytext=(4, -12), textcoords="offset points", fontsize=8)
+    ax.plot(0, 0, "k+", markersize=12, label="origin")
+    for axis, (x, y) in (("x", (1, 0)), ("y", (0, 1))):
+        ax.annotate("", (x, y), (0, 0), arrowprops={"arrowstyle": "->", "color": "black"})
+        ax.annotate(axis, (x, y), xytext=(4, 4), textcoords="offset points", fontsize=9)
     ax.set(
         xlim=(low[0], high[0]),
         ylim=(low[1], high[1]),
@@ -159,6 +164,7 @@ def save_rig_picture(path: str | Path, rig: Rig, room: np.ndarray, images: Seque
     images : sequence of ndarray or None
         One a camera.
     title : str
+        Its first line is the title; what follows, one line each, stands below it, cut short where it is too long or too much.
 
     Raises
     ------
@@ -177,7 +183,8 @@ def save_rig_picture(path: str | Path, rig: Rig, room: np.ndarray, images: Seque
     draw_rig(rig, room, left.add_subplot())
     for index, (camera, image) in enumerate(zip(rig, images, strict=True)):
         draw_view(camera, room, image, right.add_subplot(rows, columns, index + 1))
-    figure.suptitle(title)
+    first, *others = title.split("\n")
+    figure.suptitle("\n".join([first, *(textwrap.shorten(line, MOST_LETTERS, placeholder=" ...") for line in others[:MOST_LINES])]))
     try:
         figure.savefig(path, dpi=90)
     except (OSError, ValueError) as error:

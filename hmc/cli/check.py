@@ -37,13 +37,15 @@ def run(args: argparse.Namespace) -> int:
 
         print(*agreement_lines(inspection.keypoints), sep="\n")
     name = args.recording.resolve().name
+    verdict = f"{name}: {_summary(inspection)}"
     if inspection.rig is not None and inspection.room is not None:
         from hmc.camera.rig_picture import save_rig_picture
 
         out = args.out or Path(f"{name}_check.png")
-        save_rig_picture(out, inspection.rig, inspection.room, inspection.images, name)
+        wrong = [str(finding) for finding in inspection.findings if finding.severity != "note"]
+        save_rig_picture(out, inspection.rig, inspection.room, inspection.images, "\n".join([verdict, *wrong]))
         print(f"picture: {out}")
-    print(f"{name}: {_summary(inspection)}")
+    print(verdict)
     return 0 if inspection.usable else 2
 
 
