@@ -93,7 +93,9 @@ def remarks(account: Account, table: TrackTable, fps: float, most: int | None) -
     lines += [
         f"persons {a} and {b} are in one place for {seconds:.1f} s: they may be one person" for a, b, seconds in _in_one_place(table, fps)
     ]
-    there = np.bincount(table.frames - table.frames.min()) if len(table.frames) else np.zeros(1, int)
+    if not len(table.frames):
+        return [*lines, "nobody was found in any frame: hmc check tells whether calibration, room and silhouettes fit each other"]
+    there = np.bincount(table.frames - table.frames.min())
     if most is not None and there.max() < most:
         lines.append(f"recording.toml says {most} persons; at most {there.max()} were found at once")
     return lines

@@ -249,8 +249,11 @@ def test_view_cone_of_a_camera_that_looks_down():
 def test_picture(tmp_path, ring):
     room = np.array([[-1.5, -1.5, 0], [1.5, 1.5, 2.4]])
     image = np.full((120, 160, 3), 90, np.uint8)
-    save_rig_picture(tmp_path / "rig.png", ring, room, [image, None, image, image, image], "ring")
+    save_rig_picture(tmp_path / "rig.png", ring, room, [image, None, image, image, image], "ring: a verdict\n" + "error: long " * 40)
     picture = cv2.imread(str(tmp_path / "rig.png"))
     assert picture is not None and picture.shape[1] > 900
-    assert len(draw_rig(ring, room).texts) == len(ring) + 1
+    drawn = draw_rig(ring, room)
+    written = [text.get_text() for text in drawn.texts if text.get_text()]
+    assert sorted(text.split()[0] for text in written) == sorted([*ring.names, "x", "y"])
+    assert {"room", "origin"} <= {text.get_text() for text in drawn.get_legend().get_texts()}
     assert any(text.get_text() == "no image" for text in draw_view(ring[1], room, None).texts)

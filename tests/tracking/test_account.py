@@ -45,3 +45,9 @@ def test_two_tracks_on_one_person_are_told():
     there = table((0, 0, 60), (0.1, 0.1, 60), (1, 0, 60))
     assert remarks(Account(), there, 25.0, None) == ["persons 0 and 1 are in one place for 2.4 s: they may be one person"]
     assert remarks(Account(), table((0, 0, 60), (0.1, 0.1, 20)), 25.0, None) == []
+
+
+def test_an_empty_result_says_where_to_look():
+    empty = TrackTable(np.zeros(0, int), np.zeros(0, int), np.zeros((0, 3)))
+    (line,) = remarks(Account(15), empty, 25.0, 2)
+    assert line.startswith("nobody was found") and "hmc check" in line
