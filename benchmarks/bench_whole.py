@@ -5,7 +5,8 @@
 
 Times are by the clock on the wall, and hold on an idle machine. In the same run stand what bounds them: decoding of the same videos, and
 OpenCV's mixture of Gaussians over the same images and nothing else, both on one core. What a run costs whatever its length is told by a
-run of a part of the frames.
+run of a part of the frames. With `--mediapipe PYTHON`, an environment in which MediaPipe is installed, its Pose runs over the same videos
+(`peer_mediapipe.py`). What sixteen processors would do is told by Amdahl's law from one worker and all: an estimate, no measurement.
 """
 
 from __future__ import annotations
@@ -73,11 +74,27 @@ def command(*words: str) -> float:
         return seconds(lambda: subprocess.run(line, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=environment))
 
 
+def mediapipe(python: str, recording: Recording) -> float:
+    """MediaPipe Pose over the recording's videos, without its imports; seconds. It takes the processors that it wants."""
+    videos = [str(next((recording.path / "videos").glob(f"{name}.*"))) for name in recording.rig.names]
+    words = [python, str(Path(__file__).with_name("peer_mediapipe.py")), str(recording.n_frames), *videos]
+    count, taken = subprocess.run(words, check=True, capture_output=True, text=True).stdout.split()[-2:]
+    print(f"     MediaPipe Pose {float(taken):.1f} s, {1000 * float(taken) / int(count):.0f} ms an image")
+    return float(taken)
+
+
+def amdahl(one: float, several: float, workers: int, processors: int) -> float:
+    """Seconds on so many processors, of what takes `one` with one worker and `several` with so many workers."""
+    shared = max(0.0, (one - several) / (1 - 1 / workers))
+    return one - shared + shared / processors
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--recording", type=Path, help="a recording of your own")
     parser.add_argument("--cameras", help="some of its cameras, by name")
     parser.add_argument("--least", type=float, default=12.0, help="frames a second that `hmc pose` should reach at least (default: 12)")
+    parser.add_argument("--mediapipe", metavar="PYTHON", help="an interpreter that has MediaPipe")
     given = parser.parse_args(argv)
     path = given.recording or rendered()
     chosen = ["--cameras", given.cameras] if given.cameras else []
@@ -98,7 +115,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     good = report("14a", "hmc pose, frames a second", n / whole[workers], given.least, at_least=True)
     good &= report("14b", "fixed cost of hmc pose, seconds", fixed, 6.0)
     good &= report("14c", "hmc pose / (decoding and mixtures alone)", whole[workers] / (decoding + mixture), 1.2)
+    if given.mediapipe:
+        good &= report("14e", "hmc pose / MediaPipe Pose over the same videos", whole[workers] / mediapipe(given.mediapipe, recording), 1.0)
     if workers > 1:
+        print(f"     sixteen processors, by Amdahl's law: {amdahl(whole[1], whole[workers], workers, 16):.1f} s")
         good &= report("14d", f"one worker / {workers} workers", whole[1] / whole[workers], 1.8, at_least=True)
     return 0 if good else 1
 
