@@ -6,9 +6,10 @@
 >>> people.positions.shape  # rows, landmarks, x y z in metres
 (8, 15, 3)
 
-These names will stay: `open_recording`, `check`, `silhouettes`, `hulls`, `track`, `views`, `pose`, `evaluate`, `view`; `Session` and `live`
-for images as they come; the records `Recording`, `Rig`, `Camera`, `TrackTable`, `PoseTable`, `PosedPeople`; `METHODS` and `TRACKERS`,
-`pose_method`, `PoseMethod`, `register_method` and `register_tracker` to add to them; and `InputError`.
+These names will stay: `open_recording`, `check`, `silhouettes`, `hulls`, `track`, `views`, `pose`, `evaluate`, `view`; `recording_of` for
+images in memory, `Session` and `live` for images as they come; the records `Recording`, `Rig`, `Camera`, `TrackTable`, `PoseTable`,
+`PosedPeople`; `METHODS` and `TRACKERS`, `pose_method`, `PoseMethod`, `register_method` and `register_tracker` to add to them; and
+`InputError`.
 What is in the modules below may move.
 """
 
@@ -37,6 +38,7 @@ _WHERE = {
     "live": "hmc.session.newest",
     "open_recording": "hmc.io.recording",
     "pose_method": "hmc.pose.registry",
+    "recording_of": "hmc.io.memory",
     "register_method": "hmc.pose.registry",
     "register_tracker": "hmc.tracking.trackers",
     "silhouettes": "hmc.api",

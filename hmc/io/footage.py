@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from itertools import islice
 from pathlib import Path
 
 import cv2
@@ -53,6 +54,8 @@ class Footage:
         What was odd when it was opened.
     skipped : int
         Frames of the file before frame 0, of a camera that began before the others.
+    arrays : sequence of ndarray or None, optional
+        The frames themselves, where they are in memory: images (h, w, 3), or silhouettes (h, w) of bool or uint8. `path` is then a name.
     """
 
     path: Path
@@ -62,6 +65,7 @@ class Footage:
     fps: float | None = None
     notes: tuple[str, ...] = ()
     skipped: int = 0
+    arrays: Sequence[np.ndarray | None] | np.ndarray | None = field(default=None, repr=False, compare=False)
 
 
 def find_footage(folder: Path, name: str, first_number: int | None = None, count: bool = True) -> Footage | None:
@@ -252,7 +256,10 @@ def read_footage(footage: Footage, first: int, last: int, on_problem: Callable[[
     """
     images = footage.images
     skipped = footage.skipped
-    frames = _read_video(footage, first + skipped, last + skipped) if images is None else _read_images(images, first, last)
+    if footage.arrays is not None:
+        frames: Iterable[np.ndarray | None] = (_as_image(one) for one in islice(_from(footage.arrays, first), last - first))
+    else:
+        frames = _read_video(footage, first + skipped, last + skipped) if images is None else _read_images(images, first, last)
     lost: list[int] = []
 
     def say_lost() -> None:
@@ -267,7 +274,7 @@ def read_footage(footage: Footage, first: int, last: int, on_problem: Callable[[
                     f"{label}: frame {index} is {image.shape[1]} x {image.shape[0]} and not {footage.size[0]} x {footage.size[1]}; left out"
                 )
                 image = None
-            elif image is None and index < footage.n_frames and (images is None or index in images):
+            elif image is None and index < footage.n_frames and footage.arrays is None and (images is None or index in images):
                 lost.append(index)
             # A caller that knows how many frames there are asks for no more after the last.
             if image is not None or index + 1 == last:
@@ -275,6 +282,17 @@ def read_footage(footage: Footage, first: int, last: int, on_problem: Callable[[
             yield image
     finally:
         say_lost()
+
+
+def _from(arrays: Sequence[np.ndarray | None] | np.ndarray, first: int) -> Iterator[np.ndarray | None]:
+    return (arrays[k] for k in range(first, len(arrays)))
+
+
+def _as_image(array: np.ndarray | None) -> np.ndarray | None:
+    """An image in memory as files have it: silhouettes with three channels, 255 where somebody is."""
+    if array is None or array.ndim == 3:
+        return array
+    return np.repeat((array.view(np.uint8) * np.uint8(255 if array.dtype == bool else 1))[..., None], 3, axis=2)
 
 
 def _frames(indices: list[int]) -> str:
