@@ -40,8 +40,8 @@ def recording_of(
     rig : Rig or sequence of Camera
         In metres, z up, the floor at 0.
     images : sequence of images, one a camera, optional
-        Each a sequence of (h, w, 3) uint8 BGR, one a frame, None where there is none; the recording lasts as long as at least two cameras do.
-        Nothing is copied, and items are asked for when they are needed: a memory map, or a sequence that loads, streams.
+        Each a sequence of (h, w, 3) uint8 BGR, one a frame, None where there is none; the recording lasts as long as two cameras at
+        least do. Nothing is copied, and items are asked for when they are needed: a memory map, or a sequence that loads, streams.
     background : sequence of images, one a camera, optional
         Of the empty scene, 30 or so; None of a camera that has none.
     silhouettes : sequence of images, one a camera, optional
