@@ -208,7 +208,8 @@ def _patches_of(mask: np.ndarray, side: int, shape: tuple[int, int]) -> np.ndarr
     """Which patches hold a pixel of a mask: uint8, shape (n_rows, n_columns)."""
     whole = np.zeros((shape[0] * side, shape[1] * side), np.uint8)
     whole[: mask.shape[0], : mask.shape[1]] = mask
-    return whole.reshape(shape[0], side, shape[1], side).max(axis=(1, 3))
+    # Whole rows first: both at once goes pixel by pixel.
+    return whole.reshape(shape[0], side, -1).max(axis=1).reshape(*shape, side).max(axis=2)
 
 
 def blocked_from(sightings: Sightings) -> BlockedView:
