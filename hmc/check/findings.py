@@ -20,11 +20,11 @@ from hmc.check.moments import probe_masks
 from hmc.check.silhouettes import hull_findings
 from hmc.check.world_findings import world_findings
 from hmc.errors import InputError
-from hmc.io.calibration import CalibrationEntry, build_camera, read_entries
+from hmc.io.calibration import CalibrationEntry, build_camera
 from hmc.io.footage import IMAGE_SUFFIXES, VIDEO_SUFFIXES, Footage, read_footage
 from hmc.io.keypoints import open_keypoints
+from hmc.io.places import RecordingPlaces, to_places
 from hmc.io.recording import Frame, Recording, find_views, gaps, iterate_frames, open_recording, wrong_sizes, wrong_units
-from hmc.io.settings import read_settings
 
 __all__ = ["Finding", "Inspection", "check_recording", "inspect_recording"]
 
@@ -69,13 +69,13 @@ class Inspection:
         return not any(finding.severity == "error" for finding in self.findings)
 
 
-def check_recording(path: str | Path, cameras: Sequence[str] | None = None, read_all: bool = False) -> list[Finding]:
+def check_recording(path: str | Path | RecordingPlaces, cameras: Sequence[str] | None = None, read_all: bool = False) -> list[Finding]:
     """Find what is wrong with a recording.
 
     Parameters
     ----------
-    path : str or Path
-        Folder of the recording.
+    path : str, Path or RecordingPlaces
+        Folder of the recording, or where its parts lie.
     cameras : sequence of str, optional
         Look at these cameras only.
     read_all : bool
@@ -89,23 +89,24 @@ def check_recording(path: str | Path, cameras: Sequence[str] | None = None, read
     return list(inspect_recording(path, cameras, read_all).findings)
 
 
-def inspect_recording(path: str | Path, cameras: Sequence[str] | None = None, read_all: bool = False) -> Inspection:
+def inspect_recording(path: str | Path | RecordingPlaces, cameras: Sequence[str] | None = None, read_all: bool = False) -> Inspection:
     """As `check_recording`, with what a picture of the rig needs. Parameters as there."""
-    path = Path(path)
+    places = to_places(path)
+    path = places.path
     found: list[Finding] = []
 
     def say(severity: str, sentences: Iterable[str]) -> None:
         found.extend(Finding(severity, sentence) for sentence in sentences)
 
-    if not path.is_dir():
+    if not places.there:
         return Inspection((Finding("error", f"{path}: no such folder"),))
     room = None
     try:
-        room = read_settings(path).get("room")
+        room = places.read_settings().get("room")
     except InputError as error:
         say("error", [str(error)])
     try:
-        entries = read_entries(path)
+        entries = places.read_entries()
     except InputError as error:
         say("error", [str(error)])
         return Inspection(tuple(found))
@@ -117,7 +118,7 @@ def inspect_recording(path: str | Path, cameras: Sequence[str] | None = None, re
     all_names = [entry.name for entry in entries]
     entries = [entry for entry in entries if cameras is None or entry.name in cameras]
 
-    views = _views_by_camera(path, [entry.name for entry in entries], all_names, say)
+    views = _views_by_camera(places, [entry.name for entry in entries], all_names, say)
     rig = _usable_rig(entries, {name: view.size for name, view in views.items()}, say)
     if rig is None:
         return Inspection(_sorted(found))
@@ -137,7 +138,7 @@ def inspect_recording(path: str | Path, cameras: Sequence[str] | None = None, re
     images = tuple(None if view is None else next(read_footage(view, 0, 1, lambda line: None, ""), None) for view in own)
     if not any(finding.severity == "error" for finding in found):
         try:
-            recording = open_recording(path, cameras=cameras)
+            recording = open_recording(places, cameras=cameras)
         except InputError as error:
             say("error", [str(error)])
     if recording is not None:
@@ -167,7 +168,7 @@ def _sorted(found: Sequence[Finding]) -> tuple[Finding, ...]:
     return tuple(sorted(dict.fromkeys(found), key=lambda finding: order.index(finding.severity)))
 
 
-def _views_by_camera(path: Path, names: Sequence[str], all_names: Sequence[str], say: Say) -> dict[str, Footage]:
+def _views_by_camera(places: RecordingPlaces, names: Sequence[str], all_names: Sequence[str], say: Say) -> dict[str, Footage]:
     """The images, or else the silhouettes, of each camera that has some; what is wrong with the others is told."""
     unreadable = set()
 
@@ -175,11 +176,14 @@ def _views_by_camera(path: Path, names: Sequence[str], all_names: Sequence[str],
         unreadable.add(name)
         say("error", [sentence])
 
-    footage, silhouettes = find_views(path, names, all_names, count=False, on_error=on_error)
+    footage, silhouettes = find_views(places, names, all_names, count=False, on_error=on_error)
     views = {name: image or mask for name, image, mask in zip(names, footage, silhouettes, strict=True)}
     for name in names:
         if views[name] is None and name not in unreadable:
-            say("error", [f"{path}: camera '{name}' has no video, images or silhouettes; name them {name}.* or leave it out: --cameras"])
+            say(
+                "error",
+                [f"{places.path}: camera '{name}' has no video, images or silhouettes; name them {name}.* or leave it out: --cameras"],
+            )
     return {name: view for name, view in views.items() if view is not None}
 
 

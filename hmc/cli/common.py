@@ -29,20 +29,6 @@ __all__ = [
 ]
 
 T = TypeVar("T")
-#: Files of a recording on which its results depend.
-SOURCES = (
-    "calibration*",
-    "recording.toml",
-    "videos/*",
-    "images/*/*",
-    "images/*",
-    "silhouettes/*/*",
-    "background/*",
-    "background/*/*",
-    "keypoints/*",
-    "keypoints/*/*",
-    "pose/*/*",
-)
 
 
 def add_selection_options(parser: argparse.ArgumentParser) -> None:
@@ -187,9 +173,13 @@ def recording_source(recording) -> dict[str, Any]:
     """What a result says of the recording it was made from: where it lies, and when its files last changed."""
     from datetime import UTC, datetime
 
-    times = [file.stat().st_mtime for pattern in SOURCES for file in recording.path.glob(pattern)]
-    changed = datetime.fromtimestamp(max(times, default=0.0), UTC).isoformat()
-    return {"recording": recording.path.resolve(), "recording_changed": changed}
+    from hmc.io.places import places_of
+
+    places = places_of(recording)
+    source = {"recording": recording.path.resolve(), "recording_changed": datetime.fromtimestamp(places.changed_s(), UTC).isoformat()}
+    lacks = {"calibration": places.calibration, "background": places.background, "videos": places.videos, **places.settings}
+    given = {name: value.resolve() if isinstance(value, Path) else value for name, value in lacks.items() if value is not None}
+    return source | ({"given": given} if given else {})
 
 
 def was_finished(written: Sequence[Path], run_path: Path, depends_on: Mapping[str, Any]) -> bool:

@@ -20,9 +20,9 @@ from hmc.camera.coverage import estimate_room
 from hmc.camera.model import Rig
 from hmc.camera.reduction import reduce_image, reduce_mask, reduced_camera, reduction_factors
 from hmc.errors import InputError
-from hmc.io.calibration import build_camera, read_entries
+from hmc.io.calibration import build_camera
 from hmc.io.footage import Footage, find_footage, number_images, read_footage, starting_at
-from hmc.io.settings import read_settings
+from hmc.io.places import RecordingPlaces, places_of, to_places
 
 __all__ = [
     "Frame",
@@ -88,6 +88,8 @@ class Recording:
     factors : tuple of int
         How many times smaller than in their files the images and silhouettes of each camera are read (`reduced`); `rig` is that of the
         smaller ones. Empty where there is nothing to read.
+    places : RecordingPlaces or None
+        Where its parts lie, where not all of them lie in `path`.
     """
 
     path: Path
@@ -102,6 +104,7 @@ class Recording:
     room_is_estimated: bool = False
     problems: tuple[str, ...] = ()
     factors: tuple[int, ...] = ()
+    places: RecordingPlaces | None = None
     _footage: tuple[Footage | None, ...] = field(default=(), repr=False)
     _silhouettes: tuple[Footage | None, ...] = field(default=(), repr=False)
     _background: tuple[Footage | None, ...] = field(default=(), repr=False)
@@ -128,7 +131,11 @@ class Recording:
 
 
 def open_recording(
-    path: str | Path, cameras: Sequence[str] | None = None, start: int = 0, frames: int | None = None, any_world: bool = False
+    path: str | Path | RecordingPlaces,
+    cameras: Sequence[str] | None = None,
+    start: int = 0,
+    frames: int | None = None,
+    any_world: bool = False,
 ) -> Recording:
     """Open a recording or a part of it.
 
@@ -137,8 +144,8 @@ def open_recording(
 
     Parameters
     ----------
-    path : str or Path
-        Folder of the recording.
+    path : str, Path or RecordingPlaces
+        Folder of the recording, or where its parts lie.
     cameras : sequence of str, optional
         Names of the cameras to use, in this order; by default all.
     start : int
@@ -164,11 +171,11 @@ def open_recording(
     >>> recording.n_frames, recording.rig.names, recording.fps
     (10, ('cam_00', 'cam_02'), 15.0)
     """
-    path = Path(path)
-    if not path.is_dir():
+    places = to_places(path)
+    path = places.path
+    if not places.there:
         raise InputError(f"{path}: no such folder; a recording is a folder with calibration.toml and videos/ or images/")
-    settings = read_settings(path)
-    entries = read_entries(path)
+    settings, entries = places.read_settings(), places.read_entries()
     all_names = [entry.name for entry in entries]
     if cameras is not None:
         cameras = [cameras] if isinstance(cameras, str) else cameras
@@ -184,7 +191,7 @@ def open_recording(
         raise InputError(
             f"{path / 'recording.toml'}: `first_frame` names '{strangers[0]}', no camera of the calibration ({', '.join(all_names)})"
         )
-    footage, silhouettes = find_views(path, names, all_names, starts=starts)
+    footage, silhouettes = find_views(places, names, all_names, starts=starts)
     both = [image or mask for image, mask in zip(footage, silhouettes, strict=True)]
     sizes = {name: view.size for name, view in zip(names, both, strict=True) if view is not None}
     try:
@@ -212,7 +219,7 @@ def open_recording(
             f"0 to {total - 1}: choose other --start and --frames"
         )
 
-    background = _find_background(path, rig, problems)
+    background = _find_background(places.background_folder, rig, problems)
     fps = settings.get("fps") or next((view.fps for view in footage if view is not None and view.fps), DEFAULT_FPS)
     room = settings.get("room")
     return Recording(
@@ -228,6 +235,7 @@ def open_recording(
         room_is_estimated=room is None,
         problems=tuple(problems),
         factors=(1,) * len(rig),
+        places=places,
         _footage=tuple(footage),
         _silhouettes=tuple(silhouettes),
         _background=tuple(background),
@@ -291,7 +299,7 @@ def whole_recording(recording: Recording) -> Recording:
     """All frames of the same cameras, as large as they are read in this selection."""
     views = [image or mask for image, mask in zip(recording._footage, recording._silhouettes, strict=True)]
     total = common_length([view.n_frames for view in views if view is not None])
-    return replace(recording, start=0, n_frames=min(total, read_settings(recording.path).get("frames") or total))
+    return replace(recording, start=0, n_frames=min(total, places_of(recording).read_settings().get("frames") or total))
 
 
 def reduced(recording: Recording, factors: Sequence[int]) -> Recording:
@@ -357,7 +365,7 @@ def background_frames(recording: Recording, camera_index: int, limit: int | None
 
 
 def find_views(
-    path: Path,
+    places: RecordingPlaces,
     names: Sequence[str],
     all_names: Sequence[str],
     count: bool = True,
@@ -368,8 +376,7 @@ def find_views(
 
     Parameters
     ----------
-    path : Path
-        Folder of the recording.
+    places : RecordingPlaces
     names : sequence of str
         The cameras wanted.
     all_names : sequence of str
@@ -382,9 +389,9 @@ def find_views(
         The frame of a camera's files that is frame 0 of the recording, where it is not the first.
     """
 
-    def find(folder: Path, wanted: Sequence[str], first: int) -> list[Footage | None]:
+    def find(place_of: Callable[[str], tuple[Path, str]], wanted: Sequence[str], first: int) -> list[Footage | None]:
         def one(name: str) -> Footage | None:
-            found = find_footage(folder, name, first, count)
+            found = find_footage(*place_of(name), first, count)
             return found and starting_at(found, (starts or {}).get(name, 0))
 
         return [settled(name, found) for name, found in zip(wanted, _side_by_side(one, wanted), strict=True)]
@@ -398,15 +405,15 @@ def find_views(
             on_error(name, str(error))
             return None
 
-    images = path / "images"
+    images, masks = places.path / "images", places.path / "silhouettes"
     first = _first_number(images, all_names)
-    footage = find(path / "videos", names, 0)
+    footage = find(places.video_place, names, 0)
     left = [name for name, found in zip(names, footage, strict=True) if found is None]
-    others = dict(zip(left, find(images, left, first), strict=True))
+    others = dict(zip(left, find(lambda name: (images, name), left, first), strict=True))
     footage = [found or others[name] for name, found in zip(names, footage, strict=True)]
     if not any(footage):
-        first = _first_number(path / "silhouettes", all_names)
-    return footage, find(path / "silhouettes", names, first)
+        first = _first_number(masks, all_names)
+    return footage, find(lambda name: (masks, name), names, first)
 
 
 def _side_by_side(find: Callable[[str], Footage | None], names: Sequence[str]) -> list[Future[Footage | None]]:
@@ -420,10 +427,10 @@ def _first_number(folder: Path, names: Sequence[str]) -> int:
     return min(numbers, default=0)
 
 
-def _find_background(path: Path, rig: Rig, problems: list[str]) -> list[Footage | None]:
+def _find_background(folder: Path, rig: Rig, problems: list[str]) -> list[Footage | None]:
     """The empty scene of each camera; what cannot be used is left out and added to the problems."""
     background: list[Footage | None] = []
-    coming = _side_by_side(lambda name: find_footage(path / "background", name, count=False), rig.names)
+    coming = _side_by_side(lambda name: find_footage(folder, name, count=False), rig.names)
     for camera, outcome in zip(rig, coming, strict=True):
         found = None
         try:

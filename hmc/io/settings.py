@@ -13,7 +13,7 @@ import numpy as np
 
 from hmc.errors import InputError
 
-__all__ = ["read_settings"]
+__all__ = ["check_settings", "read_settings"]
 
 SETTINGS = ("name", "fps", "frames", "units", "up", "room", "persons", "subject_height_m", "first_frame")
 #: No room is wider (metres): beyond, it is in millimetres.
@@ -35,6 +35,17 @@ def read_settings(path: Path) -> dict[str, Any]:
         settings = tomllib.loads(file.read_text(encoding="utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise InputError(f"{file}: not a TOML file ({error}); mend or remove it") from None
+    return check_settings(settings, file)
+
+
+def check_settings(settings: Mapping[str, Any], file: Path) -> dict[str, Any]:
+    """Keys and values of a ``recording.toml``, or of a table of another file that has the same, checked.
+
+    Raises
+    ------
+    InputError
+        When a key is unknown or its value is not what it must be.
+    """
     for key in settings:
         if key not in SETTINGS:
             near = difflib.get_close_matches(key, SETTINGS, 1, 0.0)
