@@ -18,7 +18,7 @@ from hmc.errors import InputError
 
 __all__ = ["main"]
 
-COMMANDS = ("check", "world", "synth", "track", "pose", "evaluate", "view")
+COMMANDS = ("check", "world", "synth", "track", "pose", "evaluate", "view", "run")
 
 EXIT_WORKER = 1
 EXIT_INPUT = 2
@@ -69,6 +69,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         parser.print_help()
         return 0
     try:
+        if getattr(args, "like", None) is not None:
+            args = _repeated(parser, args, argv)
         code = args.run(args)
         sys.stdout.flush()
         return code or 0
@@ -90,3 +92,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print(f"hmc {args.command}: interrupted", file=sys.stderr)
         return EXIT_INTERRUPTED
+
+
+def _repeated(parser: argparse.ArgumentParser, args: argparse.Namespace, argv: Sequence[str]) -> argparse.Namespace:
+    """The arguments with those of the run of ``--like`` where nothing is said."""
+    from hmc.cli.option_tables import like_defaults
+
+    (subparsers,) = (action for action in parser._actions if isinstance(action, argparse._SubParsersAction))
+    subparsers.choices[args.command].set_defaults(**like_defaults(args))
+    return parser.parse_args(argv)

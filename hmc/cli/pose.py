@@ -24,9 +24,10 @@ from hmc.cli.common import (
     was_finished,
     whole_number,
 )
+from hmc.cli.option_tables import add_like_option, repeated_preset, told_options
 from hmc.cli.pose_markers import MARKERS_JOURNAL, add_marker_options, read_markers
 from hmc.cli.track import JOURNAL, add_tracker_options, selected_frontend, selected_tracker
-from hmc.pose.registry import INITS, METHODS, pose_method
+from hmc.pose.registry import BUILT_IN, INITS, METHODS, pose_method
 
 __all__ = ["add_parser", "run"]
 
@@ -54,6 +55,7 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     add_selection_options(parser)
     add_workers_option(parser)
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the result")
+    add_like_option(parser)
     parser.add_argument(
         "--method",
         metavar="NAME",
@@ -78,6 +80,12 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     named = {name for entry in METHODS.values() for name in entry.presets}
     parser.add_argument(
         "--preset", default="default", metavar="NAME", help=f"{', '.join(sorted(named))}: as printed, where a work is named"
+    )
+    parser.add_argument(
+        "--settings",
+        type=Path,
+        metavar="FILE.toml",
+        help="values in place of the preset's, in tables as [parameters.preset] of run.toml has them: [annealed] layers = 3",
     )
     parser.add_argument("--voxel", type=positive_float, default=0.03, metavar="M", help="side of a voxel, metres (default: 0.03)")
     add_image_option(parser)
@@ -137,7 +145,7 @@ def run(args: argparse.Namespace) -> int:
 
     plugins = load_given_plugins(args)
     name = args.method or ("keypoints" if args.cues == CUES[2] else "apf")
-    method = pose_method(name, args.preset, args.model, args.init, args.markers == "skin", args.passes)
+    method = pose_method(name, args.preset, args.model, args.init, args.markers == "skin", args.passes, _settings(args, name))
     recording = open_selected(args)
     if not args.full_images:
         recording = for_method(recording, method, min(args.voxel, args.track_voxel))
@@ -226,13 +234,22 @@ def run(args: argparse.Namespace) -> int:
     write_pose(paths["pose.npz"], people.states)
     if any(people.details):
         write_fits(args.out / "fits.csv", people.frames.tolist(), people.persons.tolist(), people.status, people.details)
-    write_run(paths["run.toml"], name, parameters, args.seed, **source, problems=gather_problems(problems))
+    write_run(paths["run.toml"], name, parameters, args.seed, **source, options=told_options(args), problems=gather_problems(problems))
     for name in (JOURNAL, POSE_JOURNAL, BACK_JOURNAL, MARKERS_JOURNAL, MASKS):
         for file in args.out.glob(f"{name}*"):
             file.unlink()
     _tell(people, recording, paths["joints.csv"])
     print_problems(problems)
     return 0
+
+
+def _settings(args: argparse.Namespace, name: str):
+    """Values in place of the preset's: those of the run that is repeated, then those of ``--settings``."""
+    from hmc.io.nested_settings import SettingsTable, read_settings_table
+
+    repeated = repeated_preset(args) if name in BUILT_IN else None
+    tables = [] if repeated is None else [SettingsTable(*repeated, complete=True)]
+    return tables + ([] if args.settings is None else [read_settings_table(args.settings)])
 
 
 def _keypoints(cues: str | None, recording, method):
