@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from hmc import __version__
 from hmc.errors import InputError
 
-__all__ = ["main"]
+__all__ = ["command_parser", "main", "make_parser", "repeated"]
 
 COMMANDS = ("check", "world", "synth", "track", "pose", "evaluate", "view", "run")
 
@@ -70,7 +70,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 0
     try:
         if getattr(args, "like", None) is not None:
-            args = _repeated(parser, args, argv)
+            args = repeated(parser, args, argv)
         code = args.run(args)
         sys.stdout.flush()
         return code or 0
@@ -94,10 +94,15 @@ def main(argv: Sequence[str] | None = None) -> int:
         return EXIT_INTERRUPTED
 
 
-def _repeated(parser: argparse.ArgumentParser, args: argparse.Namespace, argv: Sequence[str]) -> argparse.Namespace:
+def repeated(parser: argparse.ArgumentParser, args: argparse.Namespace, argv: Sequence[str]) -> argparse.Namespace:
     """The arguments with those of the run of ``--like`` where nothing is said."""
     from hmc.cli.option_tables import like_defaults
 
-    (subparsers,) = (action for action in parser._actions if isinstance(action, argparse._SubParsersAction))
-    subparsers.choices[args.command].set_defaults(**like_defaults(args))
+    command_parser(parser, args.command).set_defaults(**like_defaults(args))
     return parser.parse_args(argv)
+
+
+def command_parser(parser: argparse.ArgumentParser, command: str) -> argparse.ArgumentParser:
+    """The parser of one command."""
+    (subparsers,) = (action for action in parser._actions if isinstance(action, argparse._SubParsersAction))
+    return subparsers.choices[command]

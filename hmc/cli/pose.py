@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -231,7 +232,7 @@ def run(args: argparse.Namespace) -> int:
     problems += people.notes
     write_tracks(paths["tracks.csv"], _pelvis_tracks(people) if tracks is None else tracks)
     write_joints(paths["joints.csv"], people.poses)
-    write_pose(paths["pose.npz"], people.states)
+    write_pose(paths["pose.npz"], replace(people.states, costs=people.costs))
     if any(people.details):
         write_fits(args.out / "fits.csv", people.frames.tolist(), people.persons.tolist(), people.status, people.details)
     write_run(paths["run.toml"], name, parameters, args.seed, **source, options=told_options(args), problems=gather_problems(problems))
@@ -302,18 +303,9 @@ def _pelvis_tracks(people):
 
 def _tell(people, recording, path: Path) -> None:
     """Print the persons that were found."""
-    import numpy as np
+    from hmc.trials.quality import person_lines
 
-    from hmc.body.proportions import stature
-
-    for person in np.unique(people.poses.persons):
-        rows = people.poses.persons == person
-        frames, body = people.poses.frames[rows], people.states.bodies.get(int(person))
-        tall = "no pose" if body is None else f"stature about {stature({name: float(value) for name, value in body.items()}):.2f} m"
-        print(f"person {person}: {rows.sum()} frames, from {frames.min()} to {frames.max()}, {tall}")
-    if not len(people.poses.frames):
-        print(f"no person in {recording.n_frames} frames")
-    print(f"wrote {path}")
+    print(*person_lines(people.poses, people.states, recording.n_frames), f"wrote {path}", sep="\n")
 
 
 def _height(text: str, recording) -> float | None:

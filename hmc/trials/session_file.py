@@ -176,8 +176,8 @@ class _Reading:
             where = f"[[trial]] {one.get('name', k + 1)}"
             self.known_keys(one, TRIAL_KEYS, where)
             name = self.text(one, "name", "", where)
-            if not name or "/" in name or name.startswith("."):
-                self.faults.append(f"{where}: `name` must be a text that can name a folder")
+            if not name:
+                self.faults.append(f"{where}: `name` must be a text")
                 continue
             if name in said:
                 self.faults.append(f"{where}: there are two trials of this name; rename one")
@@ -195,6 +195,8 @@ class _Reading:
         videos: str | None,
     ) -> Trial:
         where, root = f"[[trial]] {name}", self.path.parent
+        if name.startswith(".") or set(name) & set("/\\,*?["):
+            self.faults.append(f"{where}: a trial's name must begin with no dot and have none of / \\ , * ? [ in it; rename it")
         pattern = self.pattern(table.get("videos"), f"{where} `videos`") or videos
         folder = root / self.text(table, "folder", "", where) if "folder" in table else found or root / name
         if "folder" in table and not folder.is_dir():
