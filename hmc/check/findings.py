@@ -23,7 +23,7 @@ from hmc.errors import InputError
 from hmc.io.calibration import CalibrationEntry, build_camera
 from hmc.io.footage import IMAGE_SUFFIXES, VIDEO_SUFFIXES, Footage, read_footage
 from hmc.io.keypoints import open_keypoints
-from hmc.io.places import RecordingPlaces, to_places
+from hmc.io.places import AnyPlaces, RecordingPlaces, to_places
 from hmc.io.recording import Frame, Recording, find_views, gaps, iterate_frames, open_recording, wrong_sizes, wrong_units
 
 __all__ = ["Finding", "Inspection", "check_recording", "inspect_recording"]
@@ -69,7 +69,7 @@ class Inspection:
         return not any(finding.severity == "error" for finding in self.findings)
 
 
-def check_recording(path: str | Path | RecordingPlaces, cameras: Sequence[str] | None = None, read_all: bool = False) -> list[Finding]:
+def check_recording(path: AnyPlaces, cameras: Sequence[str] | None = None, read_all: bool = False) -> list[Finding]:
     """Find what is wrong with a recording.
 
     Parameters
@@ -89,7 +89,7 @@ def check_recording(path: str | Path | RecordingPlaces, cameras: Sequence[str] |
     return list(inspect_recording(path, cameras, read_all).findings)
 
 
-def inspect_recording(path: str | Path | RecordingPlaces, cameras: Sequence[str] | None = None, read_all: bool = False) -> Inspection:
+def inspect_recording(path: AnyPlaces, cameras: Sequence[str] | None = None, read_all: bool = False) -> Inspection:
     """As `check_recording`, with what a picture of the rig needs. Parameters as there."""
     places = to_places(path)
     path = places.path

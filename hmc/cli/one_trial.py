@@ -104,11 +104,11 @@ def _check(session, trial, options: TrialOptions, state):
     from hmc.io.files import sibling, to_toml
     from hmc.io.recording import open_recording
     from hmc.trials.page import CHECK_PICTURE
-    from hmc.trials.state import write_state
+    from hmc.trials.state import digest, write_state
 
     args, picture = pose_arguments(session, trial, options), options.out / trial.name / CHECK_PICTURE
     recording = open_recording(trial.places, cameras=args.cameras)
-    source = to_toml({**recording_source(recording), "cameras": args.cameras})
+    source = digest(to_toml({**recording_source(recording), "cameras": args.cameras}).encode())
     if state.checked == source and picture.exists():
         return state
     found: list = []
@@ -146,13 +146,13 @@ def _view(session, trial, options: TrialOptions, state):
     from hmc.io.recording import open_recording
     from hmc.trials.moments import write_moments
     from hmc.trials.page import MOMENTS_FOLDER, VIDEO
-    from hmc.trials.state import file_digest
+    from hmc.trials.state import digest
     from hmc.view.mosaic import read_result
     from hmc.view.write import write_view
 
     folder = options.out / trial.name
-    digest, video = file_digest(folder / "joints.csv", folder / "pose.npz"), folder / VIDEO
-    drawn, filmed = state.drawn == digest, state.drawn == digest and video.exists()
+    made, video = digest((folder / "joints.csv").read_bytes(), (folder / "pose.npz").read_bytes()), folder / VIDEO
+    drawn, filmed = state.drawn == made, state.drawn == made and video.exists()
     if drawn and (filmed or not options.video):
         return state
     args = pose_arguments(session, trial, options)
@@ -166,4 +166,4 @@ def _view(session, trial, options: TrialOptions, state):
         if options.video:
             write_view(video, recording, result, (), None, True, (None, lambda steps, total: progress(steps, total, "view", options.quiet)))
 
-    return replace(_timed(state, "view", view), drawn=digest)
+    return replace(_timed(state, "view", view), drawn=made)

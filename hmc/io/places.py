@@ -19,7 +19,7 @@ from hmc.io.settings import read_settings
 if TYPE_CHECKING:
     from hmc.io.recording import Recording
 
-__all__ = ["RecordingPlaces", "places_of", "to_places"]
+__all__ = ["AnyPlaces", "RecordingPlaces", "places_of", "to_places"]
 
 #: In the pattern of videos, where a camera's name goes.
 CAMERA = "{camera}"
@@ -114,7 +114,11 @@ class RecordingPlaces:
         return max((file.stat().st_mtime for file in files), default=0.0)
 
 
-def to_places(given: str | Path | RecordingPlaces) -> RecordingPlaces:
+#: A recording's folder, or where its parts lie.
+AnyPlaces = str | Path | RecordingPlaces
+
+
+def to_places(given: AnyPlaces) -> RecordingPlaces:
     """The places of a recording of which only the folder is given."""
     return given if isinstance(given, RecordingPlaces) else RecordingPlaces(Path(given))
 

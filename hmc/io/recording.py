@@ -22,7 +22,7 @@ from hmc.camera.reduction import reduce_image, reduce_mask, reduced_camera, redu
 from hmc.errors import InputError
 from hmc.io.calibration import build_camera
 from hmc.io.footage import Footage, find_footage, number_images, read_footage, starting_at
-from hmc.io.places import RecordingPlaces, places_of, to_places
+from hmc.io.places import AnyPlaces, RecordingPlaces, places_of, to_places
 
 __all__ = [
     "Frame",
@@ -131,11 +131,7 @@ class Recording:
 
 
 def open_recording(
-    path: str | Path | RecordingPlaces,
-    cameras: Sequence[str] | None = None,
-    start: int = 0,
-    frames: int | None = None,
-    any_world: bool = False,
+    path: AnyPlaces, cameras: Sequence[str] | None = None, start: int = 0, frames: int | None = None, any_world: bool = False
 ) -> Recording:
     """Open a recording or a part of it.
 

@@ -56,9 +56,8 @@ def speed(positions: np.ndarray, frames: np.ndarray, fps: float) -> np.ndarray:
     """
     if len(frames) < 2:
         return np.full(len(frames), np.nan)
-    size = max(1, round(SMOOTH_S * fps))
-    smooth = uniform_filter1d(positions, size, axis=0, mode="nearest")
-    return np.linalg.norm(np.gradient(smooth, frames / fps, axis=0), axis=1)
+    velocities = uniform_filter1d(np.gradient(positions, frames / fps, axis=0), max(1, round(SMOOTH_S * fps)), axis=0, mode="nearest")
+    return np.linalg.norm(velocities, axis=1)
 
 
 def flexion(positions: np.ndarray, joint: tuple[str, str, str]) -> np.ndarray:
@@ -94,7 +93,8 @@ def curves_svg(result: TrialResult) -> str:
             axis.set_ylabel(name)
             axis.set_ylim(bottom=0)
             if axis.get_legend_handles_labels()[1]:
-                axis.legend(loc="upper right", ncols=4)
+                axis.legend(loc="lower right", bbox_to_anchor=(1, 0.98), ncols=4, borderaxespad=0)
+        axes[-1].ticklabel_format(axis="y", style="sci", scilimits=(-2, 3))
         axes[-1].set_xlabel("time, s")
         figure.align_ylabels()
         text = io.StringIO()

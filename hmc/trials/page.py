@@ -138,7 +138,7 @@ def _table(rows: Sequence[_Row]) -> str:
         values = [link, _chip(row.state.status), "", "", str(len(row.problems)), "", "", _seconds(row.state)]
         if result is not None:
             values[2], values[3] = str(result.n_frames), str(result.n_persons)
-            values[5] = _number(result.mean_cost, "{:.3g}")
+            values[5] = _number(result.mean_cost, "{:.2e}")
             values[6] = _number(100 * result.clear_share, "{:.0f} %")
         cells = (_cell(value, name, k > 1) for k, (name, value) in enumerate(zip(names, values, strict=True)))
         lines.append(f"<tr>{''.join(cells)}</tr>")

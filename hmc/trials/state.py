@@ -15,7 +15,7 @@ from hmc.errors import InputError
 from hmc.io.files import write_toml
 from hmc.io.results import read_run
 
-__all__ = ["DONE", "FAILED", "TrialState", "file_digest", "only_one", "read_state", "write_state"]
+__all__ = ["DONE", "FAILED", "TrialState", "digest", "only_one", "read_state", "write_state"]
 
 DONE, FAILED, BEGUN = "done", "failed", "not finished"
 STATE, LOCK = "trial.toml", ".lock"
@@ -36,7 +36,7 @@ class TrialState:
     findings : tuple of str
         What `hmc check` says.
     checked : str
-        Of which recording.
+        Digest of what says which recording was checked.
     drawn : str
         Digest of the result of which there are pictures.
     seconds : mapping
@@ -74,12 +74,9 @@ def write_state(folder: Path, state: TrialState) -> None:
     write_toml(folder / STATE, vars(state))
 
 
-def file_digest(*paths: Path) -> str:
-    """A digest of files, 16 hexadecimal digits."""
-    total = hashlib.sha256()
-    for path in paths:
-        total.update(path.read_bytes())
-    return total.hexdigest()[:16]
+def digest(*parts: bytes) -> str:
+    """A digest, 16 hexadecimal digits."""
+    return hashlib.sha256(b"".join(parts)).hexdigest()[:16]
 
 
 @contextmanager
