@@ -61,7 +61,7 @@ def test_what_is_wrong_is_said(values, said):
 
 
 def test_all_faults_are_told_at_once():
-    with pytest.raises(InputError, match="2 faults: .*layers.*; .*draws"):
+    with pytest.raises(InputError, match=r"2 faults: .*layers.*; .*draws"):
         apf({"annealed": {"layers": "x"}, "search": {"draws": "y"}})
 
 

@@ -79,7 +79,15 @@ def test_a_page_is_whole_in_itself(tmp_path):
     assert "<script" not in text and not re.search(r"(https?:)?//", re.sub(r"base64,[^\"]*", "", text))
     for link in page.links:
         assert link[1:] in page.ids if link.startswith("#") else (tmp_path / link.replace("%20", " ")).is_file()
-    for said in ("With Ana & Co (1.62 m).", "no videos/", "warning: videos differ", "cam_01: <frame> 3", "2.00e+00", "50 %", "0.50 s, frame 5"):
+    for said in (
+        "With Ana & Co (1.62 m).",
+        "no videos/",
+        "warning: videos differ",
+        "cam_01: <frame> 3",
+        "2.00e+00",
+        "50 %",
+        "0.50 s, frame 5",
+    ):
         assert said in page.text, said
     assert "<time>3 s</time>" in text and text == session_page(session_of(tmp_path, "one", "two people", "bad", "later"), tmp_path)
 

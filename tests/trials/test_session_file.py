@@ -55,7 +55,7 @@ def lab(tmp_path, recording_folder, ring):
 def test_every_trial_gets_what_its_folder_lacks(lab):
     session = read_session(lab)
     assert session.name == "a day" and [trial.name for trial in session.trials] == ["one", "two", "three"]
-    one, two, three = session.trials
+    one, two, _ = session.trials
     assert one.pose == {"voxel": 0.05, "seed": 2, "frames": 3} and two.pose == {"voxel": 0.05, "seed": 1}
     assert [str(person) for person in one.persons] == ["Ana (1.62 m)"] and two.persons == ()
     for trial in session.trials:
@@ -152,7 +152,9 @@ def test_all_faults_are_told_at_once(lab):
     assert all(word in str(caught.value) for word in ("fsp", "162", "Anna"))
 
 
-@pytest.mark.parametrize(("text", "said"), [("a = ", "not a TOML file"), (None, "no such file; a session is a TOML file"), ("", "no trials")])
+@pytest.mark.parametrize(
+    ("text", "said"), [("a = ", "not a TOML file"), (None, "no such file; a session is a TOML file"), ("", "no trials")]
+)
 def test_a_file_that_is_none(tmp_path, text, said):
     if text is not None:
         (tmp_path / "session.toml").write_text(text)
