@@ -96,10 +96,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def repeated(parser: argparse.ArgumentParser, args: argparse.Namespace, argv: Sequence[str]) -> argparse.Namespace:
     """The arguments with those of the run of ``--like`` where nothing is said."""
-    from hmc.cli.option_tables import like_defaults
+    from hmc.cli.option_tables import like_words
 
-    command_parser(parser, args.command).set_defaults(**like_defaults(args))
-    return parser.parse_args(argv)
+    return parser.parse_args([argv[0], *like_words(command_parser(parser, args.command), args), *argv[1:]])
 
 
 def command_parser(parser: argparse.ArgumentParser, command: str) -> argparse.ArgumentParser:

@@ -10,7 +10,7 @@ from typing import Any
 
 from hmc.errors import InputError
 
-__all__ = ["add_like_option", "arguments_of", "known_options", "like_defaults", "repeated_preset", "told_options"]
+__all__ = ["add_like_option", "arguments_of", "known_options", "like_words", "repeated_preset", "told_options"]
 
 #: What is of one call, and not of the result.
 OF_A_CALL = frozenset({"command", "run", "recording", "out", "quiet", "workers", "like", "session", "settings"})
@@ -40,13 +40,20 @@ def _told(value: Any) -> Any:
     return str(value.resolve()) if isinstance(value, Path) else value
 
 
-def like_defaults(args: argparse.Namespace) -> dict[str, Any]:
-    """What options are where they are not said: those of the run of ``--like``.
+def like_words(parser: argparse.ArgumentParser, args: argparse.Namespace) -> list[str]:
+    """The options of the run of ``--like`` as words of a command line, to stand before those that are said.
+
+    Parameters
+    ----------
+    parser : ArgumentParser
+        The command's.
+    args : Namespace
+        What is said.
 
     Raises
     ------
     InputError
-        When that is no file of a run, or of another command.
+        When that is no file of a run, or of another command, or what it holds are no options.
     """
     options = dict(_run(args.like).get("options", {}))
     command = options.pop("command", None)
@@ -54,14 +61,10 @@ def like_defaults(args: argparse.Namespace) -> dict[str, Any]:
         raise InputError(f"--like {args.like}: does not say with which options it was made; give the run.toml of a run of this version")
     if command != args.command:
         raise InputError(f"--like {args.like}: was made by `hmc {command}`, not by `hmc {args.command}`")
-    given = vars(args)
-    for name in options:
-        if name not in given:
-            raise InputError(f"--like {args.like}: `hmc {command}` of this version has no option `{name}`; take it out of [options]")
     # Options that add up take the place of the run's, where any are given.
-    return {
-        name: value for name, value in options.items() if not (isinstance(given[name], list) and isinstance(value, list) and given[name])
-    }
+    adding = {name for name, action in known_options(parser).items() if isinstance(action, argparse._AppendAction)}
+    kept = {name: value for name, value in options.items() if not (name in adding and getattr(args, name))}
+    return arguments_of(parser, kept, f"--like {args.like}: [options]", args.like.parent)
 
 
 def repeated_preset(args: argparse.Namespace) -> tuple[str, Mapping[str, Any]] | None:

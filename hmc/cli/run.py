@@ -164,6 +164,7 @@ def run_apart(session: Path, options: TrialOptions, parameters: Mapping[str, Any
 
 def _tell(session, trials: Sequence, out: Path) -> None:
     """A line for every trial of this call, and how many of the session failed."""
+    from hmc.trials.page import problems_of
     from hmc.trials.quality import read_trial_result
     from hmc.trials.state import FAILED, read_state
 
@@ -175,7 +176,7 @@ def _tell(session, trials: Sequence, out: Path) -> None:
         if result is None:
             print(f"{trial.name}: {state.status}{': ' * bool(state.fault)}{state.fault}")
             continue
-        people, problems = result.n_persons, len(result.problems)
+        people, problems = result.n_persons, len(problems_of(state, result))
         print(
             f"{trial.name}: {state.status}, {result.n_frames} frames, {people} person{'s' * (people != 1)}, "
             f"{problems} problem{'s' * (problems != 1)}, {sum(state.seconds.values()):.0f} s"

@@ -17,7 +17,7 @@ from hmc.trials.quality import TrialResult, read_trial_result
 from hmc.trials.session_file import Session, Trial
 from hmc.trials.state import DONE, FAILED, TrialState, read_state
 
-__all__ = ["CHECK_PICTURE", "MOMENTS_FOLDER", "VIDEO", "session_page"]
+__all__ = ["CHECK_PICTURE", "MOMENTS_FOLDER", "VIDEO", "problems_of", "session_page"]
 
 #: In a trial's folder.
 CHECK_PICTURE, MOMENTS_FOLDER, VIDEO = "check.png", "moments", "overlay.mp4"
@@ -79,11 +79,7 @@ class _Row:
 
     @property
     def problems(self) -> list[str]:
-        """What went wrong, what the check warns of, and what the run survived."""
-        told = [line for line in self.state.findings if not line.startswith("note: ")]
-        ran = [] if self.result is None else self.result.problems
-        new = [line for line in ran if not any(one.endswith(line) for one in told)]
-        return [self.state.fault] * bool(self.state.fault) + told + new
+        return problems_of(self.state, self.result)
 
 
 def session_page(session: Session, out: Path) -> str:
@@ -116,6 +112,13 @@ def session_page(session: Session, out: Path) -> str:
     head = f'<meta charset="utf-8">\n{viewport}\n<title>{escape(session.name)}</title>'
     lines = ["<!DOCTYPE html>", '<html lang="en">', f"<head>\n{head}\n<style>{_STYLE}</style>\n</head>", "<body>", "<main>", *body]
     return "\n".join([*lines, "</main>", "</body>", "</html>"]) + "\n"
+
+
+def problems_of(state: TrialState, result: TrialResult | None) -> list[str]:
+    """Why a trial failed, what the check warns of, and what the run survived, a line each."""
+    told = [line for line in state.findings if not line.startswith("note: ")]
+    ran = [] if result is None else result.problems
+    return [state.fault] * bool(state.fault) + told + [line for line in ran if not any(one.endswith(line) for one in told)]
 
 
 def _row(trial: Trial, out: Path) -> _Row:

@@ -91,7 +91,8 @@ def test_tracks_are_repeated(tmp_path):
         ("a = ", "not a TOML file"),
         ('method = "apf"\n', "does not say with which options it was made"),
         ('[options]\ncommand = "track"\n', "was made by `hmc track`, not by `hmc pose`"),
-        ('[options]\ncommand = "pose"\nspeed = 3\n', "`hmc pose` of this version has no option `speed`"),
+        ('[options]\ncommand = "pose"\nvoxel = -1\n', "[options]: `voxel`: must be a number above 0; got '-1'"),
+        ('[options]\ncommand = "pose"\nspeed = 3\n', "[options]: unknown option `speed`; did you mean `seed`?"),
         ('[options]\ncommand = "pose"\npreset = "default"\nmodel = []\n[parameters.preset]\nnames = 3\n', "no setting `names`"),
     ],
 )

@@ -247,3 +247,16 @@ def test_trials_side_by_side_end_with_a_parent_that_is_killed(tmp_path):
     told = again.communicate(timeout=300)
     assert again.returncode == 0, told
     assert files_of(out).keys() >= {"one/joints.csv", "two/joints.csv"}
+
+
+@pytest.mark.slow
+def test_trials_by_the_workers_of_a_scheduler(tmp_path):
+    distributed = pytest.importorskip("distributed")
+    lab, whole, out = make_lab(tmp_path / "lab"), tmp_path / "whole", tmp_path / "out"
+    (lab / "trials" / "empty").mkdir()
+    assert start(lab, whole).wait(300) == 2
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None, local_directory=tmp_path) as cluster:
+        process = start(lab, out, "--scheduler", cluster.scheduler_address)
+        told = process.communicate(timeout=300)
+    assert process.returncode == 2 and "2 of 3 trials done; failed: empty" in told[0], told
+    assert files_of(out) == files_of(whole)
