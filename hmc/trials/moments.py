@@ -69,7 +69,7 @@ def choose_cameras(recording: Recording, people: Sequence[Sequence[Person]]) -> 
     shown = np.array([in_view(camera, points).mean() for camera in recording.rig])
     away = np.array([camera.centre - middle for camera in recording.rig])
     size = np.array([camera.matrix[0, 0] for camera in recording.rig]) / np.linalg.norm(away, axis=1)
-    worth = shown**2 * np.sqrt(size / size.max())
+    worth = shown**4 * np.sqrt(size / size.max())
     first = int(np.argmax(worth))
     if len(recording.rig) == 1:
         return [first]

@@ -213,11 +213,17 @@ def start(lab, out, *more):
     return subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
+def finished_code(process):
+    """The exit code, when it has ended and its pipes are closed."""
+    process.communicate(timeout=300)
+    return process.returncode
+
+
 @pytest.mark.slow
 def test_a_killed_run_goes_on_and_leaves_the_same_bytes(tmp_path):
     lab = make_lab(tmp_path / "lab")
     whole, killed, beside = tmp_path / "whole", tmp_path / "killed", tmp_path / "beside"
-    assert start(lab, whole).wait(300) == 0
+    assert finished_code(start(lab, whole)) == 0
     for journal in (".track.journal", ".pose.journal"):
         process = start(lab, killed)
         deadline = time.monotonic() + 60
@@ -254,7 +260,7 @@ def test_trials_by_the_workers_of_a_scheduler(tmp_path):
     distributed = pytest.importorskip("distributed")
     lab, whole, out = make_lab(tmp_path / "lab"), tmp_path / "whole", tmp_path / "out"
     (lab / "trials" / "empty").mkdir()
-    assert start(lab, whole).wait(300) == 2
+    assert finished_code(start(lab, whole)) == 2
     with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None, local_directory=tmp_path) as cluster:
         process = start(lab, out, "--scheduler", cluster.scheduler_address)
         told = process.communicate(timeout=300)
