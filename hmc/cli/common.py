@@ -21,6 +21,7 @@ __all__ = [
     "load_given_plugins",
     "open_given_keypoints",
     "open_selected",
+    "places_source",
     "positive_float",
     "print_problems",
     "progress",
@@ -195,12 +196,16 @@ def camera_names(text: str) -> list[str]:
 
 def recording_source(recording) -> dict[str, Any]:
     """What a result says of the recording it was made from: where it lies, and when its files last changed."""
-    from datetime import UTC, datetime
-
     from hmc.io.places import places_of
 
-    places = places_of(recording)
-    source = {"recording": recording.path.resolve(), "recording_changed": datetime.fromtimestamp(places.changed_s(), UTC).isoformat()}
+    return places_source(places_of(recording))
+
+
+def places_source(places) -> dict[str, Any]:
+    """As `recording_source`, of a recording that need not be opened."""
+    from datetime import UTC, datetime
+
+    source = {"recording": places.path.resolve(), "recording_changed": datetime.fromtimestamp(places.changed_s(), UTC).isoformat()}
     lacks = {"calibration": places.calibration, "background": places.background, "videos": places.videos, **places.settings}
     given = {name: value.resolve() if isinstance(value, Path) else value for name, value in lacks.items() if value is not None}
     return source | ({"given": given} if given else {})

@@ -100,15 +100,13 @@ def _check(session, trial, options: TrialOptions, state):
     """Look the recording over, unless it was in this form before."""
     from hmc.camera.rig_picture import save_rig_picture
     from hmc.check import inspect_recording
-    from hmc.cli.common import recording_source
+    from hmc.cli.common import places_source
     from hmc.io.files import sibling, to_toml
-    from hmc.io.recording import open_recording
     from hmc.trials.page import CHECK_PICTURE
     from hmc.trials.state import digest, write_state
 
     args, picture = pose_arguments(session, trial, options), options.out / trial.name / CHECK_PICTURE
-    recording = open_recording(trial.places, cameras=args.cameras)
-    source = digest(to_toml({**recording_source(recording), "cameras": args.cameras}).encode())
+    source = digest(to_toml({**places_source(trial.places), "cameras": args.cameras}).encode())
     if state.checked == source and picture.exists():
         return state
     found: list = []
@@ -116,6 +114,7 @@ def _check(session, trial, options: TrialOptions, state):
     def check() -> None:
         inspection = inspect_recording(trial.places, args.cameras)
         found.extend(inspection.findings)
+        picture.unlink(missing_ok=True)
         if inspection.rig is not None and inspection.room is not None:
             with sibling(picture) as path:
                 save_rig_picture(path, inspection.rig, inspection.room, inspection.images, trial.name)

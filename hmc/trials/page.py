@@ -116,7 +116,7 @@ def session_page(session: Session, out: Path) -> str:
 
 def problems_of(state: TrialState, result: TrialResult | None) -> list[str]:
     """Why a trial failed, what the check warns of, and what the run survived, a line each."""
-    told = [line for line in state.findings if not line.startswith("note: ")]
+    told = [line for line in state.findings if not line.startswith("note: ") and line.partition(": ")[2] not in state.fault]
     ran = [] if result is None else result.problems
     return [state.fault] * bool(state.fault) + told + [line for line in ran if not any(one.endswith(line) for one in told)]
 

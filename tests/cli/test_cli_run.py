@@ -121,7 +121,7 @@ def test_a_fault_of_one_trial_does_not_stop_the_others(tmp_path, capsys):
     (lab / "trials" / "empty").mkdir()
     assert run(lab, tmp_path / "out", "--trials", "empty,two") == 2
     told = capsys.readouterr()
-    assert "hmc run: empty: " in told.err and "no videos/" in told.err and "Traceback" not in told.err
+    assert "hmc run: empty: " in told.err and "camera 'cam_06' has no video" in told.err and "Traceback" not in told.err
     assert "two: done" in told.out and "1 of 2 trials done; failed: empty" in told.out
     assert read_state(tmp_path / "out" / "empty").status == FAILED and not (tmp_path / "out" / "one").exists()
     page = (tmp_path / "out" / "report.html").read_text()
@@ -129,6 +129,19 @@ def test_a_fault_of_one_trial_does_not_stop_the_others(tmp_path, capsys):
     (lab / "trials" / "empty" / "videos").symlink_to(TINY / "videos")
     assert run(lab, tmp_path / "out", "--trials", "empty") == 0
     assert "empty: done, 30 frames" in capsys.readouterr().out
+
+
+def test_all_that_is_wrong_with_a_trial_is_told(tmp_path, capsys):
+    lab = make_lab(tmp_path / "lab")
+    videos = lab / "trials" / "two" / "videos"
+    videos.mkdir(parents=True)
+    for name in ("cam_00", "cam_04"):
+        (videos / f"{name}.mp4").symlink_to(TINY / "videos" / f"{name}.mp4")
+    (videos / "cam_02.mp4").write_bytes(b"no video")
+    assert run(lab, tmp_path / "out", "--trials", "two") == 2
+    told = capsys.readouterr().err
+    assert "cam_02.mp4: this video cannot be read" in told and "camera 'cam_06' has no video" in told and told.count("\n") == 1
+    assert "1 failed" in (tmp_path / "out" / "report.html").read_text()
 
 
 def test_what_breaks_by_itself_is_told_too(lab, tmp_path, capsys, monkeypatch):
