@@ -43,7 +43,7 @@ PLACES = {
     "pose.registry": (6, 2),
 }  # fmt: skip
 #: Rooms around the way of a frame, which may use all that they need of it: no arrows.
-AROUND = ("check", "synthetic", "metrics", "view", "pose.smoothing", "api", "session", "experiments")
+AROUND = ("check", "synthetic", "metrics", "view", "pose.smoothing", "api", "session", "trials", "experiments")
 #: Of everybody's use, or too small for a box.
 LEFT_OUT = {"errors", "landmarks", "plugins", "callable_package", "__init__", "__main__", "pose.__init__"}
 WIDTH, HEIGHT, COLUMN, ROW = 2.2, 0.72, 3.05, 1.0

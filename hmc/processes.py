@@ -15,17 +15,19 @@ import multiprocessing
 import os
 import signal
 import sys
+import threading
+import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from multiprocessing.connection import Connection
 from typing import Any, TypeVar
 
 import cv2
 import numpy as np
 
-__all__ = ["ahead", "arrays_ahead", "available_processors", "each_ahead", "may_fork", "share_out"]
+__all__ = ["ahead", "arrays_ahead", "available_processors", "each_ahead", "end_with", "may_fork", "share_out"]
 
 T = TypeVar("T")
 K = TypeVar("K")
@@ -34,6 +36,8 @@ K = TypeVar("K")
 DEPTH = 3
 #: Arrays begin at multiples of this, bytes.
 ALIGNED = 64
+#: How often a process looks whether its parent is still there, seconds.
+LOOK_S = 1.0
 #: Of messages: an item, the end, an exception.
 ITEM, END, FAILED = range(3)
 
@@ -46,6 +50,20 @@ def available_processors() -> int:
 def may_fork() -> bool:
     """Whether work may be given to processes here: on Linux, and not within such a process."""
     return sys.platform == "linux" and not multiprocessing.current_process().daemon
+
+
+@cache
+def end_with(parent: int) -> None:
+    """Let this process end when its parent does: a parent that is killed cannot end it, and it would compute on."""
+    if os.getpid() == parent:
+        return  # no process was started
+
+    def look() -> None:
+        while os.getppid() == parent:
+            time.sleep(LOOK_S)
+        os._exit(1)
+
+    threading.Thread(target=look, daemon=True).start()
 
 
 def ahead(make: Callable[[], Iterable[T]], workers: int = 2) -> Iterator[T]:

@@ -21,10 +21,11 @@ from hmc.check.moments import probe_masks
 from hmc.check.silhouettes import hull_findings
 from hmc.check.world_findings import world_findings
 from hmc.errors import InputError
-from hmc.io.calibration import CalibrationEntry, build_camera, read_entries
+from hmc.io.calibration import CalibrationEntry, build_camera
 from hmc.io.footage import Footage, read_footage
 from hmc.io.keypoints import open_keypoints
 from hmc.io.naming import FILES, find_files, footage_items, item_name
+from hmc.io.places import AnyPlaces, to_places
 from hmc.io.recording import (
     Frame,
     Recording,
@@ -36,7 +37,6 @@ from hmc.io.recording import (
     wrong_sizes,
     wrong_units,
 )
-from hmc.io.settings import read_settings
 from hmc.io.views import find_views
 from hmc.io.world import world_of
 
@@ -83,13 +83,13 @@ class Inspection:
         return not any(finding.severity == "error" for finding in self.findings)
 
 
-def check_recording(path: str | Path, cameras: Sequence[str] | None = None, read_all: bool = False) -> list[Finding]:
+def check_recording(path: AnyPlaces, cameras: Sequence[str] | None = None, read_all: bool = False) -> list[Finding]:
     """Find what is wrong with a recording.
 
     Parameters
     ----------
-    path : str or Path
-        Folder of the recording.
+    path : str, Path or RecordingPlaces
+        Folder of the recording, or where its parts lie.
     cameras : sequence of str, optional
         Look at these cameras only.
     read_all : bool
@@ -103,24 +103,25 @@ def check_recording(path: str | Path, cameras: Sequence[str] | None = None, read
     return list(inspect_recording(path, cameras, read_all).findings)
 
 
-def inspect_recording(path: str | Path, cameras: Sequence[str] | None = None, read_all: bool = False) -> Inspection:
+def inspect_recording(path: AnyPlaces, cameras: Sequence[str] | None = None, read_all: bool = False) -> Inspection:
     """As `check_recording`, with what a picture of the rig needs. Parameters as there."""
-    path = Path(path)
+    places = to_places(path)
+    path = places.path
     found: list[Finding] = []
 
     def say(severity: str, sentences: Iterable[str]) -> None:
         found.extend(Finding(severity, sentence) for sentence in sentences)
 
-    if not path.is_dir():
+    if not places.there:
         return Inspection((Finding("error", f"{path}: no such folder"),))
     settings: dict[str, Any] = {}
     try:
-        settings = read_settings(path)
+        settings = places.read_settings()
     except InputError as error:
         say("error", [str(error)])
     room = settings.get("room")
     try:
-        entries = read_entries(path)
+        entries = places.read_entries()
     except InputError as error:
         say("error", [str(error)])
         return Inspection(tuple(found))
@@ -153,7 +154,7 @@ def inspect_recording(path: str | Path, cameras: Sequence[str] | None = None, re
     images = tuple(None if view is None else next(read_footage(view, 0, 1, lambda line: None, ""), None) for view in own)
     if not any(finding.severity == "error" for finding in found):
         try:
-            recording = open_recording(path, cameras=cameras)
+            recording = open_recording(places, cameras=cameras)
         except InputError as error:
             say("error", [str(error)])
     if recording is not None:
@@ -196,8 +197,7 @@ def _views_by_camera(
 
     footage, silhouettes = find_views(path, names, all_names, count=False, on_error=on_error, settings=settings)
     views = {name: image or mask for name, image, mask in zip(names, footage, silhouettes, strict=True)}
-    known = [name for name in names if name not in unreadable]
-    say("error", missing_views(path, known, [views[name] for name in known]))
+    say("error", missing_views(path, names, [views[name] for name in names], unreadable))
     return {name: view for name, view in views.items() if view is not None}
 
 

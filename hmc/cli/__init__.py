@@ -16,9 +16,9 @@ from collections.abc import Sequence
 from hmc import __version__
 from hmc.errors import InputError
 
-__all__ = ["main"]
+__all__ = ["command_parser", "main", "make_parser", "repeated"]
 
-COMMANDS = ("check", "world", "synth", "track", "pose", "evaluate", "view")
+COMMANDS = ("check", "world", "synth", "track", "pose", "evaluate", "view", "run")
 
 EXIT_WORKER = 1
 EXIT_INPUT = 2
@@ -69,6 +69,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         parser.print_help()
         return 0
     try:
+        if getattr(args, "like", None) is not None:
+            args = repeated(parser, args, argv)
         code = args.run(args)
         sys.stdout.flush()
         return code or 0
@@ -90,3 +92,16 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print(f"hmc {args.command}: interrupted", file=sys.stderr)
         return EXIT_INTERRUPTED
+
+
+def repeated(parser: argparse.ArgumentParser, args: argparse.Namespace, argv: Sequence[str]) -> argparse.Namespace:
+    """The arguments with those of the run of ``--like`` where nothing is said."""
+    from hmc.cli.option_tables import like_words
+
+    return parser.parse_args([argv[0], *like_words(command_parser(parser, args.command), args), *argv[1:]])
+
+
+def command_parser(parser: argparse.ArgumentParser, command: str) -> argparse.ArgumentParser:
+    """The parser of one command."""
+    (subparsers,) = (action for action in parser._actions if isinstance(action, argparse._SubParsersAction))
+    return subparsers.choices[command]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from hmc.cli.common import camera_names
+from hmc.cli.common import add_session_option, camera_names, given_places
 
 __all__ = ["add_parser", "run"]
 
@@ -20,6 +20,7 @@ def add_parser(subparsers) -> None:
         "The exit code is 2 if the recording cannot be used.",
     )
     parser.add_argument("recording", type=Path, help="folder of the recording")
+    add_session_option(parser)
     parser.add_argument("--out", type=Path, default=None, metavar="FILE.png", help="the picture (default: NAME_check.png here)")
     parser.add_argument("--cameras", type=camera_names, default=None, metavar="A,B,...", help="look at these cameras only (default: all)")
     parser.add_argument("--all", action="store_true", help="read every frame (default: the first 90)")
@@ -29,7 +30,7 @@ def run(args: argparse.Namespace) -> int:
     """Print one line a finding, a table of keypoints where there are some, and a last line that sums up; write the picture."""
     from hmc.check import inspect_recording
 
-    inspection = inspect_recording(args.recording, args.cameras, args.all)
+    inspection = inspect_recording(given_places(args), args.cameras, args.all)
     for finding in inspection.findings:
         print(finding)
     if inspection.keypoints is not None:

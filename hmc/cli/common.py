@@ -12,13 +12,16 @@ __all__ = [
     "add_image_option",
     "add_plugin_option",
     "add_selection_options",
+    "add_session_option",
     "add_workers_option",
     "camera_names",
     "gather_problems",
+    "given_places",
     "image_parameters",
     "load_given_plugins",
     "open_given_keypoints",
     "open_selected",
+    "places_source",
     "positive_float",
     "print_problems",
     "progress",
@@ -29,29 +32,37 @@ __all__ = [
 ]
 
 T = TypeVar("T")
-#: Files of a recording on which its results depend.
-SOURCES = (
-    "calibration*",
-    "recording.toml",
-    "videos/*",
-    "images/*/*",
-    "images/*",
-    "silhouettes/*/*",
-    "background/*",
-    "background/*/*",
-    "keypoints/*",
-    "keypoints/*/*",
-    "pose/*/*",
-)
 
 
 def add_selection_options(parser: argparse.ArgumentParser) -> None:
-    """Add the recording itself, ``--start``, ``--frames``, ``--cameras`` and ``--quiet``."""
+    """Add the recording itself, ``--session``, ``--start``, ``--frames``, ``--cameras`` and ``--quiet``."""
     parser.add_argument("recording", type=Path, help="folder of the recording")
+    add_session_option(parser)
     parser.add_argument("--start", type=whole_number, default=0, metavar="N", help="first frame (default: 0)")
     parser.add_argument("--frames", type=whole_number, default=None, metavar="N", help="how many frames (default: all)")
     parser.add_argument("--cameras", type=camera_names, default=None, metavar="A,B,...", help="use these cameras only (default: all)")
     parser.add_argument("--quiet", action="store_true", help="no progress bar")
+
+
+def add_session_option(parser: argparse.ArgumentParser) -> None:
+    """Add ``--session``."""
+    parser.add_argument(
+        "--session",
+        type=Path,
+        metavar="FILE",
+        help="the session.toml that gives what the recording's folder lacks, of a trial of a session",
+    )
+
+
+def given_places(args: argparse.Namespace):
+    """Where the parts of the recording lie, which may be a trial of ``--session``."""
+    from hmc.io.places import RecordingPlaces
+
+    if args.session is None:
+        return RecordingPlaces(args.recording)
+    from hmc.trials.session_file import places_in_session, read_session
+
+    return places_in_session(read_session(args.session), args.recording)
 
 
 def add_workers_option(parser: argparse.ArgumentParser) -> None:
@@ -106,7 +117,7 @@ def open_selected(args: argparse.Namespace):
     """Open the recording that `add_selection_options` describes."""
     from hmc.io.recording import open_recording
 
-    return open_recording(args.recording, cameras=args.cameras, start=args.start, frames=args.frames)
+    return open_recording(given_places(args), cameras=args.cameras, start=args.start, frames=args.frames)
 
 
 def open_given_keypoints(recording, asked: str):
@@ -185,11 +196,19 @@ def camera_names(text: str) -> list[str]:
 
 def recording_source(recording) -> dict[str, Any]:
     """What a result says of the recording it was made from: where it lies, and when its files last changed."""
+    from hmc.io.places import places_of
+
+    return places_source(places_of(recording))
+
+
+def places_source(places) -> dict[str, Any]:
+    """As `recording_source`, of a recording that need not be opened."""
     from datetime import UTC, datetime
 
-    times = [file.stat().st_mtime for pattern in SOURCES for file in recording.path.glob(pattern)]
-    changed = datetime.fromtimestamp(max(times, default=0.0), UTC).isoformat()
-    return {"recording": recording.path.resolve(), "recording_changed": changed}
+    source = {"recording": places.path.resolve(), "recording_changed": datetime.fromtimestamp(places.changed_s(), UTC).isoformat()}
+    lacks = {"calibration": places.calibration, "background": places.background, "videos": places.videos, **places.settings}
+    given = {name: value.resolve() if isinstance(value, Path) else value for name, value in lacks.items() if value is not None}
+    return source | ({"given": given} if given else {})
 
 
 def was_finished(written: Sequence[Path], run_path: Path, depends_on: Mapping[str, Any]) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -24,9 +25,10 @@ from hmc.cli.common import (
     was_finished,
     whole_number,
 )
+from hmc.cli.option_tables import add_like_option, repeated_preset, told_options
 from hmc.cli.pose_markers import MARKERS_JOURNAL, add_marker_options, read_markers
 from hmc.cli.track import JOURNAL, add_tracker_options, selected_frontend, selected_tracker
-from hmc.pose.registry import INITS, METHODS, pose_method
+from hmc.pose.registry import BUILT_IN, INITS, METHODS, pose_method
 
 __all__ = ["add_parser", "run"]
 
@@ -54,6 +56,7 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     add_selection_options(parser)
     add_workers_option(parser)
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the result")
+    add_like_option(parser)
     parser.add_argument(
         "--method",
         metavar="NAME",
@@ -78,6 +81,12 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     named = {name for entry in METHODS.values() for name in entry.presets}
     parser.add_argument(
         "--preset", default="default", metavar="NAME", help=f"{', '.join(sorted(named))}: as printed, where a work is named"
+    )
+    parser.add_argument(
+        "--settings",
+        type=Path,
+        metavar="FILE.toml",
+        help="values in place of the preset's, in tables as [parameters.preset] of run.toml has them: [annealed] layers = 3",
     )
     parser.add_argument("--voxel", type=positive_float, default=0.03, metavar="M", help="side of a voxel, metres (default: 0.03)")
     add_image_option(parser)
@@ -137,7 +146,7 @@ def run(args: argparse.Namespace) -> int:
 
     plugins = load_given_plugins(args)
     name = args.method or ("keypoints" if args.cues == CUES[2] else "apf")
-    method = pose_method(name, args.preset, args.model, args.init, args.markers == "skin", args.passes)
+    method = pose_method(name, args.preset, args.model, args.init, args.markers == "skin", args.passes, _settings(args, name))
     recording = open_selected(args)
     if not args.full_images:
         recording = for_method(recording, method, min(args.voxel, args.track_voxel))
@@ -223,16 +232,25 @@ def run(args: argparse.Namespace) -> int:
     problems += people.notes
     write_tracks(paths["tracks.csv"], _pelvis_tracks(people) if tracks is None else tracks)
     write_joints(paths["joints.csv"], people.poses)
-    write_pose(paths["pose.npz"], people.states)
+    write_pose(paths["pose.npz"], replace(people.states, costs=people.costs))
     if any(people.details):
         write_fits(args.out / "fits.csv", people.frames.tolist(), people.persons.tolist(), people.status, people.details)
-    write_run(paths["run.toml"], name, parameters, args.seed, **source, problems=gather_problems(problems))
+    write_run(paths["run.toml"], name, parameters, args.seed, **source, options=told_options(args), problems=gather_problems(problems))
     for name in (JOURNAL, POSE_JOURNAL, BACK_JOURNAL, MARKERS_JOURNAL, MASKS):
         for file in args.out.glob(f"{name}*"):
             file.unlink()
     _tell(people, recording, paths["joints.csv"])
     print_problems(problems)
     return 0
+
+
+def _settings(args: argparse.Namespace, name: str):
+    """Values in place of the preset's: those of the run that is repeated, then those of ``--settings``."""
+    from hmc.io.nested_settings import SettingsTable, read_settings_table
+
+    repeated = repeated_preset(args) if name in BUILT_IN else None
+    tables = [] if repeated is None else [SettingsTable(*repeated, complete=True)]
+    return tables + ([] if args.settings is None else [read_settings_table(args.settings)])
 
 
 def _keypoints(cues: str | None, recording, method):
@@ -285,18 +303,9 @@ def _pelvis_tracks(people):
 
 def _tell(people, recording, path: Path) -> None:
     """Print the persons that were found."""
-    import numpy as np
+    from hmc.trials.quality import person_lines
 
-    from hmc.body.proportions import stature
-
-    for person in np.unique(people.poses.persons):
-        rows = people.poses.persons == person
-        frames, body = people.poses.frames[rows], people.states.bodies.get(int(person))
-        tall = "no pose" if body is None else f"stature about {stature({name: float(value) for name, value in body.items()}):.2f} m"
-        print(f"person {person}: {rows.sum()} frames, from {frames.min()} to {frames.max()}, {tall}")
-    if not len(people.poses.frames):
-        print(f"no person in {recording.n_frames} frames")
-    print(f"wrote {path}")
+    print(*person_lines(people.poses, people.states, recording.n_frames), f"wrote {path}", sep="\n")
 
 
 def _height(text: str, recording) -> float | None:

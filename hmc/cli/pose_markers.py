@@ -128,10 +128,10 @@ def _source(args: argparse.Namespace, recording) -> tuple[Path, bool]:
 
 def _read(path: Path, recording):
     """The detections of the recording's selection."""
-    from hmc.io.calibration import read_entries
     from hmc.io.detections import DetectionTable, read_detections
+    from hmc.io.places import places_of
 
-    table = read_detections(path, [entry.name for entry in read_entries(recording.path)])
+    table = read_detections(path, [entry.name for entry in places_of(recording).read_entries()])
     chosen = (table.frames >= recording.start) & (table.frames < recording.start + recording.n_frames)
     return DetectionTable(table.frames[chosen], table.cameras[chosen], table.uv[chosen])
 

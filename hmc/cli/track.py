@@ -26,6 +26,7 @@ from hmc.cli.common import (
     was_finished,
     whole_number,
 )
+from hmc.cli.option_tables import add_like_option, told_options
 
 if TYPE_CHECKING:
     from hmc.io.recording import Recording
@@ -60,6 +61,7 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     add_selection_options(parser)
     add_workers_option(parser)
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the result")
+    add_like_option(parser)
     add_tracker_options(parser)
     add_plugin_option(parser)
     parser.add_argument("--voxel", type=positive_float, metavar="M", help=f"side of a voxel, metres (default: {VOXEL_M})")
@@ -172,7 +174,9 @@ def run(args: argparse.Namespace) -> int:
     table = work.track(run, timings.append)
     write_tracks(tracks_path, table)
     speed = {name: value for timing in timings for name, value in _speed(timing, recording.fps).items()}
-    write_run(run_path, work.method, parameters, args.seed, **source, problems=gather_problems(problems), speed=speed)
+    write_run(
+        run_path, work.method, parameters, args.seed, **source, options=told_options(args), problems=gather_problems(problems), speed=speed
+    )
     journal.unlink(missing_ok=True)
     print(_summary(table, recording.n_frames))
     if speed:

@@ -34,7 +34,7 @@ class Found(NamedTuple):
     notes: dict[str, str]
 
 
-def find_files(recording: Path, kind: str, names: Sequence[str], settings: Mapping[str, Any]) -> Found:
+def find_files(recording: Path, kind: str, names: Sequence[str], settings: Mapping[str, Any], folder: Path | None = None) -> Found:
     """Find the cameras' files in one of a recording's folders.
 
     What recording.toml says stands. Otherwise a file or folder that is called like the camera is the camera's. For cameras without one,
@@ -50,7 +50,9 @@ def find_files(recording: Path, kind: str, names: Sequence[str], settings: Mappi
     names : sequence of str
         All cameras of the calibration.
     settings : mapping
-        Of recording.toml, checked.
+        Of recording.toml, checked; of a trial whose session says where its videos are, ``videos`` is a path with `PLACE` in it.
+    folder : Path, optional
+        Where files of this kind are, if not in the recording's own folder of that name.
 
     Returns
     -------
@@ -62,6 +64,8 @@ def find_files(recording: Path, kind: str, names: Sequence[str], settings: Mappi
         When recording.toml names a camera or file that is not there, or it is not clear which file is meant.
     """
     said = settings.get(kind, {})
+    if isinstance(said, Path):
+        return Found({name: _in_place(Path(str(said).replace(PLACE, name))) for name in names}, {})
     if isinstance(said, str):
         return Found({name: _by_pattern(recording, kind, said, name) for name in names}, {})
     strangers = [name for name in said if name not in names]
@@ -74,7 +78,7 @@ def find_files(recording: Path, kind: str, names: Sequence[str], settings: Mappi
         if not file.exists():
             raise InputError(f"{recording / 'recording.toml'}: `{kind}` gives camera '{name}' the file {file}, which is not there")
     given = {path.resolve() for paths in files.values() for path in paths}
-    items = [item for item in footage_items(recording / kind) if item.resolve() not in given]
+    items = [item for item in footage_items(folder or recording / kind) if item.resolve() not in given]
     exact = {item_name(item) for item in items}
     if kind == "videos":  # no guess goes before images that bear the camera's name
         exact |= {item_name(item) for item in footage_items(recording / "images")}
@@ -132,6 +136,13 @@ def _guess(recording: Path, kind: str, names: Sequence[str], items: Sequence[Pat
             file = candidates[0].relative_to(recording).as_posix()
             raise InputError(f'{recording / kind}: {what}; say which in recording.toml: {kind} = {{ "{name}" = "{file}", ... }}')
     return {name: candidates[0] for name, candidates in fitting.items() if candidates}
+
+
+def _in_place(path: Path) -> tuple[Path, ...]:
+    """The file or folder at a path, or the one there whose name has a suffix more; none where there is none."""
+    if path.exists():
+        return (path,)
+    return tuple(sorted(path.parent.glob(f"{glob.escape(path.name)}.*"))[:1])
 
 
 def _by_pattern(recording: Path, kind: str, pattern: str, name: str) -> tuple[Path, ...]:

@@ -8,7 +8,7 @@ Units are metres, Z is up and the floor is at z = 0.
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -24,6 +24,7 @@ from hmc.errors import InputError
 from hmc.io.calibration import build_camera, read_entries
 from hmc.io.footage import Footage, read_footage
 from hmc.io.naming import footage_items, item_name
+from hmc.io.places import AnyPlaces, RecordingPlaces, places_of, to_places
 from hmc.io.settings import read_settings
 from hmc.io.sizes import fit_size, size_cure
 from hmc.io.views import find_background, find_views
@@ -95,6 +96,8 @@ class Recording:
     factors : tuple of int
         How many times smaller than in their files the images and silhouettes of each camera are read (`reduced`); `rig` is that of the
         smaller ones. Empty where there is nothing to read.
+    places : RecordingPlaces or None
+        Where its parts lie, where not all of them lie in `path`.
     """
 
     path: Path
@@ -109,6 +112,7 @@ class Recording:
     room_is_estimated: bool = False
     problems: tuple[str, ...] = ()
     factors: tuple[int, ...] = ()
+    places: RecordingPlaces | None = None
     _footage: tuple[Footage | None, ...] = field(default=(), repr=False)
     _silhouettes: tuple[Footage | None, ...] = field(default=(), repr=False)
     _background: tuple[Footage | None, ...] = field(default=(), repr=False)
@@ -135,7 +139,7 @@ class Recording:
 
 
 def open_recording(
-    path: str | Path, cameras: Sequence[str] | None = None, start: int = 0, frames: int | None = None, any_world: bool = False
+    path: AnyPlaces, cameras: Sequence[str] | None = None, start: int = 0, frames: int | None = None, any_world: bool = False
 ) -> Recording:
     """Open a recording or a part of it.
 
@@ -144,8 +148,8 @@ def open_recording(
 
     Parameters
     ----------
-    path : str or Path
-        Folder of the recording.
+    path : str, Path or RecordingPlaces
+        Folder of the recording, or where its parts lie.
     cameras : sequence of str, optional
         Names of the cameras to use, in this order; by default all.
     start : int
@@ -171,11 +175,11 @@ def open_recording(
     >>> recording.n_frames, recording.rig.names, recording.fps
     (10, ('cam_00', 'cam_02'), 15.0)
     """
-    path = Path(path)
-    if not path.is_dir():
+    places = to_places(path)
+    path = places.path
+    if not places.there:
         raise InputError(f"{path}: no such folder; a recording is a folder with calibration.toml and videos/ or images/")
-    settings = read_settings(path)
-    entries = read_entries(path)
+    settings, entries = places.read_settings(), places.read_entries()
     all_names = [entry.name for entry in entries]
     if cameras is not None:
         cameras = [cameras] if isinstance(cameras, str) else cameras
@@ -220,7 +224,7 @@ def open_recording(
             f"0 to {total - 1}: choose other --start and --frames"
         )
 
-    background = find_background(path, rig, all_names, settings, problems)
+    background = find_background(places.background_folder, path, rig, all_names, settings, problems)
     fps = settings.get("fps") or next((view.fps for view in footage if view is not None and view.fps), DEFAULT_FPS)
     room = settings.get("room")
     return Recording(
@@ -236,6 +240,7 @@ def open_recording(
         room_is_estimated=room is None,
         problems=tuple(problems),
         factors=(1,) * len(rig),
+        places=places,
         _footage=tuple(footage),
         _silhouettes=tuple(silhouettes),
         _background=tuple(background),
@@ -299,7 +304,7 @@ def whole_recording(recording: Recording) -> Recording:
     """All frames of the same cameras, as large as they are read in this selection."""
     views = [image or mask for image, mask in zip(recording._footage, recording._silhouettes, strict=True)]
     total = common_length([view.n_frames for view in views if view is not None])
-    return replace(recording, start=0, n_frames=min(total, read_settings(recording.path).get("frames") or total))
+    return replace(recording, start=0, n_frames=min(total, places_of(recording).read_settings().get("frames") or total))
 
 
 def reduced(recording: Recording, factors: Sequence[int]) -> Recording:
@@ -400,15 +405,15 @@ def common_length(lengths: Sequence[int]) -> int:
     return ordered[min(1, len(ordered) - 1)] if ordered else 0
 
 
-def missing_views(path: Path, names: Sequence[str], views: Sequence[Footage | None]) -> list[str]:
-    """One sentence for each camera without images and silhouettes."""
-    lost = [name for name, view in zip(names, views, strict=True) if view is None]
+def missing_views(path: Path, names: Sequence[str], views: Sequence[Footage | None], told: Collection[str] = ()) -> list[str]:
+    """One sentence for each camera without images and silhouettes, but for those of which more is told already."""
+    lost = [name for name, view in zip(names, views, strict=True) if view is None and name not in told]
     if not lost:
         return []
     used = {view.path for view in views if view is not None}
     spare = next((item for item in footage_items(path / "videos") if item not in used and item_name(item) not in names), None)
     cure = f'say whose is whose in recording.toml: videos = {{ "{lost[0]}" = "videos/{spare.name if spare else "FILE.mp4"}", ... }}'
-    if not any(views):
+    if not any(views) and not told:
         return [f"{path}: no videos/, images/ or silhouettes/ with the cameras' names ({', '.join(names)}); name them so, or {cure}"]
     return [
         f"{path}: camera '{name}' of the calibration has no video, images or silhouettes; name them so, {cure}, or leave it out: --cameras"

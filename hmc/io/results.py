@@ -128,6 +128,8 @@ class PoseStates:
         Name of every state variable.
     bodies : mapping
         Person number to that person's dimensions: a mapping from name (`height_m`, ...) to a number or an array of numbers.
+    costs : ndarray, shape (n,), optional
+        What the method minimised, of each row; NaN where there is none.
 
     Raises
     ------
@@ -140,10 +142,11 @@ class PoseStates:
     states: np.ndarray
     dof_names: tuple[str, ...]
     bodies: Mapping[int, Mapping[str, float | np.ndarray]] = field(default_factory=dict)
+    costs: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "dof_names", tuple(str(name) for name in self.dof_names))
-        _set_rows(self, states=(len(self.dof_names),))
+        _set_rows(self, states=(len(self.dof_names),), **({} if self.costs is None else {"costs": ()}))
 
 
 def _set_rows(table: Any, **tails: tuple[int, ...]) -> None:
@@ -289,6 +292,8 @@ def _refuse_twice(path: Path, cells: np.ndarray, lines: np.ndarray, what: str) -
 def write_pose(path: str | Path, poses: PoseStates) -> None:
     """Write state vectors and bodies to an `.npz` file of plain arrays."""
     arrays = {"frames": poses.frames, "persons": poses.persons, "states": poses.states, "dof_names": np.array(poses.dof_names, dtype=str)}
+    if poses.costs is not None:
+        arrays["costs"] = poses.costs
     for person, body in poses.bodies.items():
         for name, value in body.items():
             arrays[f"body/{int(person)}/{name}"] = np.asarray(value, float)
@@ -312,7 +317,8 @@ def read_pose(path: str | Path) -> PoseStates:
                     _, person, name = key.split("/", 2)
                     bodies.setdefault(int(person), {})[name] = data[key]
             names = tuple(str(name) for name in data["dof_names"])
-            return PoseStates(data["frames"], data["persons"], data["states"], names, bodies)
+            costs = data["costs"] if "costs" in data.files else None
+            return PoseStates(data["frames"], data["persons"], data["states"], names, bodies, costs)
     except OSError as error:
         raise InputError(f"{path}: cannot read the poses ({error.strerror or error})") from error
     except (ValueError, KeyError, EOFError, TypeError, AttributeError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:

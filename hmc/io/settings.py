@@ -16,7 +16,7 @@ from hmc.io.naming import FILES, PLACE
 from hmc.io.sizes import FITS
 from hmc.io.world import UNITS, UPS
 
-__all__ = ["read_settings"]
+__all__ = ["check_settings", "read_settings"]
 
 SETTINGS = ("name", "fps", "frames", "units", "up", "room", "persons", "subject_height_m", "first_frame", "image_size", *FILES)
 #: No room is wider (metres): beyond, it is in millimetres.
@@ -38,6 +38,17 @@ def read_settings(path: Path) -> dict[str, Any]:
         settings = tomllib.loads(file.read_text(encoding="utf-8-sig"))
     except (ValueError, RecursionError) as error:
         raise InputError(f"{file}: not a TOML file ({error}); mend or remove it") from None
+    return check_settings(settings, file)
+
+
+def check_settings(settings: Mapping[str, Any], file: Path) -> dict[str, Any]:
+    """Keys and values of a ``recording.toml``, or of a table of another file that has the same, checked.
+
+    Raises
+    ------
+    InputError
+        When a key is unknown or its value is not what it must be.
+    """
     for key in settings:
         if key not in SETTINGS:
             near = difflib.get_close_matches(key, SETTINGS, 1, 0.0)

@@ -83,17 +83,18 @@ def find_views(
 
 
 def find_background(
-    path: Path, rig: Rig, all_names: Sequence[str], settings: Mapping[str, Any], problems: list[str]
+    folder: Path, path: Path, rig: Rig, all_names: Sequence[str], settings: Mapping[str, Any], problems: list[str]
 ) -> list[Footage | None]:
-    """The empty scene of each camera; what cannot be used is left out and added to the problems."""
+    """The empty scene of each camera, in a folder of the recording's at `path` or another; what cannot be used is left out and added to the
+    problems."""
     background: list[Footage | None] = []
     try:
-        files = find_files(path, "background", all_names, settings)
+        files = find_files(path, "background", all_names, settings, folder)
     except InputError as error:
         problems.append(f"{error}; going on without background")
         return [None] * len(rig)
     problems.extend(note for name, note in files.notes.items() if name in rig.names)
-    coming = _side_by_side(lambda name: _open(path / "background", Found(files.files, {}), name, None, False), rig.names)
+    coming = _side_by_side(lambda name: _open(folder, Found(files.files, {}), name, None, False), rig.names)
     for camera, outcome in zip(rig, coming, strict=True):
         found = None
         try:

@@ -103,7 +103,7 @@ class PosedPeople:
     def save(self, folder: str | Path) -> None:
         """Write ``joints.csv`` and ``pose.npz``, as `hmc pose` does."""
         write_joints(Path(folder) / "joints.csv", self.poses)
-        write_pose(Path(folder) / "pose.npz", self.states)
+        write_pose(Path(folder) / "pose.npz", replace(self.states, costs=self.costs))
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal, cast, get_args
+from typing import TYPE_CHECKING, Any, Literal, cast, get_args
 
 from hmc.errors import InputError
+from hmc.io.nested_settings import SettingsTable, changed
 from hmc.plugins import load_plugins
 
 if TYPE_CHECKING:
@@ -42,12 +43,15 @@ class MethodChoice:
         One of `INITS`; None: as the preset has it.
     skin : bool
         Markers are worn on the skin; else they are the joint centres.
+    settings : sequence of SettingsTable
+        Values in place of the preset's, one table after the other.
     """
 
     preset: str = "default"
     models: Sequence[str] = ()
     init: Init | None = None
     skin: bool = True
+    settings: Sequence[SettingsTable] = ()
 
 
 @dataclass(frozen=True)
@@ -74,7 +78,13 @@ class MethodEntry:
 
 
 def pose_method(
-    name: str, preset: str = "default", models: Sequence[str] = (), init: str | None = None, skin: bool = True, passes: int = 2
+    name: str,
+    preset: str = "default",
+    models: Sequence[str] = (),
+    init: str | None = None,
+    skin: bool = True,
+    passes: int = 2,
+    settings: Sequence[SettingsTable] = (),
 ) -> PoseMethod:
     """A method by its name.
 
@@ -86,6 +96,8 @@ def pose_method(
         As in `MethodChoice`.
     passes : {1, 2}
         1: without the second pass, backward in time, that most methods' `default` has (`hmc.pose.backward`).
+    settings
+        As in `MethodChoice`; tables are named as the fields of `PoseMethod.settings`, which `run.toml` has as ``parameters.preset``.
 
     Raises
     ------
@@ -112,7 +124,9 @@ def pose_method(
         raise InputError(f"--init {init}: method {name}{'' if preset == 'default' else f' of preset {preset}'} has a start of its own")
     if passes not in (1, 2):
         raise InputError(f"`passes` must be 1 or 2; got {passes!r}")
-    method = entry.make(MethodChoice(preset, models, cast("Init | None", init), skin))
+    if settings and name not in BUILT_IN:
+        raise InputError(f"{settings[0].where}: method {name} is not of the package; its settings are in its own file")
+    method = entry.make(MethodChoice(preset, models, cast("Init | None", init), skin, settings))
     return method if passes == 2 else replace(method, back=None)
 
 
@@ -150,7 +164,7 @@ def _annealed(name: str) -> Callable[[MethodChoice], PoseMethod]:
         from hmc.pose.methods.annealed import annealed_method
         from hmc.pose.methods.scalable import method_preset
 
-        return annealed_method(method_preset(_house(choice), name, choice.models), name)
+        return annealed_method(changed(method_preset(_house(choice), name, choice.models), choice.settings), name)
 
     return make
 
@@ -164,28 +178,37 @@ def _house(choice: MethodChoice, preset: str | None = None):
 
 
 def _smd(choice: MethodChoice) -> PoseMethod:
-    from hmc.pose.methods.smd import SMD_PRESETS, smd_method
+    parts: dict[str, Any]
+    from hmc.pose.methods.smd import SMD_PRESETS, DaVinciStart, smd_method
 
-    return smd_method(SMD_PRESETS[choice.preset], None if choice.preset == "kehl2006" else _house(choice, "default"))
+    if choice.preset == "kehl2006":
+        printed = SMD_PRESETS[choice.preset]
+        parts = changed({"descent": printed, "without_da_vinci": DaVinciStart(printed).otherwise.preset}, choice.settings)
+        return smd_method(parts["descent"], None, parts["without_da_vinci"])
+    parts = changed({"descent": SMD_PRESETS[choice.preset], "house": _house(choice, "default")}, choice.settings)
+    return smd_method(parts["descent"], parts["house"])
 
 
 def _pso(choice: MethodChoice) -> PoseMethod:
     from hmc.pose.methods.pso import SWARM_PRESETS, pso_method
 
-    return pso_method(SWARM_PRESETS[choice.preset], None if choice.preset == "hsiao2008" else _house(choice, "default"))
+    if choice.preset == "hsiao2008":
+        return pso_method(changed({"swarm": SWARM_PRESETS[choice.preset]}, choice.settings)["swarm"])
+    parts: dict[str, Any] = changed({"swarm": SWARM_PRESETS[choice.preset], "house": _house(choice, "default")}, choice.settings)
+    return pso_method(parts["swarm"], parts["house"])
 
 
 def _markers(choice: MethodChoice) -> PoseMethod:
     from hmc.pose.methods.marker_apf import marker_method
     from hmc.pose.steps.marker_filter import MARKER_PRESETS
 
-    return marker_method(MARKER_PRESETS[choice.preset], choice.skin)
+    return marker_method(changed(MARKER_PRESETS[choice.preset], choice.settings), choice.skin)
 
 
 def _keypoints(choice: MethodChoice) -> PoseMethod:
-    from hmc.pose.methods.keypoints import keypoint_method
+    from hmc.pose.methods.keypoints import KeypointPreset, keypoint_method
 
-    return keypoint_method()
+    return keypoint_method(changed(KeypointPreset(), choice.settings))
 
 
 #: By name, in the order in which they are listed.

@@ -20,7 +20,7 @@ from hmc.voxels import hulls as frontend
 def little_work():
     """The methods as they are, with less work, people watched for three frames."""
 
-    def lean(name, preset, models, init, skin, passes):
+    def lean(name, preset, models, init, skin, passes, settings):
         method = lean_method(name, preset, tuple(models), init, skin)
         return method if passes == 2 else replace(method, back=None)
 

@@ -72,13 +72,15 @@ MAY_IMPORT = {
     "check": VOXELS | {"check", "callable_package"},
     "view": VIEW | {"callable_package"},
     "synthetic": IO | BODY | {"synthetic"},
+    # a session's file, what is kept of its trials, and its report, which shows poses and bodies over images; runs nothing itself
+    "trials": VIEW | {"trials"},
     "plugins": BASE,
     "processes": set(),
     "session": POSE | {"session"},
     "experiments": EVERYTHING,
     "api": EVERYTHING,
     "callable_package": set(),  # finds `api` by its name, once it is called
-    "cli": EVERYTHING | {"experiments"},
+    "cli": EVERYTHING | {"experiments", "trials"},
     "__main__": {"cli"},
     "__init__": set(),
 }

@@ -11,7 +11,6 @@ from __future__ import annotations
 import contextlib
 import functools
 import os
-import threading
 import time
 import traceback
 from collections.abc import Callable, Iterator, Mapping
@@ -28,13 +27,11 @@ from hmc.experiments.engine.selection import grid_of
 from hmc.experiments.engine.store import cell_key, cell_path, cell_rng, cell_text, read_cell, write_text
 from hmc.io.provenance import code_state, machine
 from hmc.plugins import add_plugins, plugin_files
+from hmc.processes import end_with
 
 __all__ = ["Outcome", "compute_cells", "plan_for", "plan_of", "run_experiment", "stored_cells"]
 
 Progress = Callable[[int, int], None]
-
-#: How often a worker looks whether its parent is still there, seconds.
-LOOK_S = 1.0
 
 
 @dataclass(frozen=True)
@@ -180,22 +177,8 @@ def compute_cells(
 
 def _work(parent: int, task: Callable[[dict[str, Any]], str], parameters: dict[str, Any]) -> str:
     """A task in a worker."""
-    _end_with(parent)
+    end_with(parent)
     return task(parameters)
-
-
-@functools.cache
-def _end_with(parent: int) -> None:
-    """Let this process end when its parent does: a parent that is killed cannot end its workers, and they would compute on."""
-    if os.getpid() == parent:
-        return  # joblib found no way to start workers
-
-    def look() -> None:
-        while os.getppid() == parent:
-            time.sleep(LOOK_S)
-        os._exit(1)
-
-    threading.Thread(target=look, daemon=True).start()
 
 
 @dataclass(frozen=True)

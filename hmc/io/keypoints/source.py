@@ -10,11 +10,11 @@ import numpy as np
 
 from hmc.camera.reduction import reduce_pixels
 from hmc.errors import InputError
-from hmc.io.calibration import read_entries
 from hmc.io.footage import Footage
 from hmc.io.keypoints.csv_forms import read_csv_table
 from hmc.io.keypoints.json_forms import last_number, read_json_frame, read_json_table
 from hmc.io.keypoints.people import NOBODY, RawPeople, is_normalised, to_pixels
+from hmc.io.places import places_of
 from hmc.io.recording import Recording
 
 __all__ = ["KeypointSource", "open_keypoints"]
@@ -166,7 +166,7 @@ def open_keypoints(recording: Recording) -> KeypointSource | None:
             offsets.append(first + _offset(views))
         present = tuple(item is not None for item in found)
         return KeypointSource(folder, rig.names, present, recording.factors, tuple(readers), tuple(offsets))
-    all_names = [entry.name for entry in read_entries(recording.path)] if strangers else []
+    all_names = [entry.name for entry in places_of(recording).read_entries()] if strangers else []
     for folder, names in strangers:
         if not any(_item_of(name, [folder / one for one in names]) for name in all_names):
             raise InputError(

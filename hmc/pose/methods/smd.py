@@ -82,7 +82,7 @@ class DaVinciStart:
         return replace(started, state=state)
 
 
-def smd_method(preset: SmdPreset, house: PosePreset | None = None) -> PoseMethod:
+def smd_method(preset: SmdPreset, house: PosePreset | None = None, without_da_vinci: PosePreset | None = None) -> PoseMethod:
     """The descent as the paper has it, or with the house's start, refinement, search, recovery and legs.
 
     Parameters
@@ -90,10 +90,12 @@ def smd_method(preset: SmdPreset, house: PosePreset | None = None) -> PoseMethod
     preset : SmdPreset
     house : PosePreset, optional
         Whose start and refinement are used; the paper's method alone where left out.
+    without_da_vinci : PosePreset, optional
+        Of the paper's method alone: whose start is used where nobody stands as da Vinci's man does.
     """
     equip = partial(solid_subject, preset=preset)
     if house is None:
-        start = DaVinciStart(preset)
+        start = DaVinciStart(preset) if without_da_vinci is None else DaVinciStart(preset, WindowStart(without_da_vinci))
         settings = {"descent": preset, "without_da_vinci": start.otherwise.preset}
         return PoseMethod("smd", "Kehl and Van Gool (2006)", start, as_proposed(descended()), NEEDS, equip, settings=settings)
     return PoseMethod(

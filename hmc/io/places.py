@@ -1,0 +1,121 @@
+"""Where the parts of a recording lie: its own folder, and elsewhere what that lacks.
+
+A trial of a session has no calibration and no empty scene of its own: the session has one for all of its trials. What the folder itself has
+goes before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from hmc.io.calibration import CalibrationEntry, find_calibration, read_entries
+from hmc.io.calibration.read import PATTERNS
+from hmc.io.settings import read_settings
+
+if TYPE_CHECKING:
+    from hmc.io.recording import Recording
+
+__all__ = ["AnyPlaces", "RecordingPlaces", "places_of", "to_places"]
+
+#: In the pattern of videos, where a camera's name goes.
+CAMERA = "{camera}"
+#: So many of the patterns of calibrations match nothing else: a camera's own .xml or .yml beside a trial's videos is none.
+OF_RIGS = 10
+#: Files of a recording on which its results depend.
+SOURCES = (
+    "calibration*",
+    "recording.toml",
+    "videos/*",
+    "images/*/*",
+    "images/*",
+    "silhouettes/*/*",
+    "background/*",
+    "background/*/*",
+    "keypoints/*",
+    "keypoints/*/*",
+    "pose/*/*",
+)
+
+
+@dataclass(frozen=True)
+class RecordingPlaces:
+    """Where the parts of a recording lie.
+
+    Parameters
+    ----------
+    path : Path
+        Its own folder; it need not be there where there is a pattern of videos.
+    calibration : Path or None
+        File or folder of the calibration, where its own folder has none.
+    background : Path or None
+        Folder with a video or a subfolder of images a camera, where its own folder has none.
+    videos : str or None
+        Path of the cameras' videos with ``{camera}`` in it, where its own folder has no videos/.
+    settings : mapping
+        Keys of ``recording.toml``, checked, where its own does not say.
+    """
+
+    path: Path
+    calibration: Path | None = None
+    background: Path | None = None
+    videos: str | None = None
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def there(self) -> bool:
+        """Whether there may be a recording: its folder is there, or not needed."""
+        return self.path.is_dir() or self.videos is not None
+
+    def read_settings(self) -> dict[str, Any]:
+        """Checked settings, as `hmc.io.settings.read_settings`."""
+        own = self.path / "videos"
+        elsewhere = {} if self.videos is None or own.is_dir() else {"videos": Path(self.videos)}
+        return {**self.settings, **elsewhere, **read_settings(self.path)}
+
+    def read_entries(self) -> list[CalibrationEntry]:
+        """What the calibration states, as `hmc.io.calibration.read_entries`."""
+        return read_entries(self.calibration_place)
+
+    @property
+    def calibration_place(self) -> Path:
+        """The file or folder that the calibration is looked for in."""
+        if self.calibration is None:
+            return self.path
+        folders = (self.path, self.path / "calibration")
+        own = any(next(folder.glob(pattern), None) is not None for folder in folders for pattern in PATTERNS[:OF_RIGS])
+        return self.path if own else self.calibration
+
+    @property
+    def background_folder(self) -> Path:
+        """The folder of the empty scene."""
+        own = self.path / "background"
+        return own if self.background is None or own.is_dir() else self.background
+
+    def changed_s(self) -> float:
+        """When a file on which results depend last changed, seconds since 1970; 0 where there is none."""
+        files = [file for pattern in SOURCES for file in self.path.glob(pattern)]
+        if self.calibration is not None and self.calibration_place == self.calibration:
+            files += find_calibration(self.calibration)
+        if self.background is not None and self.background_folder == self.background:
+            files += [*self.background.glob("*"), *self.background.glob("*/*")]
+        if self.videos is not None:
+            pattern = Path(self.videos.replace(CAMERA, "*"))
+            files += pattern.parent.glob(pattern.name)
+        return max((file.stat().st_mtime for file in files), default=0.0)
+
+
+#: A recording's folder, or where its parts lie.
+AnyPlaces = str | Path | RecordingPlaces
+
+
+def to_places(given: AnyPlaces) -> RecordingPlaces:
+    """The places of a recording of which only the folder is given."""
+    return given if isinstance(given, RecordingPlaces) else RecordingPlaces(Path(given))
+
+
+def places_of(recording: Recording) -> RecordingPlaces:
+    """Where the parts of an opened recording lie."""
+    return recording.places or RecordingPlaces(recording.path)
