@@ -23,8 +23,10 @@ from hmc.errors import InputError
 from hmc.io.calibration import CalibrationEntry, build_camera, read_entries
 from hmc.io.footage import IMAGE_SUFFIXES, VIDEO_SUFFIXES, Footage, read_footage
 from hmc.io.keypoints import open_keypoints
-from hmc.io.recording import Frame, Recording, find_views, gaps, iterate_frames, open_recording, wrong_sizes, wrong_units
+from hmc.io.recording import Frame, Recording, iterate_frames, open_recording, wrong_sizes, wrong_units
 from hmc.io.settings import read_settings
+from hmc.io.timing import rates_differ
+from hmc.io.views import find_views, gaps
 
 __all__ = ["Finding", "Inspection", "check_recording", "inspect_recording"]
 
@@ -125,7 +127,7 @@ def inspect_recording(path: str | Path, cameras: Sequence[str] | None = None, re
     say("error", wrong_sizes(rig, own))
     say("error", wrong_units(rig))
     say("warning", gaps(own))
-    say("warning", rates([view.fps for view in own if view is not None]))
+    say("note", rates([view.fps for view in own if view is not None]))
     say("warning", itertools.chain.from_iterable(odd_camera(camera) for camera in rig))
     say("note", [sentence for camera in rig for sentence in orientation(camera)])
     say("warning", same_place(rig))
@@ -213,8 +215,8 @@ def unused_views(path: Path, names: Sequence[str]) -> list[str]:
 def rates(fps: Sequence[float | None]) -> list[str]:
     """A sentence when the videos' frame rates differ by more than 1 %."""
     known = [rate for rate in fps if rate]
-    if known and max(known) > 1.01 * min(known):
-        return [f"videos differ in frame rate ({min(known):g} to {max(known):g} a second); cameras must be synchronised, frame by frame"]
+    if rates_differ(known):
+        return [f"videos differ in frame rate ({min(known):g} to {max(known):g} a second); their frames are matched by their time stamps"]
     return []
 
 

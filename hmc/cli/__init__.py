@@ -18,7 +18,7 @@ from hmc.errors import InputError
 
 __all__ = ["main"]
 
-COMMANDS = ("check", "world", "synth", "track", "pose", "evaluate", "view")
+COMMANDS = ("check", "world", "sync", "synth", "track", "pose", "evaluate", "view")
 
 EXIT_WORKER = 1
 EXIT_INPUT = 2

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -21,8 +20,10 @@ from hmc.camera.model import Rig
 from hmc.camera.reduction import reduce_image, reduce_mask, reduced_camera, reduction_factors
 from hmc.errors import InputError
 from hmc.io.calibration import build_camera, read_entries
-from hmc.io.footage import Footage, find_footage, number_images, read_footage, starting_at
+from hmc.io.footage import Footage, find_footage, read_footage
 from hmc.io.settings import read_settings
+from hmc.io.timing import go_by_time, rates_differ
+from hmc.io.views import all_rates, common_length, find_views, gaps, missing_views, put_in_time, side_by_side
 
 __all__ = [
     "Frame",
@@ -69,7 +70,7 @@ class Recording:
         Its folder.
     name : str
     fps : float
-        Frames a second: of recording.toml, else of the first video, else 30.
+        Frames a second: of recording.toml, else of the first video (of the slowest, where they differ), else 30.
     rig : Rig
         The selected cameras.
     room : ndarray, shape (2, 3)
@@ -105,11 +106,17 @@ class Recording:
     _footage: tuple[Footage | None, ...] = field(default=(), repr=False)
     _silhouettes: tuple[Footage | None, ...] = field(default=(), repr=False)
     _background: tuple[Footage | None, ...] = field(default=(), repr=False)
+    _times: Mapping[str, np.ndarray] = field(default_factory=dict, repr=False)
 
     @property
     def known_height_m(self) -> float | None:
         """The stature of the person in it, metres; None where it is not known, or another person may be there too."""
         return self.subject_height_m[0] if len(self.subject_height_m) == 1 and self.persons in (None, 1) else None
+
+    @property
+    def _own_views(self) -> tuple[Footage | None, ...]:
+        """What frames are counted in, a camera: its images, or else its silhouettes."""
+        return tuple(image or mask for image, mask in zip(self._footage, self._silhouettes, strict=True))
 
     @property
     def has_images(self) -> bool:
@@ -184,7 +191,17 @@ def open_recording(
         raise InputError(
             f"{path / 'recording.toml'}: `first_frame` names '{strangers[0]}', no camera of the calibration ({', '.join(all_names)})"
         )
-    footage, silhouettes = find_views(path, names, all_names, starts=starts)
+    footage, silhouettes = find_views(path, names, all_names)
+    both = [image or mask for image, mask in zip(footage, silhouettes, strict=True)]
+    there = {name: view for name, view in zip(names, both, strict=True) if view is not None}
+    rates = all_rates(path, there, all_names)
+    by_stamps = rates_differ(rates)
+    fps = settings.get("fps") or (min(rates) if by_stamps else next(iter(rates), DEFAULT_FPS))
+    times = go_by_time(path, there, fps, by_stamps, starts)
+    footage, silhouettes = (
+        [put_in_time(view, starts.get(name, 0), times.get(name)) for name, view in zip(names, views, strict=True)]
+        for views in (footage, silhouettes)
+    )
     both = [image or mask for image, mask in zip(footage, silhouettes, strict=True)]
     sizes = {name: view.size for name, view in zip(names, both, strict=True) if view is not None}
     try:
@@ -213,7 +230,6 @@ def open_recording(
         )
 
     background = _find_background(path, rig, problems)
-    fps = settings.get("fps") or next((view.fps for view in footage if view is not None and view.fps), DEFAULT_FPS)
     room = settings.get("room")
     return Recording(
         path=path,
@@ -231,6 +247,7 @@ def open_recording(
         _footage=tuple(footage),
         _silhouettes=tuple(silhouettes),
         _background=tuple(background),
+        _times=times,
     )
 
 
@@ -289,8 +306,7 @@ def only_cameras(recording: Recording, cameras: Sequence[int]) -> Recording:
 
 def whole_recording(recording: Recording) -> Recording:
     """All frames of the same cameras, as large as they are read in this selection."""
-    views = [image or mask for image, mask in zip(recording._footage, recording._silhouettes, strict=True)]
-    total = common_length([view.n_frames for view in views if view is not None])
+    total = common_length([view.n_frames for view in recording._own_views if view is not None])
     return replace(recording, start=0, n_frames=min(total, read_settings(recording.path).get("frames") or total))
 
 
@@ -356,74 +372,10 @@ def background_frames(recording: Recording, camera_index: int, limit: int | None
         yield from (reduce_image(image, recording.factors[camera_index]) for image in reader if image is not None)
 
 
-def find_views(
-    path: Path,
-    names: Sequence[str],
-    all_names: Sequence[str],
-    count: bool = True,
-    on_error: Callable[[str, str], None] | None = None,
-    starts: Mapping[str, int] | None = None,
-) -> tuple[list[Footage | None], list[Footage | None]]:
-    """The images (in ``videos/``, else in ``images/``) and the silhouettes of each camera.
-
-    Parameters
-    ----------
-    path : Path
-        Folder of the recording.
-    names : sequence of str
-        The cameras wanted.
-    all_names : sequence of str
-        All cameras of the calibration: numbered images count from the smallest number of all, whichever are wanted.
-    count : bool
-        As `hmc.io.footage.open_video`.
-    on_error : callable, optional
-        Called with a camera's name and what is wrong with its files, which then count as missing; by default that is raised.
-    starts : mapping of str to int, optional
-        The frame of a camera's files that is frame 0 of the recording, where it is not the first.
-    """
-
-    def find(folder: Path, wanted: Sequence[str], first: int) -> list[Footage | None]:
-        def one(name: str) -> Footage | None:
-            found = find_footage(folder, name, first, count)
-            return found and starting_at(found, (starts or {}).get(name, 0))
-
-        return [settled(name, found) for name, found in zip(wanted, _side_by_side(one, wanted), strict=True)]
-
-    def settled(name: str, found: Future[Footage | None]) -> Footage | None:
-        try:
-            return found.result()
-        except InputError as error:
-            if on_error is None:
-                raise
-            on_error(name, str(error))
-            return None
-
-    images = path / "images"
-    first = _first_number(images, all_names)
-    footage = find(path / "videos", names, 0)
-    left = [name for name, found in zip(names, footage, strict=True) if found is None]
-    others = dict(zip(left, find(images, left, first), strict=True))
-    footage = [found or others[name] for name, found in zip(names, footage, strict=True)]
-    if not any(footage):
-        first = _first_number(path / "silhouettes", all_names)
-    return footage, find(path / "silhouettes", names, first)
-
-
-def _side_by_side(find: Callable[[str], Footage | None], names: Sequence[str]) -> list[Future[Footage | None]]:
-    """What is found of each camera, in threads: decoders, which do most of the work, let each other run."""
-    with ThreadPoolExecutor() as pool:
-        return [pool.submit(find, name) for name in names]
-
-
-def _first_number(folder: Path, names: Sequence[str]) -> int:
-    numbers = [min(number_images(folder / name), default=0) for name in names if (folder / name).is_dir()]
-    return min(numbers, default=0)
-
-
 def _find_background(path: Path, rig: Rig, problems: list[str]) -> list[Footage | None]:
     """The empty scene of each camera; what cannot be used is left out and added to the problems."""
     background: list[Footage | None] = []
-    coming = _side_by_side(lambda name: find_footage(path / "background", name, count=False), rig.names)
+    coming = side_by_side(lambda name: find_footage(path / "background", name, count=False), rig.names)
     for camera, outcome in zip(rig, coming, strict=True):
         found = None
         try:
@@ -435,33 +387,6 @@ def _find_background(path: Path, rig: Rig, problems: list[str]) -> list[Footage 
             found = None
         background.append(found)
     return background
-
-
-def gaps(views: Sequence[Footage | None]) -> list[str]:
-    """A sentence for each camera whose numbered images have holes."""
-    sentences = []
-    for view in views:
-        missing = [] if view is None or view.images is None else sorted(set(range(view.n_frames)) - view.images.keys())
-        if view is not None and missing:
-            sentences.append(f"{view.path}: {len(missing)} of {view.n_frames} images are missing, the first is frame {missing[0]}")
-    return sentences
-
-
-def common_length(lengths: Sequence[int]) -> int:
-    """Frames of which at least two cameras have an image; of the one, if there is one."""
-    ordered = sorted(lengths, reverse=True)
-    return ordered[min(1, len(ordered) - 1)] if ordered else 0
-
-
-def missing_views(path: Path, names: Sequence[str], views: Sequence[Footage | None]) -> list[str]:
-    """One sentence for each camera without images and silhouettes."""
-    if not any(views):
-        return [f"{path}: no videos/, images/ or silhouettes/ with the cameras' names ({', '.join(names)})"]
-    return [
-        f"{path}: camera '{name}' of the calibration has no video, images or silhouettes; name them so, or leave it out: --cameras"
-        for name, view in zip(names, views, strict=True)
-        if view is None
-    ]
 
 
 def wrong_sizes(rig: Rig, views: Sequence[Footage | None]) -> list[str]:
