@@ -75,7 +75,8 @@ def disagreements(recording: Recording, masks: Sequence[Sequence[np.ndarray | No
         if better.any() and rest[better].mean() >= max(GOOD_AGREEMENT, shares[others][better].mean() + GAIN):
             return [
                 f"camera '{names[index]}': its silhouettes do not fit the calibration and the other cameras', which fit each other; "
-                "is this its video, and has it moved since it was calibrated?"
+                "is this its video, and has it moved since it was calibrated? If it is early or late, by how much finds: "
+                f"hmc sync {recording.path}"
             ]
     if known.min() >= LEAST_AGREEMENT:
         return []

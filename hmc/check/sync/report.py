@@ -43,11 +43,13 @@ def inspect_synchrony(recording: Recording, search_s: float, moments: int) -> tu
     packed = packed_silhouettes(small)
     n = len(packed)
     reach = max(1, min(round(search_s * recording.fps), round(MOST_APART * n)))
-    parts = [by_silhouettes(small.rig, packed, reach)]
-    keypoints = open_keypoints(small)
+    evidence = by_silhouettes(small.rig, packed, reach)
+    found = find_synchrony(evidence)
+    keypoints = None if found.all_sure else open_keypoints(small)
     if keypoints is not None:
-        parts.append(by_keypoints(small.rig, keypoints, recording.start, n, reach))
-    found = find_synchrony(combined(parts))
+        # Keypoints scatter more than silhouettes of a known background do, but need none.
+        other = find_synchrony(combined([evidence, by_keypoints(small.rig, keypoints, recording.start, n, reach)]))
+        found = max(found, other, key=lambda one: sum(camera.status == "sure" for camera in one.cameras))
     now = [np.arange(n)] * len(small.rig)
     then = [one.course.frames(n) for one in found.cameras]
     whole = [t for t in range(n) if all(0 <= own[t] < n for own in then)] or list(range(n))
@@ -69,12 +71,12 @@ def sync_lines(recording: Recording, found: Synchrony, shares: np.ndarray, first
     """A table: a head, a line a camera, and a line for what is to be said of one."""
     names = recording.rig.names
     wide = max(8, *(len(name) for name in names))
-    lines = [f"{'camera':{wide}}  offset  first frame  drift/s  dropped  how sure  unlike others   covered by hulls"]
+    lines = [f"{'camera':{wide}}  offset   +/-  first frame  drift/s  dropped  how sure  unlike others   covered by hulls"]
     for c, (name, one) in enumerate(zip(names, found.cameras, strict=True)):
         course = one.course
         dropped = sum(-change for _, change in course.steps if change < 0)
         first = str(first_frames.get(name, "times"))
-        cells = f"{_offset(one):>6}  {first:>11}  {course.slope * recording.fps:7.2f}  {dropped:7d}  {one.status:>8}"
+        cells = f"{_offset(one):>6}  {_doubt(one):>4}  {first:>11}  {course.slope * recording.fps:7.2f}  {dropped:7d}  {one.status:>8}"
         lines.append(f"{name:{wide}}  {cells}  {_number(one.before)} -> {_number(one.after)}  {_share(shares[0, c])} -> {_share(shares[1, c])}")
     for name, one in zip(names, found.cameras, strict=True):
         lines += _remarks(name, one)
@@ -100,6 +102,10 @@ def _offset(one: CameraTime) -> str:
     if one.status != "sure":
         return "-"
     return f"{course.shift:+d}" if np.isnan(one.fraction) or course != Course(course.shift) else f"{course.shift + one.fraction:+.1f}"
+
+
+def _doubt(one: CameraTime) -> str:
+    return f"{one.doubt:.1f}" if one.status == "sure" and np.isfinite(one.doubt) else "-"
 
 
 def _listed(values: list[int]) -> str:
