@@ -42,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
     from hmc.io.new_timing import write_new_timing
     from hmc.io.recording import open_recording
 
-    recording = open_recording(args.recording, frames=args.frames)
+    recording = open_recording(args.recording, frames=args.frames, any_world=True)
     found, shares = inspect_synchrony(recording, args.search, MOMENTS)
     name = args.recording.resolve().name
     first_frames, times = new_timing(recording, [one.course for one in found.cameras])

@@ -173,5 +173,5 @@ def _is_odd(fps: float | None) -> bool:
     if not fps:
         return False
     usual = np.concatenate([USUAL_RATES, USUAL_RATES / 1.001])
-    return bool((np.abs(fps - usual) > 1e-4 * usual).all()) and fps != round(fps)
+    return bool((np.abs(fps - usual) > 1e-4 * usual).all())
 

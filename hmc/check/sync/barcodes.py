@@ -16,8 +16,8 @@ from hmc.camera.model import Camera, Rig, undistort
 
 __all__ = ["barcode", "shared_planes", "unlikeness"]
 
-#: Cameras nearer to each other than this, metres, have no planes to speak of.
-LEAST_BASELINE_M = 0.05
+#: Cameras nearer to each other than this share of the usual distance from the cameras' middle have no planes to speak of.
+LEAST_BASELINE = 0.01
 #: A row with fewer planes that cut a person tells nothing.
 LEAST_PLANES = 8
 
@@ -40,7 +40,8 @@ def shared_planes(rig: Rig, pair: tuple[int, int]) -> tuple[np.ndarray, np.ndarr
     one, other = pair
     baseline = rig[other].centre - rig[one].centre
     length = float(np.linalg.norm(baseline))
-    if length < LEAST_BASELINE_M:
+    usual = float(np.median(np.linalg.norm(rig.centres - rig.centres.mean(axis=0), axis=1)))
+    if length <= LEAST_BASELINE * usual:
         return None
     across = np.linalg.svd(baseline[None] / length)[2][1:]
     angles = [_plane_angles(rig[c], across) for c in pair]

@@ -17,12 +17,14 @@ NONE = -(10**9)
 ROOM, MOST_DROPPED = 20, 5
 #: A dropped frame is believed when it is seen in as many moments after it as would be as much worse by a whole frame.
 LEAST_SEEN = 8.0
+#: Where so many frames are dropped at once, a camera must be no worse than usual by so many frames' shift between any two steps.
+MANY, FITTING = 3, 2.0
 #: A moment counts for no worse than so many frames' shift.
 CAP = 4.0
 #: What is gained is more than so many deviations of what chance gains over all moments; moments of one part.
 NOISE, PART = 1.0, 12
 #: A clock is believed to be off when by the end it is so by this many frames, and not by more frames a frame than any clock is.
-LEAST_DRIFT, MOST_SLOPE = 0.75, 0.02
+LEAST_DRIFT, MOST_SLOPE = 0.75, 0.005
 
 
 @dataclass(frozen=True)
@@ -217,9 +219,14 @@ def _stepping(costs: np.ndarray, usual: float, frame: float, charge: float) -> t
         change[t] = np.where(fresh, steps, change[t - 1])
     t, k = n - 1, int(totals[-1].argmin())
     gain = float(sums[-1, ROOM] - totals[t, k])
-    found = []
+    found: list[tuple[int, int]] = []
+    fits: list[float] = []
     while began[t, k] > 0:
         moment, step = int(began[t, k]), int(change[t, k])
         found.append((moment, step))
+        fits.append(float(np.median(costs[moment : t + 1, k])))
         t, k = moment - 1 - max(0, -step), k - step
+    fits.append(float(np.median(costs[: t + 1, k])))
+    if max((abs(step) for _, step in found), default=0) >= MANY and max(fits) > usual + FITTING * frame:
+        return Course(), -charge  # not in time anywhere: it is something else that is wrong there
     return Course(shift=k - ROOM, steps=tuple(reversed(found))), gain

@@ -11,7 +11,7 @@ from hmc.check.sync.courses import Course, against, best_course
 from hmc.check.sync.evidence import Evidence
 from hmc.check.sync.shifts import Certainty, certainty, find_shifts, fractions, moved_curve
 
-__all__ = ["CameraTime", "Synchrony", "find_synchrony"]
+__all__ = ["CameraTime", "Synchrony", "find_synchrony", "joined"]
 
 #: A camera's shift is believed when any other is so many standard errors worse, or this share of the others find it alone ...
 LEAST_MARGIN, MOST_AGREEING = 2.5, 0.6
@@ -141,6 +141,20 @@ def find_synchrony(evidence: Evidence) -> Synchrony:
             misfit = one.after >= max(MISFIT, TIMES * usual)
             found[c] = replace(one, course=Course(), fraction=np.nan, after=one.before, status="misfit" if misfit else "weak")
     return Synchrony(tuple(found), _all_curves(curves, 0 * shifts, fitting), _all_curves(curves, shifts, fitting))
+
+
+def joined(first: Synchrony, second: Synchrony) -> Synchrony:
+    """What the first is sure of, and of the other cameras what the second found; the second alone where they share too little."""
+    both = [k for k, (one, other) in enumerate(zip(first.cameras, second.cameras, strict=True)) if one.status == other.status == "sure"]
+    plain = [k for k in both if first.cameras[k].course.is_plain and second.cameras[k].course.is_plain]
+    if not first.known or len(plain) < 2:
+        return second if sum(one.status == "sure" for one in second.cameras) > sum(one.status == "sure" for one in first.cameras) else first
+    apart = int(np.median([first.cameras[k].course.shift - second.cameras[k].course.shift for k in plain]))
+    cameras = [
+        one if one.status == "sure" or other.status != "sure" else replace(other, course=_moved(other.course, apart))
+        for one, other in zip(first.cameras, second.cameras, strict=True)
+    ]
+    return replace(first, cameras=tuple(cameras))
 
 
 def _is_sure(one: Certainty, partners: int) -> bool:

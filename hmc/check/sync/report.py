@@ -9,7 +9,7 @@ import numpy as np
 from hmc.check.silhouettes import covered_shares
 from hmc.check.sync.courses import Course
 from hmc.check.sync.evidence import by_keypoints, by_silhouettes, combined
-from hmc.check.sync.find import CameraTime, Synchrony, find_synchrony
+from hmc.check.sync.find import CameraTime, Synchrony, find_synchrony, joined
 from hmc.check.sync.silhouettes import masks_at, packed_silhouettes, small_recording
 from hmc.io.keypoints import open_keypoints
 from hmc.io.recording import Recording
@@ -49,7 +49,7 @@ def inspect_synchrony(recording: Recording, search_s: float, moments: int) -> tu
     if keypoints is not None:
         # Keypoints scatter more than silhouettes of a known background do, but need none.
         other = find_synchrony(combined([evidence, by_keypoints(small.rig, keypoints, recording.start, n, reach)]))
-        found = max(found, other, key=lambda one: sum(camera.status == "sure" for camera in one.cameras))
+        found = joined(found, other)
     now = [np.arange(n)] * len(small.rig)
     then = [one.course.frames(n) for one in found.cameras]
     whole = [t for t in range(n) if all(0 <= own[t] < n for own in then)] or list(range(n))

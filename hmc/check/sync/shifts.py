@@ -55,6 +55,8 @@ def find_shifts(curves: np.ndarray, members: Sequence[int] | None = None) -> np.
     """
     n = len(curves)
     members = list(range(n)) if members is None else list(members)
+    if not members:
+        return np.zeros(n, int)
     wells = _wells(curves)
     reach = wells.shape[2] // 2
     starts = [np.zeros(n, int)]
