@@ -111,7 +111,8 @@ def main() -> int:
     print("camera    shift  dropped  in time before  after  frames it lacks")
     for name in source.rig.names:
         true = f"{shifts.get(name, 0):+5d}  {('every ' + str(drops[name])) if name in drops else '-':>8}"
-        print(f"{name:8}  {true}  {before[name][0]:13.0%}  {after[name][0]:5.0%}  {after[name][1]:5d}{'  stranger' if name in strangers else ''}")
+        what = "  stranger" if name in strangers else ""
+        print(f"{name:8}  {true}  {before[name][0]:13.0%}  {after[name][0]:5.0%}  {after[name][1]:5d}{what}")
     return 0
 
 

@@ -83,7 +83,8 @@ def disagreements(recording: Recording, masks: Sequence[Sequence[np.ndarray | No
     listed = ", ".join(f"{name} {share:.0%}" for name, share in zip(names, shares, strict=True) if not np.isnan(share))
     return [
         f"silhouettes and calibration disagree (share of each that fits the others': {listed}); "
-        f"is each video that of its camera, and are they synchronised? That finds: hmc sync {recording.path}"
+        f"is each video that of its camera, and are they synchronised? That finds: "
+        f"hmc sync {recording.path}"
     ]
 
 
@@ -134,7 +135,10 @@ def _odd_camera(recording: Recording, hulls: Sequence[Hull]) -> list[str]:
         ways = ((right, ("left", "right")), (down, ("up", "down")))
         way = " and ".join(f"{round(abs(n) * max(rig[c].size) / 640)} px {words[n > 0]}" for n, words in ways if n)
         sentence += f"; {then:.1%} of its own would if they were moved {way}"
-    return [f"{sentence}; has it moved since it was calibrated, or is its video early or late? When each camera's frames were taken, finds: hmc sync {recording.path}"]
+    return [
+        f"{sentence}; has it moved since it was calibrated, or is its video early or late? When each camera's frames were taken, finds: "
+        f"hmc sync {recording.path}"
+    ]
 
 
 def covered_shares(recording: Recording, masks: Sequence[Sequence[np.ndarray | None]]) -> np.ndarray:

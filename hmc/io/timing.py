@@ -110,9 +110,7 @@ def write_times(file: Path, times: np.ndarray) -> None:
         target.write(HEAD + "\n" + "".join(f"{frame},{time:.6f}\n" for frame, time in enumerate(times) if np.isfinite(time)))
 
 
-def go_by_time(
-    path: Path, views: Mapping[str, Footage], fps: float, by_stamps: bool, starts: Mapping[str, int]
-) -> dict[str, np.ndarray]:
+def go_by_time(path: Path, views: Mapping[str, Footage], fps: float, by_stamps: bool, starts: Mapping[str, int]) -> dict[str, np.ndarray]:
     """When each frame of a camera's files was taken, of the cameras that go by time.
 
     Parameters
@@ -144,13 +142,15 @@ def go_by_time(
         times = read_times(file)
         if times is not None:
             if name in starts:
-                raise InputError(f"{file}: tells when frames were taken, and so does `first_frame` of recording.toml for '{name}'; leave one")
+                raise InputError(
+                    f"{file}: tells when frames were taken, and so does `first_frame` of recording.toml for '{name}'; leave one"
+                )
             in_frames = times * fps
             if not (nearest_frames(in_frames[: view.n_frames]) >= 0).any():
                 low, high = np.nanmin(times), np.nanmax(times)
                 raise InputError(
-                    f"{file}: no frame was taken from 0 s on, when the recording begins, and is there too ({low:g} to {high:g} s); give times "
-                    "from the recording's first frame on"
+                    f"{file}: no frame was taken from 0 s on, when the recording begins (its times are {low:g} to {high:g} s); "
+                    "give seconds from the recording's first frame on"
                 )
             found[name] = in_frames[: view.n_frames]
         elif view.images is None and (by_stamps or _is_odd(view.fps)):
@@ -174,4 +174,3 @@ def _is_odd(fps: float | None) -> bool:
         return False
     usual = np.concatenate([USUAL_RATES, USUAL_RATES / 1.001])
     return bool((np.abs(fps - usual) > 1e-4 * usual).all())
-

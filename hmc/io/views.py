@@ -97,7 +97,7 @@ def all_rates(path: Path, views: Mapping[str, Footage], all_names: Sequence[str]
             found = find_footage(folder, name, count=False)
         except InputError:
             continue  # it is not read
-        rates.append(found and found.fps)
+        rates.append(None if found is None else found.fps)
     return [rate for rate in rates if rate]
 
 

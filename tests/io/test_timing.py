@@ -53,7 +53,9 @@ def test_each_frame_is_the_nearest_or_none(steps, begin):
 
 @given(st.integers(1, 50), st.integers(-5, 5))
 def test_even_times_are_frames_counted(n, first):
-    np.testing.assert_array_equal(nearest_frames(np.arange(n) - first), np.r_[[-1] * max(0, -first), np.arange(max(0, first), n)][: max(0, n - first)])
+    np.testing.assert_array_equal(
+        nearest_frames(np.arange(n) - first), np.r_[[-1] * max(0, -first), np.arange(max(0, first), n)][: max(0, n - first)]
+    )
 
 
 def test_unknown_times_are_left_out():

@@ -48,7 +48,7 @@ def shared_planes(rig: Rig, pair: tuple[int, int]) -> tuple[np.ndarray, np.ndarr
     # Planes lie as far apart as neighbouring pixels do in the coarser view.
     step = max(float(np.median(np.abs(_wrapped(np.diff(angle, axis=axis))))) for angle in angles for axis in (0, 1))
     places = [np.floor((angle + np.pi) / step).astype(int) for angle in angles]
-    common = np.intersect1d(*places)
+    common = np.intersect1d(places[0], places[1])
     if len(common) < LEAST_PLANES:
         return None
     index = np.full(int(np.ceil(2 * np.pi / step)) + 2, -1)

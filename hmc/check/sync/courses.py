@@ -25,6 +25,8 @@ CAP = 4.0
 NOISE, PART = 1.0, 12
 #: A clock is believed to be off when by the end it is so by this many frames, and not by more frames a frame than any clock is.
 LEAST_DRIFT, MOST_SLOPE = 0.75, 0.005
+#: A clock is off, and nothing was dropped, where shifts over time are this much nearer to a line than to steps.
+LINE = 0.6
 
 
 @dataclass(frozen=True)
@@ -148,8 +150,14 @@ def best_course(costs: np.ndarray) -> tuple[Course, float]:
     charge = max(LEAST_SEEN * frame, NOISE * float(np.median(rises[:, 1])) * np.sqrt(told.sum()))
     now = float(filled[:, ROOM].sum())
     best = int(filled.sum(axis=0).argmin())
-    found = [(Course(shift=best - ROOM), now - float(filled[:, best].sum())), _drifting(filled, now, charge), _stepping(filled, usual, frame, charge)]
+    found = [
+        (Course(shift=best - ROOM), now - float(filled[:, best].sum())),
+        _drifting(filled, now, charge),
+        _stepping(filled, usual, frame, charge),
+    ]
     course, gain = max(found, key=lambda one: one[1])
+    if course.steps and all(change == course.steps[0][1] for _, change in course.steps):
+        course = _evenly(course, filled) or course
     return course, gain / charge
 
 
@@ -183,6 +191,34 @@ def _drifting(costs: np.ndarray, now: float, charge: float) -> tuple[Course, flo
     a, b = min(tried, key=tried.__getitem__)
     shift = round(a)
     return Course(shift, (), float(a - shift), float((b - a) / (len(costs) - 1))), now - tried[a, b] - charge
+
+
+def _evenly(course: Course, costs: np.ndarray) -> Course | None:
+    """The drift that steps stand for, where shifts of parts of the recording, to fractions of a frame, lie on a line rather than on steps.
+
+    Costs rise evenly from the truth to either side, so that both sides tell where between two frames it is.
+    """
+    n = len(costs)
+    told, shifts, steps = [], [], []
+    places = course.frames(n) - np.arange(n)
+    for part in np.array_split(np.arange(n), max(4, n // PART)):
+        means = costs[part].mean(axis=0)
+        k = int(means[1:-1].argmin()) + 1
+        before, now, after = means[k - 1 : k + 2]
+        there = places[part][places[part] > NONE // 2]
+        if max(before, after) > now and len(there):
+            told.append(float(part.mean()))
+            shifts.append(k - ROOM + (before - after) / (2 * (max(before, after) - now)))
+            steps.append(float(there.mean()))
+    if len(told) < 4:
+        return None
+    slope, start = np.polyfit(told, shifts, 1)
+    on_line = np.median(np.abs(np.array(shifts) - start - slope * np.array(told)))
+    on_steps = np.median(np.abs(np.array(shifts) - steps))
+    if abs(slope) > MOST_SLOPE or abs(slope) * n < LEAST_DRIFT or on_line > LINE * on_steps:
+        return None
+    shift = round(start)
+    return Course(shift, (), float(start - shift), float(slope))
 
 
 def _stepping(costs: np.ndarray, usual: float, frame: float, charge: float) -> tuple[Course, float]:

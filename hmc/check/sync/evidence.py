@@ -111,14 +111,10 @@ def by_silhouettes(rig: Rig, packed: Sequence[Sequence[Packed]], reach: int) -> 
     rows: dict[tuple[int, int], np.ndarray] = {}
     for c in range(len(rig)):
         masks = [unpack(moment[c]) for moment in packed]
-        for pair, planes in shared.items():
-            if planes is not None and c in pair:
-                rows[pair[pair.index(c)], pair[1 - pair.index(c)]] = barcode(masks, planes[pair.index(c)], planes[2])
-    bands = {
-        (i, j): banded(unlikeness(rows[i, j], rows[j, i]), reach)
-        for i, j in pairs
-        if (i, j) in rows
-    }
+        for (i, j), planes in shared.items():
+            if planes is not None and c in (i, j):
+                rows[(i, j) if c == i else (j, i)] = barcode(masks, planes[0] if c == i else planes[1], planes[2])
+    bands = {(i, j): banded(unlikeness(rows[i, j], rows[j, i]), reach) for i, j in pairs if (i, j) in rows}
     return Evidence(len(rig), len(packed), reach, bands)
 
 
@@ -185,4 +181,3 @@ def banded(matrix: np.ndarray, reach: int) -> np.ndarray:
     padded = np.full((n, n + 2 * reach), np.nan, np.float32)
     padded[:, reach : reach + n] = matrix
     return np.stack([padded[t, t : t + 2 * reach + 1] for t in range(n)])
-

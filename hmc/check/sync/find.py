@@ -133,8 +133,10 @@ def find_synchrony(evidence: Evidence) -> Synchrony:
         before, after = _middle(against(evidence, now, partners, c)), _middle(costs)
         part = float(parts[c]) if courses[c].is_plain else np.nan
         doubt = BIAS * after / rise if (rise := _rise(costs)) > 0 else np.inf
-        sure_of = len(fitting) >= 2 and c in fitting and (courses[c] == Course() or not courses[c].is_plain or _told(courses[c], part, doubt))
-        found.append(CameraTime(courses[c], part, doubt, own, before, after, "sure" if sure_of else "weak"))
+        course = courses[c]
+        if course.is_plain and course.shift and not _told(course, part, doubt):
+            course, part, after = Course(), np.nan, before
+        found.append(CameraTime(course, part, doubt, own, before, after, "sure" if len(fitting) >= 2 and c in fitting else "weak"))
     usual = float(np.median([found[c].after for c in fitting])) if fitting else np.nan
     for c, one in enumerate(found):
         if one.status != "sure":

@@ -54,8 +54,10 @@ def inspect_synchrony(recording: Recording, search_s: float, moments: int) -> tu
     then = [one.course.frames(n) for one in found.cameras]
     whole = [t for t in range(n) if all(0 <= own[t] < n for own in then)] or list(range(n))
     chosen = sorted({whole[round(k)] for k in np.linspace(0, len(whole) - 1, min(moments, len(whole)))})
-    masks = [[None if mask is None else _enlarged(mask, camera.size) for mask, camera in zip(frame, small.rig, strict=True)]
-             for frame in (*masks_at(packed, now, chosen), *masks_at(packed, then, chosen))]
+    masks = [
+        [None if mask is None else _enlarged(mask, camera.size) for mask, camera in zip(frame, small.rig, strict=True)]
+        for frame in (*masks_at(packed, now, chosen), *masks_at(packed, then, chosen))
+    ]
     shares = np.stack([covered_shares(small, masks[: len(chosen)]), covered_shares(small, masks[len(chosen) :])])
     return found, shares
 
@@ -77,7 +79,9 @@ def sync_lines(recording: Recording, found: Synchrony, shares: np.ndarray, first
         dropped = sum(-change for _, change in course.steps if change < 0)
         first = str(first_frames.get(name, "times"))
         cells = f"{_offset(one):>6}  {_doubt(one):>4}  {first:>11}  {course.slope * recording.fps:7.2f}  {dropped:7d}  {one.status:>8}"
-        lines.append(f"{name:{wide}}  {cells}  {_number(one.before)} -> {_number(one.after)}  {_share(shares[0, c])} -> {_share(shares[1, c])}")
+        lines.append(
+            f"{name:{wide}}  {cells}  {_number(one.before)} -> {_number(one.after)}  {_share(shares[0, c])} -> {_share(shares[1, c])}"
+        )
     for name, one in zip(names, found.cameras, strict=True):
         lines += _remarks(name, one)
     return lines

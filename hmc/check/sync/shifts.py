@@ -74,7 +74,7 @@ def find_shifts(curves: np.ndarray, members: Sequence[int] | None = None) -> np.
 
 def _wells(curves: np.ndarray) -> np.ndarray:
     """Curves with nothing above their median: far from the truth, more or less unlike is all one."""
-    n, _, size = curves.shape
+    n = len(curves)
     wells = np.zeros_like(curves)
     for i in range(n):
         for j in range(n):

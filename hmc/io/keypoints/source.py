@@ -85,9 +85,10 @@ class KeypointSource:
         InputError
             When a file of this frame is not as it should be; one line with its name.
         """
+        numbers = [index if view is None else view.in_file(index) for view in self._views]
         people = tuple(
-            NOBODY.copy() if reader is None or (number := index if view is None else view.in_file(index)) is None else reader(number + offset)
-            for reader, offset, view in zip(self._readers, self._offsets, self._views, strict=True)
+            NOBODY.copy() if reader is None or number is None else reader(number + offset)
+            for reader, offset, number in zip(self._readers, self._offsets, numbers, strict=True)
         )
         people = people if self._change is None else self._change(index, people)
         return tuple(_in_smaller(one, factor) for one, factor in zip(people, self.factors, strict=True))
