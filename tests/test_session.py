@@ -209,11 +209,14 @@ def test_arrays_alone_are_enough(tmp_path, ring):
 
 def test_the_lines_of_the_readme_run():
     clip = tiny_clip(FRAMES)
-    page = (TINY.parents[2] / "README.md").read_text(encoding="utf-8").split("## Live, and images in memory")[1]
-    lines = page.split("```python\n")[1].split("```")[0]
-    assert len(lines.splitlines()) <= 10
+    page = (TINY.parents[2] / "README.md").read_text(encoding="utf-8").split("## Images in memory, and live")[1]
+    arrays, lines = (part.split("```")[0] for part in page.split("```python\n")[1:3])
+    assert len(arrays.splitlines()) <= 10 and len(lines.splitlines()) <= 10
     calibration = [(one.name, one.size, one.matrix, one.distortions, one.rotation, one.translation) for one in clip.rig]
     names = {"calibration": calibration, "background": empty_scene(), "frames": clip_images()[:6]}
+    names["images"] = [np.stack(own) for own in zip(*clip_images(), strict=True)]
+    exec(compile(arrays, "README.md", "exec"), names)
+    assert np.isfinite(names["people"].positions).all() and len(names["people"].frames) == len(names["images"][0])
     exec(compile(lines, "README.md", "exec"), names)
     assert list(names["found"].people) == [0] and names["person"].position.shape == (3,)
 

@@ -26,18 +26,9 @@ from hmc.io.footage import Footage, read_footage
 from hmc.io.keypoints import open_keypoints
 from hmc.io.naming import FILES, find_files, footage_items, item_name
 from hmc.io.places import AnyPlaces, to_places
-from hmc.io.recording import (
-    Frame,
-    Recording,
-    fitted,
-    gaps,
-    iterate_frames,
-    missing_views,
-    open_recording,
-    wrong_sizes,
-    wrong_units,
-)
-from hmc.io.views import find_views
+from hmc.io.recording import Frame, Recording, fitted, iterate_frames, open_recording, wrong_sizes, wrong_units
+from hmc.io.timing import rates_differ
+from hmc.io.views import find_views, gaps, missing_views
 from hmc.io.world import world_of
 
 __all__ = ["Finding", "Inspection", "check_recording", "inspect_recording"]
@@ -142,7 +133,7 @@ def inspect_recording(path: AnyPlaces, cameras: Sequence[str] | None = None, rea
     say("error", wrong_sizes(rig, own))
     say("error", wrong_units(rig))
     say("warning", gaps(own))
-    say("warning", rates([view.fps for view in own if view is not None]))
+    say("note", rates([view.fps for view in own if view is not None]))
     say("warning", itertools.chain.from_iterable(odd_camera(camera) for camera in rig))
     say("note", [sentence for camera in rig for sentence in orientation(camera)])
     say("warning", same_place(rig))
@@ -245,8 +236,8 @@ def unused_views(path: Path, names: Sequence[str], files: set[Path]) -> list[str
 def rates(fps: Sequence[float | None]) -> list[str]:
     """A sentence when the videos' frame rates differ by more than 1 %."""
     known = [rate for rate in fps if rate]
-    if known and max(known) > 1.01 * min(known):
-        return [f"videos differ in frame rate ({min(known):g} to {max(known):g} a second); cameras must be synchronised, frame by frame"]
+    if rates_differ(known):
+        return [f"videos differ in frame rate ({min(known):g} to {max(known):g} a second); their frames are matched by their time stamps"]
     return []
 
 

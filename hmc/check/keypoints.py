@@ -157,7 +157,8 @@ def keypoint_findings(agreement: KeypointAgreement) -> list[str]:
             shift = late.get(other, -late.get(one, 0))
             share = agreement.by_shift[other, MOST_SHIFT + shift]
             then = "" if np.isnan(share) else f", {share * residual[other]:.1f} px"
-            return [f"{pair}{then} if those of '{names[other]}' are taken {_frames(shift)}; which of them is early or late cannot be told"]
+            cure = "which of them is early or late cannot be told; `first_frame` for either, as from hmc sync RECORDING, mends it"
+            return [f"{pair}{then} if those of '{names[other]}' are taken {_frames(shift)}; {cure}"]
         if residual[one] > MOST_PX * agreement.scales[[one, other]].mean():
             return [f"{pair}; have they moved since they were calibrated? Which one cannot be told from two"]
         return []
@@ -170,7 +171,7 @@ def keypoint_findings(agreement: KeypointAgreement) -> list[str]:
         sentences.append(
             f"camera '{names[c]}': its keypoints are {residual[c]:.1f} px from the other cameras' epipolar lines, {then:.1f} px if they "
             f"are taken {_frames(shift)}; its video seems to begin {_count(shift)} {'before' if shift > 0 else 'after'} the others': "
-            "`first_frame` in recording.toml mends that"
+            "`first_frame` in recording.toml mends that, and is found by: hmc sync RECORDING"
         )
     rest = [c for c in off if c not in late]
     if 2 * len(rest) > len(known) or (not sentences and not rest and _median(residual[known] / agreement.scales[known]) > MOST_PX):
@@ -178,7 +179,7 @@ def keypoint_findings(agreement: KeypointAgreement) -> list[str]:
         return [
             *sentences,
             f"keypoints and calibration disagree (px from the other cameras' epipolar lines: {listed}); are they of these videos, "
-            "at their size, and are the cameras synchronised?",
+            "at their size, and are the cameras synchronised (hmc sync RECORDING)?",
         ]
     for c in rest:
         sentences.append(

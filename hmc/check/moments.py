@@ -10,7 +10,7 @@ import numpy as np
 from hmc.camera.segmentation import BackgroundModel, segment, train_background
 from hmc.io.recording import Frame, Recording, background_frames, iterate_frames
 
-__all__ = ["Masks", "moments", "probe_masks"]
+__all__ = ["Masks", "learn_background", "moments", "probe_masks"]
 
 #: Silhouettes of one moment, one a camera: bool, shape (height, width), or None.
 Masks = Sequence[np.ndarray | None]
@@ -38,7 +38,7 @@ def probe_masks(recording: Recording, frames: Sequence[Frame], medians: bool = F
     if recording.has_silhouettes:
         return [frame.silhouettes or (None,) * len(recording.rig) for frame in frames]
     with ThreadPoolExecutor() as pool:
-        models = list(pool.map(lambda c: _learn(recording, c, frames if medians else ()), range(len(recording.rig))))
+        models = list(pool.map(lambda c: learn_background(recording, c, frames if medians else ()), range(len(recording.rig))))
     masks: list[list[np.ndarray | None]] = [[None] * len(models) for _ in frames]
     for c, model in enumerate(models):
         for frame, found in zip(frames, masks, strict=True):
@@ -65,7 +65,8 @@ def moments(recording: Recording, n: int) -> list[Masks]:
     return probe_masks(recording, frames, medians=True)
 
 
-def _learn(recording: Recording, index: int, frames: Sequence[Frame]) -> BackgroundModel | None:
+def learn_background(recording: Recording, index: int, frames: Sequence[Frame]) -> BackgroundModel | None:
+    """The empty scene of one camera: of its own frames, or else the median of some of the recording's, if there are three or more."""
     if recording.n_background_frames[index]:
         return train_background(background_frames(recording, index, LEARNT_FRAMES))
     images = [image for frame in frames if (image := frame.images[index]) is not None]

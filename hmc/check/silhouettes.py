@@ -9,11 +9,11 @@ import cv2
 import numpy as np
 
 from hmc.camera.coverage import inside_image
-from hmc.camera.model import Camera, Rig, project
+from hmc.camera.model import Camera, project
 from hmc.check.hull import Hull, best_move, beyond_room, fine_hull, floor_height, misfit, odd_camera
 from hmc.io.recording import Recording
 
-__all__ = ["disagreements", "hull_findings", "silhouette_agreement"]
+__all__ = ["covered_shares", "disagreements", "hull_findings", "silhouette_agreement"]
 
 #: Spacing of the points that the hull is made of (metres; wider in a room that would need more than MAX_POINTS).
 SPACING_M = 0.06
@@ -75,14 +75,16 @@ def disagreements(recording: Recording, masks: Sequence[Sequence[np.ndarray | No
         if better.any() and rest[better].mean() >= max(GOOD_AGREEMENT, shares[others][better].mean() + GAIN):
             return [
                 f"camera '{names[index]}': its silhouettes do not fit the calibration and the other cameras', which fit each other; "
-                "is this its video, and has it moved since it was calibrated?"
+                "is this its video, and has it moved since it was calibrated? If it is early or late, by how much finds: "
+                f"hmc sync {recording.path}"
             ]
     if known.min() >= LEAST_AGREEMENT:
         return []
     listed = ", ".join(f"{name} {share:.0%}" for name, share in zip(names, shares, strict=True) if not np.isnan(share))
     return [
         f"silhouettes and calibration disagree (share of each that fits the others': {listed}); "
-        "is each video that of its camera, and are they synchronised?"
+        f"is each video that of its camera, and are they synchronised? That finds: "
+        f"hmc sync {recording.path}"
     ]
 
 
@@ -112,11 +114,12 @@ def hull_findings(recording: Recording, masks: Sequence[Sequence[np.ndarray | No
             f"people's feet are {depth * 100:.0f} cm below the floor, where they are cut off; the floor must be at z = 0 in the "
             "calibration, and the room's lower limit at the floor"
         )
-    return cut or disagreements(recording, masks) or _odd_camera(rig, hulls)
+    return cut or disagreements(recording, masks) or _odd_camera(recording, hulls)
 
 
-def _odd_camera(rig: Rig, hulls: Sequence[Hull]) -> list[str]:
+def _odd_camera(recording: Recording, hulls: Sequence[Hull]) -> list[str]:
     """A sentence on the camera that is off by a few pixels or frames."""
+    rig = recording.rig
     shares = misfit(rig, hulls, range(len(rig)))
     odd = odd_camera(rig, hulls, shares)
     if odd is None:
@@ -132,7 +135,15 @@ def _odd_camera(rig: Rig, hulls: Sequence[Hull]) -> list[str]:
         ways = ((right, ("left", "right")), (down, ("up", "down")))
         way = " and ".join(f"{round(abs(n) * max(rig[c].size) / 640)} px {words[n > 0]}" for n, words in ways if n)
         sentence += f"; {then:.1%} of its own would if they were moved {way}"
-    return [f"{sentence}; has it moved since it was calibrated, or is its video early or late?"]
+    return [
+        f"{sentence}; has it moved since it was calibrated, or is its video early or late? When each camera's frames were taken, finds: "
+        f"hmc sync {recording.path}"
+    ]
+
+
+def covered_shares(recording: Recording, masks: Sequence[Sequence[np.ndarray | None]]) -> np.ndarray:
+    """`silhouette_agreement` of all cameras of a recording, shape (n_cameras,); masks as there."""
+    return silhouette_agreement(_views(recording), masks, range(len(recording.rig)))
 
 
 def silhouette_agreement(views: Sequence[_View], masks: Sequence[Sequence[np.ndarray | None]], members: Sequence[int]) -> np.ndarray:

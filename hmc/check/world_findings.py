@@ -47,7 +47,10 @@ def world_findings(recording: Recording, masks: Sequence[Masks]) -> list[str]:
         if tilt_deg > TILTED_DEG and (tilt_deg > 180 - TILTED_DEG or level_share(rig, ground.up) > level_share(rig, np.array([0.0, 0, 1]))):
             return [f"people stand {tilt_deg:.0f} degrees from the calibration's z axis, which should point up; {cure}"]
         if not STATURES_M[0] <= ground.stature <= STATURES_M[1]:
-            return [f"people come out {ground.stature:.3g} m tall; the calibration is in other units than metres; {cure}"]
+            return [
+                f"people come out {ground.stature:.3g} m tall; the calibration is in other units than metres; {cure} (if cameras "
+                f"may be out of time, first: hmc sync {recording.path})"
+            ]
     if not any(_inside(one, room) >= INSIDE for one in figures):
         where = ", ".join(f"{value:.1f}" for value in np.median(np.concatenate([one.points for one in figures]), axis=0))
         limits = " to ".join(f"({', '.join(f'{value:.1f}' for value in end)})" for end in room)

@@ -23,15 +23,21 @@ __all__ = [
     "VIDEO_SUFFIXES",
     "Footage",
     "find_footage",
+    "in_time",
     "open_files",
     "open_images",
     "open_video",
     "read_footage",
+    "stamps",
     "starting_at",
 ]
 
 #: A video is over when this many frames in a row cannot be decoded.
 MAX_FAILURES = 25
+#: Frames a second of a video of which nothing tells them.
+DEFAULT_FPS = 30.0
+#: After a video's last frame.
+END = 2**62
 
 
 @dataclass(frozen=True)
@@ -54,6 +60,8 @@ class Footage:
         What was odd when it was opened.
     skipped : int
         Frames of the file before frame 0, of a camera that began before the others.
+    places : tuple of int, or None
+        Of a camera that goes by time (`hmc.io.timing`): the frame of the file for each frame, -1 where it has none.
     arrays : sequence of ndarray or None, optional
         The frames themselves, where they are in memory: images (h, w, 3), or silhouettes (h, w) of bool or uint8. `path` is then a name.
     """
@@ -66,6 +74,13 @@ class Footage:
     notes: tuple[str, ...] = ()
     skipped: int = 0
     arrays: Sequence[np.ndarray | None] | np.ndarray | None = field(default=None, repr=False, compare=False)
+    places: tuple[int, ...] | None = None
+
+    def in_file(self, frame: int) -> int | None:
+        """Which frame of the file a frame is, counted from the file's beginning; None where the camera took none."""
+        if self.places is None:
+            return frame + self.skipped
+        return self.places[frame] if frame < len(self.places) and self.places[frame] >= 0 else None
 
 
 def find_footage(folder: Path, name: str, first_number: int | None = None, count: bool = True) -> Footage | None:
@@ -237,6 +252,31 @@ def starting_at(footage: Footage, first: int) -> Footage:
     return replace(footage, n_frames=footage.n_frames - first, images=images, skipped=footage.skipped + first)
 
 
+def in_time(footage: Footage, places: Sequence[int]) -> Footage:
+    """The footage with these frames of its files for the frames of the recording, -1 for none (`Footage.places`)."""
+    images = footage.images
+    if images is not None:
+        images = {frame: images[place] for frame, place in enumerate(places) if place in images}
+    return replace(footage, n_frames=len(places), images=images, places=tuple(int(place) for place in places))
+
+
+def stamps(footage: Footage) -> np.ndarray:
+    """When each frame of a video is to be shown, by its container: (n_frames,) seconds, the first at 0. Reads the whole video."""
+    capture = cv2.VideoCapture(str(footage.path))
+    found = np.full(footage.n_frames, np.nan)
+    try:
+        for index in _grab(capture):
+            if index >= footage.n_frames:
+                break
+            found[index] = capture.get(cv2.CAP_PROP_POS_MSEC) / 1000
+    finally:
+        capture.release()
+    known = np.flatnonzero(np.isfinite(found))
+    if len(known) > 1 and not (np.diff(found[known]) > 0).all():
+        return np.arange(footage.n_frames) / (footage.fps or DEFAULT_FPS)  # a container without time stamps
+    return found[: known[-1] + 1] - found[known[0]] if len(known) else found[:0]
+
+
 def read_footage(footage: Footage, first: int, last: int, on_problem: Callable[[str], None], label: str) -> Iterator[np.ndarray | None]:
     """Frames ``first`` to ``last`` (not included) of one camera, in order.
 
@@ -255,11 +295,10 @@ def read_footage(footage: Footage, first: int, last: int, on_problem: Callable[[
         None where the frame is missing, unreadable or of another size.
     """
     images = footage.images
-    skipped = footage.skipped
     if footage.arrays is not None:
         frames: Iterable[np.ndarray | None] = (_as_image(one) for one in islice(_from(footage.arrays, first), last - first))
     else:
-        frames = _read_video(footage, first + skipped, last + skipped) if images is None else _read_images(images, first, last)
+        frames = _read_video(footage, first, last) if images is None else _read_images(images, first, last)
     lost: list[int] = []
 
     def say_lost() -> None:
@@ -274,7 +313,7 @@ def read_footage(footage: Footage, first: int, last: int, on_problem: Callable[[
                     f"{label}: frame {index} is {image.shape[1]} x {image.shape[0]} and not {footage.size[0]} x {footage.size[1]}; left out"
                 )
                 image = None
-            elif image is None and index < footage.n_frames and footage.arrays is None and (images is None or index in images):
+            elif image is None and index < footage.n_frames and footage.arrays is None and _should_be_there(footage, index):
                 lost.append(index)
             # A caller that knows how many frames there are asks for no more after the last.
             if image is not None or index + 1 == last:
@@ -282,6 +321,11 @@ def read_footage(footage: Footage, first: int, last: int, on_problem: Callable[[
             yield image
     finally:
         say_lost()
+
+
+def _should_be_there(footage: Footage, index: int) -> bool:
+    """Whether files of a camera have a frame."""
+    return footage.in_file(index) is not None if footage.images is None else index in footage.images
 
 
 def _from(arrays: Sequence[np.ndarray | None] | np.ndarray, first: int) -> Iterator[np.ndarray | None]:
@@ -303,18 +347,14 @@ def _read_video(footage: Footage, first: int, last: int) -> Iterator[np.ndarray 
     capture = cv2.VideoCapture(str(footage.path))
     try:
         # Grabbing up to the first frame is slower than seeking, but exact for every codec and container.
-        due = first
-        for index in _grab(capture) if last > first else ():
-            if index < first:
-                continue
-            for _ in range(due, min(index, last)):
-                yield None
-            if index < last:
-                yield capture.retrieve()[1]
-            due = index + 1
-            if due >= last:
-                return
-        for _ in range(due, last):
+        grabbed = _grab(capture)
+        index = -1
+        for frame in range(first, min(last, footage.n_frames)):
+            wanted = footage.in_file(frame)
+            while wanted is not None and index < wanted:
+                index = next(grabbed, END)
+            yield capture.retrieve()[1] if index == wanted else None
+        for _ in range(max(first, footage.n_frames), last):
             yield None
     finally:
         capture.release()

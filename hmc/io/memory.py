@@ -12,7 +12,8 @@ from hmc.camera.coverage import estimate_room
 from hmc.camera.model import Camera, Rig
 from hmc.errors import InputError
 from hmc.io.footage import Footage
-from hmc.io.recording import DEFAULT_FPS, Recording, common_length, wrong_units
+from hmc.io.recording import DEFAULT_FPS, Recording, wrong_units
+from hmc.io.views import common_length
 
 __all__ = ["recording_of"]
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from hmc.camera.model import Rig
 from hmc.io.calibration import write_calibration
 
-__all__ = ["write_new_world"]
+__all__ = ["keep_before", "write_new_world"]
 
 #: Of recording.toml: what is said in the old world's terms.
 OLD_TERMS = ("room", "units", "up")
@@ -34,20 +34,20 @@ def write_new_world(path: Path, rig: Rig) -> list[str]:
     lines = []
     target, settings = path / "calibration.toml", path / "recording.toml"
     if target.exists():
-        lines.append(f"kept what was there: {_keep(target)}")
+        lines.append(f"kept what was there: {keep_before(target)}")
     write_calibration(target, rig)
     lines.insert(0, f"written: {target}")
     if settings.is_file():
         text = settings.read_text(encoding="utf-8")
         new, taken = without_old_terms(text)
         if taken:
-            kept = _keep(settings)
+            kept = keep_before(settings)
             settings.write_text(new, encoding="utf-8")
             lines.append(f"{settings}: {', '.join(f'`{key}`' for key in taken)} of the old world taken out; kept what was there: {kept}")
     return lines
 
 
-def _keep(file: Path) -> Path:
+def keep_before(file: Path) -> Path:
     """Rename a file to a name that is free, and tell it."""
     for n in range(1, 1000):
         kept = file.with_stem(f"{file.stem}_before{'' if n == 1 else f'_{n}'}")

@@ -8,7 +8,7 @@ Units are metres, Z is up and the floor is at z = 0.
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -23,11 +23,11 @@ from hmc.camera.world import World
 from hmc.errors import InputError
 from hmc.io.calibration import build_camera, read_entries
 from hmc.io.footage import Footage, read_footage
-from hmc.io.naming import footage_items, item_name
 from hmc.io.places import AnyPlaces, RecordingPlaces, places_of, to_places
 from hmc.io.settings import read_settings
 from hmc.io.sizes import fit_size, size_cure
-from hmc.io.views import find_background, find_views
+from hmc.io.timing import go_by_time, rates_differ
+from hmc.io.views import all_rates, common_length, find_background, find_views, gaps, missing_views, put_in_time
 from hmc.io.world import world_of
 
 __all__ = [
@@ -77,7 +77,7 @@ class Recording:
         Its folder.
     name : str
     fps : float
-        Frames a second: of recording.toml, else of the first video, else 30.
+        Frames a second: of recording.toml, else of the first video (of the slowest, where they differ), else 30.
     rig : Rig
         The selected cameras.
     room : ndarray, shape (2, 3)
@@ -116,11 +116,17 @@ class Recording:
     _footage: tuple[Footage | None, ...] = field(default=(), repr=False)
     _silhouettes: tuple[Footage | None, ...] = field(default=(), repr=False)
     _background: tuple[Footage | None, ...] = field(default=(), repr=False)
+    _times: Mapping[str, np.ndarray] = field(default_factory=dict, repr=False)
 
     @property
     def known_height_m(self) -> float | None:
         """The stature of the person in it, metres; None where it is not known, or another person may be there too."""
         return self.subject_height_m[0] if len(self.subject_height_m) == 1 and self.persons in (None, 1) else None
+
+    @property
+    def _own_views(self) -> tuple[Footage | None, ...]:
+        """What frames are counted in, a camera: its images, or else its silhouettes."""
+        return tuple(image or mask for image, mask in zip(self._footage, self._silhouettes, strict=True))
 
     @property
     def has_images(self) -> bool:
@@ -195,7 +201,17 @@ def open_recording(
         raise InputError(
             f"{path / 'recording.toml'}: `first_frame` names '{strangers[0]}', no camera of the calibration ({', '.join(all_names)})"
         )
-    footage, silhouettes = find_views(path, names, all_names, starts=starts, settings=settings)
+    footage, silhouettes = find_views(path, names, all_names, settings=settings)
+    both = [image or mask for image, mask in zip(footage, silhouettes, strict=True)]
+    there = {name: view for name, view in zip(names, both, strict=True) if view is not None}
+    rates = all_rates(path, there, all_names)
+    by_stamps = rates_differ(rates)
+    fps = settings.get("fps") or (min(rates) if by_stamps else next(iter(rates), DEFAULT_FPS))
+    times = go_by_time(path, there, fps, by_stamps, starts)
+    footage, silhouettes = (
+        [put_in_time(view, starts.get(name, 0), times.get(name)) for name, view in zip(names, views, strict=True)]
+        for views in (footage, silhouettes)
+    )
     both = [image or mask for image, mask in zip(footage, silhouettes, strict=True)]
     sizes = {name: view.size for name, view in zip(names, both, strict=True) if view is not None}
     try:
@@ -225,7 +241,6 @@ def open_recording(
         )
 
     background = find_background(places.background_folder, path, rig, all_names, settings, problems)
-    fps = settings.get("fps") or next((view.fps for view in footage if view is not None and view.fps), DEFAULT_FPS)
     room = settings.get("room")
     return Recording(
         path=path,
@@ -244,6 +259,7 @@ def open_recording(
         _footage=tuple(footage),
         _silhouettes=tuple(silhouettes),
         _background=tuple(background),
+        _times=times,
     )
 
 
@@ -302,8 +318,7 @@ def only_cameras(recording: Recording, cameras: Sequence[int]) -> Recording:
 
 def whole_recording(recording: Recording) -> Recording:
     """All frames of the same cameras, as large as they are read in this selection."""
-    views = [image or mask for image, mask in zip(recording._footage, recording._silhouettes, strict=True)]
-    total = common_length([view.n_frames for view in views if view is not None])
+    total = common_length([view.n_frames for view in recording._own_views if view is not None])
     return replace(recording, start=0, n_frames=min(total, places_of(recording).read_settings().get("frames") or total))
 
 
@@ -387,38 +402,6 @@ def read_rig(path: Path) -> Rig:
         return Rig(tuple(fitted(build_camera(entry, sizes, world_of(settings)), sizes, settings) for entry in entries))
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-
-
-def gaps(views: Sequence[Footage | None]) -> list[str]:
-    """A sentence for each camera whose numbered images have holes."""
-    sentences = []
-    for view in views:
-        missing = [] if view is None or view.images is None else sorted(set(range(view.n_frames)) - view.images.keys())
-        if view is not None and missing:
-            sentences.append(f"{view.path}: {len(missing)} of {view.n_frames} images are missing, the first is frame {missing[0]}")
-    return sentences
-
-
-def common_length(lengths: Sequence[int]) -> int:
-    """Frames of which at least two cameras have an image; of the one, if there is one."""
-    ordered = sorted(lengths, reverse=True)
-    return ordered[min(1, len(ordered) - 1)] if ordered else 0
-
-
-def missing_views(path: Path, names: Sequence[str], views: Sequence[Footage | None], told: Collection[str] = ()) -> list[str]:
-    """One sentence for each camera without images and silhouettes, but for those of which more is told already."""
-    lost = [name for name, view in zip(names, views, strict=True) if view is None and name not in told]
-    if not lost:
-        return []
-    used = {view.path for view in views if view is not None}
-    spare = next((item for item in footage_items(path / "videos") if item not in used and item_name(item) not in names), None)
-    cure = f'say whose is whose in recording.toml: videos = {{ "{lost[0]}" = "videos/{spare.name if spare else "FILE.mp4"}", ... }}'
-    if not any(views) and not told:
-        return [f"{path}: no videos/, images/ or silhouettes/ with the cameras' names ({', '.join(names)}); name them so, or {cure}"]
-    return [
-        f"{path}: camera '{name}' of the calibration has no video, images or silhouettes; name them so, {cure}, or leave it out: --cameras"
-        for name in lost
-    ]
 
 
 def wrong_sizes(rig: Rig, views: Sequence[Footage | None]) -> list[str]:

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from hmc.camera.model import Rig
 from hmc.errors import InputError
-from hmc.io.footage import Footage, find_footage, number_files, number_images, open_files, starting_at
-from hmc.io.naming import Found, find_files
+from hmc.io.footage import Footage, find_footage, in_time, number_files, number_images, open_files, starting_at
+from hmc.io.naming import Found, find_files, footage_items, item_name
+from hmc.io.timing import nearest_frames
 
-__all__ = ["find_background", "find_views"]
+__all__ = ["all_rates", "common_length", "find_background", "find_views", "gaps", "missing_views", "put_in_time"]
 
 
 def find_views(
@@ -22,7 +25,6 @@ def find_views(
     all_names: Sequence[str],
     count: bool = True,
     on_error: Callable[[str, str], None] | None = None,
-    starts: Mapping[str, int] | None = None,
     settings: Mapping[str, Any] | None = None,
 ) -> tuple[list[Footage | None], list[Footage | None]]:
     """The images (in ``videos/``, else in ``images/``) and the silhouettes of each camera.
@@ -39,8 +41,6 @@ def find_views(
         As `hmc.io.footage.open_video`.
     on_error : callable, optional
         Called with a camera's name and what is wrong with its files, which then count as missing; by default that is raised.
-    starts : mapping of str to int, optional
-        The frame of a camera's files that is frame 0 of the recording, where it is not the first.
     settings : mapping, optional
         Of recording.toml, checked: which files are which camera's (`hmc.io.naming.find_files`).
     """
@@ -57,8 +57,7 @@ def find_views(
 
     def find(kind: str, files: Found, wanted: Sequence[str], first: int) -> list[Footage | None]:
         def one(name: str) -> Footage | None:
-            found = _open(path / kind, files, name, first, count)
-            return found and starting_at(found, (starts or {}).get(name, 0))
+            return _open(path / kind, files, name, first, count)
 
         return [settled(name, found) for name, found in zip(wanted, _side_by_side(one, wanted), strict=True)]
 
@@ -129,3 +128,75 @@ def _first_number(folder: Path, files: Found, names: Sequence[str]) -> int:
     places = [files.files.get(name, (folder / name,)) for name in names]
     folders = [number_images(place[0]) for place in places if len(place) == 1 and place[0].is_dir()]
     return min((min(numbers, default=0) for numbers in (*folders, *(number_files(place) for place in places if len(place) > 1))), default=0)
+
+
+def put_in_time(view: Footage | None, first: int, times: np.ndarray | None) -> Footage | None:
+    """A camera's files as the recording counts frames.
+
+    Parameters
+    ----------
+    view : Footage or None
+        From its first frame on.
+    first : int
+        The frame that is frame 0 of the recording, of a camera that counts frames.
+    times : ndarray, shape (n,), or None
+        When its frames were taken, in frames of the recording, of one that goes by time (`hmc.io.timing.go_by_time`).
+
+    Raises
+    ------
+    InputError
+        When it has no frame from there on.
+    """
+    if view is None or times is None:
+        return view and starting_at(view, first)
+    places = nearest_frames(times[: view.n_frames])
+    if not len(places):
+        raise InputError(f"{view.path}: has no frame from the recording's first on; correct its times or `first_frame` in recording.toml")
+    return in_time(view, places.tolist())
+
+
+def all_rates(path: Path, views: Mapping[str, Footage], all_names: Sequence[str]) -> list[float]:
+    """The rates that the videos of a recording state, of all its cameras, whichever of them are read."""
+    rates = [view.fps for view in views.values()]
+    folder = path / "videos"
+    others = [name for name in all_names if name not in views] if folder.is_dir() else []
+    for name in others:
+        try:
+            found = find_footage(folder, name, count=False)
+        except InputError:
+            continue  # it is not read
+        rates.append(None if found is None else found.fps)
+    return [rate for rate in rates if rate]
+
+
+def gaps(views: Sequence[Footage | None]) -> list[str]:
+    """A sentence for each camera whose numbered images have holes."""
+    sentences = []
+    for view in views:
+        taken = [] if view is None else [frame for frame in range(view.n_frames) if view.in_file(frame) is not None]
+        missing = [] if view is None or view.images is None else sorted(set(taken) - view.images.keys())
+        if view is not None and missing:
+            sentences.append(f"{view.path}: {len(missing)} of {view.n_frames} images are missing, the first is frame {missing[0]}")
+    return sentences
+
+
+def common_length(lengths: Sequence[int]) -> int:
+    """Frames of which at least two cameras have an image; of the one, if there is one."""
+    ordered = sorted(lengths, reverse=True)
+    return ordered[min(1, len(ordered) - 1)] if ordered else 0
+
+
+def missing_views(path: Path, names: Sequence[str], views: Sequence[Footage | None], told: Collection[str] = ()) -> list[str]:
+    """One sentence for each camera without images and silhouettes, but for those of which more is told already."""
+    lost = [name for name, view in zip(names, views, strict=True) if view is None and name not in told]
+    if not lost:
+        return []
+    used = {view.path for view in views if view is not None}
+    spare = next((item for item in footage_items(path / "videos") if item not in used and item_name(item) not in names), None)
+    cure = f'say whose is whose in recording.toml: videos = {{ "{lost[0]}" = "videos/{spare.name if spare else "FILE.mp4"}", ... }}'
+    if not any(views) and not told:
+        return [f"{path}: no videos/, images/ or silhouettes/ with the cameras' names ({', '.join(names)}); name them so, or {cure}"]
+    return [
+        f"{path}: camera '{name}' of the calibration has no video, images or silhouettes; name them so, {cure}, or leave it out: --cameras"
+        for name in lost
+    ]

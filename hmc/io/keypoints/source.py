@@ -52,6 +52,7 @@ class KeypointSource:
     factors: tuple[int, ...]
     _readers: tuple[Reader | None, ...] = field(repr=False)
     _offsets: tuple[int, ...] = field(repr=False)
+    _views: tuple[Footage | None, ...] = field(repr=False)
     _change: Change | None = field(default=None, repr=False)
 
     def changed(self, change: Change) -> KeypointSource:
@@ -84,8 +85,10 @@ class KeypointSource:
         InputError
             When a file of this frame is not as it should be; one line with its name.
         """
+        numbers = [index if view is None else view.in_file(index) for view in self._views]
         people = tuple(
-            NOBODY.copy() if reader is None else reader(index + offset) for reader, offset in zip(self._readers, self._offsets, strict=True)
+            NOBODY.copy() if reader is None or number is None else reader(number + offset)
+            for reader, offset, number in zip(self._readers, self._offsets, numbers, strict=True)
         )
         people = people if self._change is None else self._change(index, people)
         return tuple(_in_smaller(one, factor) for one, factor in zip(people, self.factors, strict=True))
@@ -133,7 +136,7 @@ def open_keypoints(recording: Recording) -> KeypointSource | None:
     Looked for are ``keypoints/CAMERA/*.json`` (one file a frame), ``keypoints/CAMERA.csv`` and ``keypoints/CAMERA.json`` (one file a
     camera), ``keypoints/CAMERADLC*.csv`` (DeepLabCut), then ``pose/CAMERA_json/*.json`` and ``pose/CAMERA/*.json`` (Pose2Sim).
     Files of frames are read when they are asked for, files of cameras here. A file that counts in its camera's own frames follows
-    ``first_frame`` of recording.toml.
+    ``first_frame`` and times of the recording.
 
     Parameters
     ----------
@@ -160,12 +163,12 @@ def open_keypoints(recording: Recording) -> KeypointSource | None:
                 strangers.append((folder, [item.name for item in items]))
             continue
         offsets, readers = [], []
-        for camera, item, views in zip(rig, found, _footage(recording), strict=True):
-            reader, first = (None, 0) if item is None else _reader(item, camera.size if views is None else views.size)
+        for camera, item, view in zip(rig, found, recording._own_views, strict=True):
+            reader, first = (None, 0) if item is None else _reader(item, camera.size if view is None else view.size)
             readers.append(reader)
-            offsets.append(first + _offset(views))
+            offsets.append(first + _offset(view))
         present = tuple(item is not None for item in found)
-        return KeypointSource(folder, rig.names, present, recording.factors, tuple(readers), tuple(offsets))
+        return KeypointSource(folder, rig.names, present, recording.factors, tuple(readers), tuple(offsets), recording._own_views)
     all_names = [entry.name for entry in places_of(recording).read_entries()] if strangers else []
     for folder, names in strangers:
         if not any(_item_of(name, [folder / one for one in names]) for name in all_names):
@@ -206,21 +209,14 @@ def _is_table_of(camera: str, item: Path) -> bool:
     return (item.stem == camera and suffix in TABLE_SUFFIXES) or (suffix == ".csv" and item.stem.startswith(f"{camera}DLC"))
 
 
-def _footage(recording: Recording) -> list[Footage | None]:
-    """What frames are counted in, a camera: its images, or else its silhouettes."""
-    return [image or mask for image, mask in zip(recording._footage, recording._silhouettes, strict=True)]
-
-
 def _offset(footage: Footage | None) -> int:
-    """The number that a detector gives frame 0 of the recording: that of the image, or the place in the video."""
-    if footage is None:
-        return 0
-    if footage.images:
+    """The number that a detector gives frame 0 of the camera's files: that of the image, or 0 of a video."""
+    if footage is not None and footage.images:
         frame, path = next(iter(footage.images.items()))
-        number = last_number(path.stem)
-        if number is not None:
-            return number - frame
-    return footage.skipped
+        number, place = last_number(path.stem), footage.in_file(frame)
+        if number is not None and place is not None:
+            return number - place
+    return 0
 
 
 def _reader(item: Path, size: tuple[int, int]) -> tuple[Reader, int]:

@@ -1,0 +1,268 @@
+"""How one camera's frames run beside the others': a shift, and frames it dropped, or a clock that runs faster or slower."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hmc.check.sync.evidence import Evidence
+
+__all__ = ["Course", "against", "best_course"]
+
+#: No frame of a camera belongs to a moment.
+NONE = -(10**9)
+#: Courses may leave their shift by so many frames, either way, and drop so many frames at once.
+ROOM, MOST_DROPPED = 20, 5
+#: A dropped frame is believed when it is seen in as many moments after it as would be as much worse by a whole frame.
+LEAST_SEEN = 8.0
+#: Where so many frames are dropped at once, a camera must be no worse than usual by so many frames' shift between any two steps.
+MANY, FITTING = 3, 2.0
+#: A moment counts for no worse than so many frames' shift.
+CAP = 4.0
+#: What is gained is more than so many deviations of what chance gains over all moments; moments of one part.
+NOISE, PART = 1.0, 12
+#: A clock is believed to be off when by the end it is so by this many frames, and not by more frames a frame than any clock is.
+LEAST_DRIFT, MOST_SLOPE = 0.75, 0.005
+#: A clock is off, and nothing was dropped, where shifts over time are this much nearer to a line than to steps.
+LINE = 0.6
+
+
+@dataclass(frozen=True)
+class Course:
+    """Which frame of a camera belongs to each moment: frame = moment + shift + start + slope * moment + what steps before it add.
+
+    Parameters
+    ----------
+    shift : int
+        Frames.
+    steps : tuple of (int, int)
+        A moment from which on, and by how many frames the shift is another: -2 where the camera dropped two, whose moments are the two
+        before; +1 where it has a frame more than there was time for.
+    start, slope : float
+        Of a clock that drifts: frames, and frames a frame.
+    """
+
+    shift: int = 0
+    steps: tuple[tuple[int, int], ...] = ()
+    start: float = 0.0
+    slope: float = 0.0
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether a shift is all."""
+        return not self.steps and not self.slope
+
+    def frames(self, n: int) -> np.ndarray:
+        """The frame at each of n moments, int; `NONE` where it was dropped."""
+        moments = np.arange(n)
+        found = np.rint(moments + self.shift + self.start + self.slope * moments).astype(int)
+        for moment, change in self.steps:
+            found[moment:] += change
+            if change < 0:
+                found[max(0, moment + change) : moment] = NONE
+        return found
+
+    def moments(self, frames: np.ndarray) -> np.ndarray:
+        """The moments at which frames were taken, by the same rule turned round; float."""
+        frames = np.asarray(frames, float)
+        if self.slope:
+            return (frames - self.shift - self.start) / (1 + self.slope)
+        found, shift = frames - self.shift, self.shift
+        for moment, change in self.steps:
+            shift += change
+            if change > 0:
+                before = moment + shift - change  # the first frame too many
+                extra = (frames >= before) & (frames < before + change)
+                found[extra] = moment - 1 + (frames[extra] - before + 1) / (change + 1)
+            after = frames >= moment + shift
+            found[after] = frames[after] - shift
+        return found
+
+
+def against(evidence: Evidence, frames: Sequence[np.ndarray], members: Sequence[int], c: int) -> np.ndarray:
+    """How unlike a camera is to the others at each moment, when it is taken some frames from where it is.
+
+    Parameters
+    ----------
+    evidence : Evidence
+    frames : sequence of ndarray of int, shape (n_moments,)
+        Each camera's frame at each moment.
+    members : sequence of int
+        The cameras to compare with.
+    c : int
+
+    Returns
+    -------
+    ndarray, shape (n_moments, 2 * ROOM + 1)
+        The mean over the others; NaN where nothing can be told. Of a moment whose frame the camera has not, of the frame it would be.
+    """
+    reach, n = evidence.reach, evidence.n_moments
+    total, number = np.zeros((n, 2 * ROOM + 1)), np.zeros((n, 2 * ROOM + 1))
+    own = (frames[c][:, None] + np.arange(-ROOM, ROOM + 1)).clip(-1, n)
+    for j in members:
+        pair = (min(c, j), max(c, j))
+        if j == c or pair not in evidence.bands:
+            continue
+        other = np.broadcast_to(frames[j][:, None], own.shape)
+        first, second = (own, other) if c < j else (other, own)
+        there = (first >= 0) & (first < n) & (second >= 0) & (second < n) & (np.abs(second - first) <= reach)
+        values = np.full(own.shape, np.nan)
+        values[there] = evidence.bands[pair][first[there], (second - first + reach)[there]]
+        known = np.isfinite(values)
+        total[known] += values[known]
+        number[known] += 1
+    # Where one camera alone saw somebody, what it says is no mean of what the others say.
+    most = number.max(axis=1, keepdims=True)
+    return np.where((number > 0) & (number == most), total / np.maximum(number, 1), np.nan)
+
+
+def best_course(costs: np.ndarray) -> tuple[Course, float]:
+    """The course that fits best, beside that of no change.
+
+    A moment counts for no worse than some frames' shift would make it, since silhouettes are bad now and then.
+
+    Parameters
+    ----------
+    costs : ndarray, shape (n_moments, 2 * ROOM + 1)
+        As from `against`, about a plain course.
+
+    Returns
+    -------
+    course : Course
+        As a change of that about which the costs are.
+    gain : float
+        By how much it lowers the costs, less what its complication is charged, as a share of that charge; 0 where nothing is gained.
+    """
+    known = np.isfinite(costs)
+    told = known[:, ROOM - 1 : ROOM + 2].all(axis=1)
+    if told.sum() < 2 * LEAST_SEEN:
+        return Course(), 0.0
+    # What cannot be told speaks neither for a course nor against it.
+    filled = np.where(known, costs, costs[:, ROOM : ROOM + 1])
+    rises = np.array([_rise(filled[part]) for part in np.array_split(np.flatnonzero(told), max(1, int(told.sum()) // PART))])
+    frame = float(np.median(rises[:, 0]))
+    if frame <= 0:
+        return Course(), 0.0
+    usual = float(np.median(filled[told].min(axis=1)))
+    filled = np.where(np.isfinite(filled), np.minimum(filled, usual + CAP * frame), usual)
+    charge = max(LEAST_SEEN * frame, NOISE * float(np.median(rises[:, 1])) * np.sqrt(told.sum()))
+    now = float(filled[:, ROOM].sum())
+    best = int(filled.sum(axis=0).argmin())
+    found = [
+        (Course(shift=best - ROOM), now - float(filled[:, best].sum())),
+        _drifting(filled, now, charge),
+        _stepping(filled, usual, frame, charge),
+    ]
+    course, gain = max(found, key=lambda one: one[1])
+    if course.steps and all(change == course.steps[0][1] for _, change in course.steps):
+        course = _evenly(course, filled) or course
+    return course, gain / charge
+
+
+def _rise(costs: np.ndarray) -> tuple[float, float]:
+    """How much worse the frame before or after the best is, over some moments, and by how much that scatters."""
+    k = int(costs[:, 1:-1].mean(axis=0).argmin()) + 1
+    steps = np.minimum(costs[:, k - 1], costs[:, k + 1]) - costs[:, k]
+    means = costs[:, k - 1 : k + 2].mean(axis=0)
+    return float(min(means[0], means[2]) - means[1]), float(np.std(steps))
+
+
+def _drifting(costs: np.ndarray, now: float, charge: float) -> tuple[Course, float]:
+    """The clock that fits best, and its gain."""
+    moments = np.arange(len(costs))
+
+    def cost(first: float, last: float) -> float:
+        where = first + (last - first) * moments / (len(costs) - 1) + ROOM
+        low = np.minimum(where.astype(int), 2 * ROOM - 1)
+        part = where - low
+        return float(((1 - part) * costs[moments, low] + part * costs[moments, low + 1]).sum())
+
+    most = min(2 * ROOM, MOST_SLOPE * len(costs))
+    wide = np.arange(-ROOM, ROOM + 1.0)
+    tried = {(a, b): cost(a, b) for a in wide for b in wide if abs(b - a) <= most + 1}
+    a, b = min(tried, key=tried.__getitem__)
+    fine = np.arange(-1, 1.01, 0.125)
+    tried = {(x, y): cost(x, y) for x in (a + fine).clip(-ROOM, ROOM) for y in (b + fine).clip(-ROOM, ROOM)}
+    tried = {ends: value for ends, value in tried.items() if LEAST_DRIFT <= abs(ends[1] - ends[0]) <= most}
+    if not tried:
+        return Course(), -charge
+    a, b = min(tried, key=tried.__getitem__)
+    shift = round(a)
+    return Course(shift, (), float(a - shift), float((b - a) / (len(costs) - 1))), now - tried[a, b] - charge
+
+
+def _evenly(course: Course, costs: np.ndarray) -> Course | None:
+    """The drift that steps stand for, where shifts of parts of the recording, to fractions of a frame, lie on a line rather than on steps.
+
+    Costs rise evenly from the truth to either side, so that both sides tell where between two frames it is.
+    """
+    n = len(costs)
+    told, shifts, steps = [], [], []
+    places = course.frames(n) - np.arange(n)
+    for part in np.array_split(np.arange(n), max(4, n // PART)):
+        means = costs[part].mean(axis=0)
+        k = int(means[1:-1].argmin()) + 1
+        before, now, after = means[k - 1 : k + 2]
+        there = places[part][places[part] > NONE // 2]
+        if max(before, after) > now and len(there):
+            told.append(float(part.mean()))
+            shifts.append(k - ROOM + (before - after) / (2 * (max(before, after) - now)))
+            steps.append(float(there.mean()))
+    if len(told) < 4:
+        return None
+    slope, start = np.polyfit(told, shifts, 1)
+    on_line = np.median(np.abs(np.array(shifts) - start - slope * np.array(told)))
+    on_steps = np.median(np.abs(np.array(shifts) - steps))
+    if abs(slope) > MOST_SLOPE or abs(slope) * n < LEAST_DRIFT or on_line > LINE * on_steps:
+        return None
+    shift = round(start)
+    return Course(shift, (), float(start - shift), float(slope))
+
+
+def _stepping(costs: np.ndarray, usual: float, frame: float, charge: float) -> tuple[Course, float]:
+    """The dropped (and doubled) frames that fit best, and their gain.
+
+    Dynamic programming over moments and shifts; between two steps there are `LEAST_SEEN` moments. A frame more than there was time for is
+    charged double, since cameras hardly ever make one.
+    """
+    n, size = costs.shape
+    least = int(LEAST_SEEN)
+    sums = np.vstack([np.zeros(size), np.cumsum(costs, axis=0)])
+    totals = np.full((n, size), np.inf)  # best until moment t, the last stretch being long enough
+    began = np.zeros((n, size), int)  # the moment at which that stretch began
+    change = np.zeros((n, size), int)  # and the step there
+    for t in range(least - 1, n):
+        start = t - least + 1
+        if start == 0:
+            totals[t], began[t], change[t] = sums[t + 1], 0, 0
+            continue
+        stretch = sums[t + 1] - sums[start]
+        best, steps = np.full(size, np.inf), np.zeros(size, int)
+        for m in range(1, MOST_DROPPED + 1):
+            if start - 1 - m >= 0:
+                dropped = totals[start - 1 - m][m:] + charge + m * (usual + frame)
+                better = dropped < best[: size - m]
+                best[: size - m][better], steps[: size - m][better] = dropped[better], -m
+            doubled = totals[start - 1][: size - m] + 2 * charge
+            better = doubled < best[m:]
+            best[m:][better], steps[m:][better] = doubled[better], m
+        longer = totals[t - 1] + costs[t]
+        fresh = best + stretch < longer
+        totals[t] = np.where(fresh, best + stretch, longer)
+        began[t] = np.where(fresh, start, began[t - 1])
+        change[t] = np.where(fresh, steps, change[t - 1])
+    t, k = n - 1, int(totals[-1].argmin())
+    gain = float(sums[-1, ROOM] - totals[t, k])
+    found: list[tuple[int, int]] = []
+    fits: list[float] = []
+    while began[t, k] > 0:
+        moment, step = int(began[t, k]), int(change[t, k])
+        found.append((moment, step))
+        fits.append(float(np.median(costs[moment : t + 1, k])))
+        t, k = moment - 1 - max(0, -step), k - step
+    fits.append(float(np.median(costs[: t + 1, k])))
+    if max((abs(step) for _, step in found), default=0) >= MANY and max(fits) > usual + FITTING * frame:
+        return Course(), -charge  # not in time anywhere: it is something else that is wrong there
+    return Course(shift=k - ROOM, steps=tuple(reversed(found))), gain
