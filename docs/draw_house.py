@@ -41,6 +41,8 @@ PLACES = {
     "pose.starts": (4, 3), "pose.legs": (4, 2), "pose.follow": (4, 1), "pose.records": (4, 0),
     "pose.recovery": (5, 3), "pose.methods": (5, 2), "cli": (5, 1),
     "pose.registry": (6, 2),
+    "processes": (0, 3), "pose.keypoint_tracks": (2, -1), "pose.keypoint_sides": (3, -1), "pose.keypoint_cues": (4, -1),
+    "pose.keypoint_views": (5, -1), "pose.occluders": (3, 0), "pose.clear_views": (5, 0), "pose.mixtures": (6, 3), "pose.backward": (6, 0),
 }  # fmt: skip
 #: Rooms around the way of a frame, which may use all that they need of it: no arrows.
 AROUND = ("check", "synthetic", "metrics", "view", "pose.smoothing", "api", "session", "trials", "experiments")
@@ -97,7 +99,7 @@ def draw(out: Path) -> None:
     for one, other, name, _ in FLOW:
         if name not in imports.get((one, other), ()):
             raise SystemExit(f"hmc.{other} does not import {name} from hmc.{one}")
-    figure, axes = plt.subplots(figsize=(16, 6.2))
+    figure, axes = plt.subplots(figsize=(19, 7.6))
     known = {edge for edge in imports if set(edge) <= set(PLACES) and edge[1] != "cli"} | {("pose.registry", "cli")}
     for one, other in sorted(reduced(known) - {flow[:2] for flow in FLOW}):
         arrow(axes, one, other, GREY, 1.0, 0.12)
@@ -107,13 +109,13 @@ def draw(out: Path) -> None:
         x, y = middle_of(name)
         box = plt.Rectangle((x - WIDTH / 2, y - HEIGHT / 2), WIDTH, HEIGHT, facecolor=FILL, edgecolor=INK, linewidth=1.1, zorder=3)
         axes.add_patch(box)
-        axes.text(x, y + 0.11, name, ha="center", va="center", fontsize=10, color=INK, zorder=4, weight="bold")
+        axes.text(x, y + 0.11, name, ha="center", va="center", fontsize=10 if len(name) < 15 else 7.5, color=INK, zorder=4, weight="bold")
         axes.text(x, y - 0.18, f"{sizes[name]:,} lines", ha="center", va="center", fontsize=8.5, color="#566072", zorder=4)
     x, y = middle_of("io")
     axes.annotate(
         "videos", (x - WIDTH / 2, y), (x - WIDTH / 2 - 0.85, y), ha="center", va="center", arrowprops=_line(BLUE, 2.4), color=BLUE
     )
-    axes.set(xlim=(-2.3, 6 * COLUMN + 1.4), ylim=(-4.15 * ROW * 1.35 - 0.5, 0.5))
+    axes.set(xlim=(-2.3, (len(AROUND) - 1) * COLUMN + 1.4), ylim=(-4.15 * ROW * 1.35 - 0.5, ROW * 1.35 + 0.5))
     axes.text(*_below("cli"), "joints.csv, tracks.csv, pose.npz", ha="center", va="top", fontsize=9, color=BLUE, zorder=5)
     axes.axhline(-3.6 * ROW * 1.35, color=GREY, linewidth=0.8, linestyle=":")
     axes.text(-2.2, -3.6 * ROW * 1.35 - 0.06, "around it", va="top", fontsize=9, color="#566072")
