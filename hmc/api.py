@@ -151,7 +151,7 @@ def track(
         raise InputError("track: keypoints have no use for a tracker; leave one of both out")
     from hmc.pose.keypoint_tracks import tracks_of_keypoints
 
-    return tracks_of_keypoints(recording, keypoints.reduced(recording.factors))
+    return tracks_of_keypoints(recording, _in_images(keypoints, recording))
 
 
 def views(
@@ -257,7 +257,7 @@ def pose(
     recording, method = _opened(recording), pose_method(method) if isinstance(method, str) else method
     height = None if height_m == "auto" else recording.known_height_m if height_m is None else height_m
     recording = recording if full_images else for_method(recording, method, POSE_VOXEL_M)
-    keypoints = None if keypoints is None else keypoints.reduced(recording.factors)
+    keypoints = None if keypoints is None else _in_images(keypoints, recording)
 
     def counted(steps: Iterable[HullStep], total: int) -> Iterator[HullStep]:
         for n, step in enumerate(steps, start=1):
@@ -354,6 +354,11 @@ def view(found: PosedPeople | TrackTable, recording: Recording, out: str | Path,
 
     result = Result(tracks=found) if isinstance(found, TrackTable) else with_bodies(Result(found.poses), found.states)
     write_view(out, recording, result, frames)
+
+
+def _in_images(keypoints: KeypointSource, recording: Recording) -> KeypointSource:
+    """Keypoints in pixels of the images as they are read; as they are where that is as they were recorded."""
+    return keypoints if set(recording.factors) <= {1} else keypoints.reduced(recording.factors)
 
 
 def _opened(recording: Recording | str | Path) -> Recording:
