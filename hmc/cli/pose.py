@@ -25,6 +25,7 @@ from hmc.cli.common import (
     was_finished,
     whole_number,
 )
+from hmc.cli.kept import MASKS, add_silhouette_options, given_silhouettes, leave_silhouettes, silhouettes_source, take_silhouettes
 from hmc.cli.option_tables import add_like_option, repeated_preset, told_options
 from hmc.cli.pose_markers import MARKERS_JOURNAL, add_marker_options, read_markers
 from hmc.cli.track import JOURNAL, add_tracker_options, selected_frontend, selected_tracker
@@ -39,8 +40,6 @@ BACK_JOURNAL = ".back.journal"
 SMOOTH_S = 0.3
 #: What `--cues` may say.
 CUES = ("silhouettes", "silhouettes,keypoints", "keypoints")
-#: Its silhouettes, which the tracker leaves for the poses.
-MASKS = ".masks"
 RESULTS = ("joints.csv", "tracks.csv", "pose.npz", "run.toml")
 
 
@@ -124,6 +123,7 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
         metavar="S",
         help=f"smooth the finished poses over so many seconds (without a number: {SMOOTH_S})",
     )
+    add_silhouette_options(parser)
     add_marker_options(parser)
     return parser
 
@@ -182,6 +182,8 @@ def run(args: argparse.Namespace) -> int:
             parameters |= {"track_voxel_size_m": args.track_voxel, "tracker": tracker.settings}
         parameters["frontend"] = frontend
     source, markers = recording_source(recording), None
+    silhouettes = given_silhouettes(args, recording, hulls)
+    source |= silhouettes_source(silhouettes)
     if given is not None:
         source |= {"tracks": args.tracks.resolve(), "tracks_changed": str(args.tracks.stat().st_mtime_ns)}
     if "detections" in method.needs:
@@ -208,6 +210,7 @@ def run(args: argparse.Namespace) -> int:
             selected_workers(args),
         )
 
+    take_silhouettes(silhouettes, recording, args.out / MASKS, key, problems.append)
     tracks = given
     if given is None and hulls:
         tracks = track_recording(recording, args.track_voxel, tracker, args.seed, kept(JOURNAL, "track"))
@@ -230,6 +233,8 @@ def run(args: argparse.Namespace) -> int:
     elif tracks is not None and cues is not None:
         people = with_keypoint_views(people, recording, tracks, cues)
     problems += people.notes
+    if hulls:
+        leave_silhouettes(args, recording, key, problems.append)
     write_tracks(paths["tracks.csv"], _pelvis_tracks(people) if tracks is None else tracks)
     write_joints(paths["joints.csv"], people.poses)
     write_pose(paths["pose.npz"], replace(people.states, costs=people.costs))

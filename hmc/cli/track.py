@@ -26,6 +26,7 @@ from hmc.cli.common import (
     was_finished,
     whole_number,
 )
+from hmc.cli.kept import MASKS, add_silhouette_options, given_silhouettes, leave_silhouettes, silhouettes_source, take_silhouettes
 from hmc.cli.option_tables import add_like_option, told_options
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ CUES = ("silhouettes", "keypoints")
 #: Options of which keypoints alone make no use, with what they are where nothing is said.
 OF_SILHOUETTES = {
     "tracker": None, "color": None, "particles": None, "track_preset": "default", "complete": True, "cut_shadows": True, "voxel": None,
-    "full_images": False,
+    "full_images": False, "silhouettes": True, "silhouettes_from": None,
 }  # fmt: skip
 
 
@@ -67,6 +68,7 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     parser.add_argument("--voxel", type=positive_float, metavar="M", help=f"side of a voxel, metres (default: {VOXEL_M})")
     add_image_option(parser)
     parser.add_argument("--seed", type=whole_number, default=0, metavar="N", help="seed of the random numbers (default: 0)")
+    add_silhouette_options(parser)
     parser.add_argument(
         "--cues",
         choices=CUES,
@@ -154,7 +156,8 @@ def run(args: argparse.Namespace) -> int:
         **work.parameters,
         **plugins,
     }
-    source = recording_source(recording)
+    silhouettes = given_silhouettes(args, recording, args.cues == CUES[0])
+    source = recording_source(recording) | silhouettes_source(silhouettes)
     depends_on = {"method": work.method, "seed": args.seed, **source, "parameters": parameters}
     key = to_toml(depends_on)
     if was_finished([tracks_path], run_path, depends_on):
@@ -166,18 +169,23 @@ def run(args: argparse.Namespace) -> int:
     run = RunOptions(
         selected_frontend(args),
         journal,
+        args.out / MASKS if args.cues == CUES[0] else None,
         key=key,
         on_problem=problems.append,
         progress=lambda steps, total: progress(steps, total, "track", args.quiet),
         workers=selected_workers(args),
     )
+    take_silhouettes(silhouettes, work.recording, args.out / MASKS, key, problems.append)
     table = work.track(run, timings.append)
+    if args.cues == CUES[0]:
+        leave_silhouettes(args, work.recording, key, problems.append)
     write_tracks(tracks_path, table)
     speed = {name: value for timing in timings for name, value in _speed(timing, recording.fps).items()}
     write_run(
         run_path, work.method, parameters, args.seed, **source, options=told_options(args), problems=gather_problems(problems), speed=speed
     )
-    journal.unlink(missing_ok=True)
+    for path in (journal, args.out / MASKS):
+        path.unlink(missing_ok=True)
     print(_summary(table, recording.n_frames))
     if speed:
         print(
@@ -191,8 +199,10 @@ def run(args: argparse.Namespace) -> int:
 
 @dataclass(frozen=True)
 class _Work:
-    """What is to be done: the method's name and parameters, and a function from a run and what takes its timing to the tracks."""
+    """What is to be done: the recording as it is read, the method's name and parameters, and a function from a run and what takes its
+    timing to the tracks."""
 
+    recording: Recording
     method: str
     parameters: Mapping[str, Any]
     track: Callable[[RunOptions, Callable[[Timing], None]], TrackTable]
@@ -205,7 +215,7 @@ def _by_silhouettes(args: argparse.Namespace, recording: Recording) -> _Work:
     voxel, tracker = args.voxel or VOXEL_M, selected_tracker(args)
     recording = recording if args.full_images else for_voxels(recording, voxel)
     parameters = {"voxel_size_m": voxel, "tracker": tracker.settings, "frontend": selected_frontend(args)} | image_parameters(recording)
-    return _Work(tracker.name, parameters, lambda run, timed: track_recording(recording, voxel, tracker, args.seed, run, timed))
+    return _Work(recording, tracker.name, parameters, lambda run, timed: track_recording(recording, voxel, tracker, args.seed, run, timed))
 
 
 def _by_keypoints(args: argparse.Namespace, recording: Recording) -> _Work:
@@ -217,7 +227,7 @@ def _by_keypoints(args: argparse.Namespace, recording: Recording) -> _Work:
     if given:
         raise InputError(f"--cues {args.cues}: has no use for {', '.join(given)}; leave {'it' if len(given) == 1 else 'them'} out")
     source = open_given_keypoints(recording, f"--cues {args.cues}")
-    return _Work("keypoints", {"cues": args.cues}, lambda run, timed: tracks_of_keypoints(recording, source, run))
+    return _Work(recording, "keypoints", {"cues": args.cues}, lambda run, timed: tracks_of_keypoints(recording, source, run))
 
 
 def _speed(timing, fps: float) -> dict[str, float]:

@@ -129,6 +129,11 @@ class Recording:
         return tuple(image or mask for image, mask in zip(self._footage, self._silhouettes, strict=True))
 
     @property
+    def file_sizes(self) -> tuple[tuple[int, int], ...]:
+        """Width and height of each camera's images in their files, pixels; of one without, as they are read."""
+        return tuple(view.size if view else camera.size for camera, view in zip(self.rig, self._own_views, strict=True))
+
+    @property
     def has_images(self) -> bool:
         """Whether any camera has images (else there are only silhouettes)."""
         return any(footage is not None for footage in self._footage)

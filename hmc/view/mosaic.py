@@ -17,15 +17,28 @@ from hmc.body.proportions import make_bodies
 from hmc.camera.model import Camera
 from hmc.errors import InputError
 from hmc.io.keypoints import KeypointSource
+from hmc.io.masks import MaskStep
 from hmc.io.recording import Frame, Recording, iterate_frames
 from hmc.io.results import PoseStates, PoseTable, TrackTable, read_joints, read_pose, read_tracks
+from hmc.io.silhouettes import KeptSilhouettes, open_silhouettes
 from hmc.landmarks import ENOUGH_VIEWS, landmark_index
 from hmc.view.overlay import LEFT, RIGHT, draw_keypoints, draw_label, draw_outline, draw_paths, draw_sticks, draw_track, person_color
 from hmc.view.scene import BACKGROUND, draw_floor, draw_rig, draw_voxels, from_above, viewpoint
 from hmc.voxels.grid import VoxelGrid
 from hmc.voxels.hulls import HullStep, stream_hulls
 
-__all__ = ["Layout", "Person", "Result", "make_layout", "people_in", "read_result", "render", "stream_mosaics", "with_bodies"]
+__all__ = [
+    "Layout",
+    "Person",
+    "Result",
+    "make_layout",
+    "people_in",
+    "read_result",
+    "render",
+    "run_silhouettes",
+    "stream_mosaics",
+    "with_bodies",
+]
 
 #: Largest picture, (width, height) in pixels, and the most that a camera's image is enlarged.
 MAX_SIZE = (1920, 1080)
@@ -53,12 +66,13 @@ class Person:
 
 @dataclass(frozen=True)
 class Result:
-    """A result as far as it was written: poses, tracks, state vectors with the persons' bodies."""
+    """A result as far as it was written: poses, tracks, state vectors with the persons' bodies, the run's silhouettes."""
 
     poses: PoseTable | None = None
     tracks: TrackTable | None = None
     states: PoseStates | None = None
     bodies: Mapping[int, BodyModel] | None = None
+    silhouettes: KeptSilhouettes | None = None
 
     @property
     def frames(self) -> np.ndarray:
@@ -96,7 +110,7 @@ def read_result(directory: str | Path) -> Result:
     if poses is None and tracks is None:
         raise InputError(f"{directory}: neither joints.csv nor tracks.csv; give the folder that `hmc pose` or `hmc track` wrote")
     states = read_pose(directory / "pose.npz") if (directory / "pose.npz").exists() else None
-    result = Result(poses, tracks)
+    result = Result(poses, tracks, silhouettes=open_silhouettes(directory))
     if states is not None and states.dof_names == DOF_NAMES[:N_CANTON]:
         # Of before the trunk bent: its joints, which come last, are at 0.
         states = replace(states, dof_names=DOF_NAMES, states=np.pad(states.states, ((0, 0), (0, N_DOF - N_CANTON))))
@@ -280,7 +294,8 @@ def stream_mosaics(
         frames = iterate_frames(recording, first, last, on_problem)
     else:
         grid = VoxelGrid.from_room(recording.room, voxel_size_m, len(recording.rig))
-        frames = stream_hulls(recording, grid, first=first, last=last, on_problem=on_problem)
+        masks = run_silhouettes(recording, result, first, last, on_problem)
+        frames = stream_hulls(recording, grid, first=first, last=last, masks=masks, on_problem=on_problem)
     view_of = panel_views(result, recording.room, layout.panel[2:])
     for frame in frames:
         camera = view_of(frame.index)
@@ -292,6 +307,28 @@ def stream_mosaics(
             draw_voxels(panel, camera, grid, frame.strict)
         found = None if keypoints is None else keypoints.frame(frame.index)
         yield frame.index, render(layout, recording, frame, people_in(result, frame.index), panel, camera, outlines, found)
+
+
+def run_silhouettes(
+    recording: Recording, result: Result, first: int | None, last: int | None, on_problem: Callable[[str], None] | None
+) -> Iterator[MaskStep] | None:
+    """The silhouettes that the run kept, with the images of their frames; None where it kept none, or not all of these.
+
+    Parameters
+    ----------
+    recording : Recording
+    result : Result
+    first, last : int, optional
+        As for `stream_mosaics`.
+    on_problem : callable, optional
+        Called with one line for everything that was survived.
+    """
+    kept, first = result.silhouettes, recording.start if first is None else first
+    last = recording.start + recording.n_frames if last is None else last
+    if kept is None or kept.missing(recording, first, last):
+        return None
+    frames = iterate_frames(recording, first, last, on_problem)
+    return (replace(step, images=frame.images) for step, frame in zip(kept.steps(recording, range(first, last)), frames, strict=True))
 
 
 def panel_views(result: Result, room: np.ndarray, size: tuple[int, int]) -> Callable[[int], Camera]:

@@ -1,8 +1,10 @@
 """The pose command on the small rendered clip: results, resuming, repeated runs and wrong input."""
 
 import csv
+import shutil
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 from drawn import draw_recording
@@ -33,8 +35,13 @@ def pose(out, *more, recording=TINY):
     return main(["pose", str(recording), "--out", str(out), "--quiet", *more])
 
 
-def quick(out, *more, frames="4"):
-    return pose(out, "--frames", frames, "--voxel", "0.05", "--preset", "canton2009", *more)
+def quick(out, *more, frames="4", recording=TINY):
+    return pose(out, "--frames", frames, "--voxel", "0.05", "--preset", "canton2009", *more, recording=recording)
+
+
+def pictures(out):
+    """The bytes of the silhouettes in a result, by file."""
+    return {path.relative_to(out): path.read_bytes() for path in (out / "silhouettes").rglob("*.png")}
 
 
 @pytest.fixture(scope="module")
@@ -45,8 +52,9 @@ def finished(tmp_path_factory):
     return out
 
 
-def test_a_run_leaves_its_four_files_and_nothing_else(finished):
-    assert sorted(path.name for path in finished.iterdir()) == ["joints.csv", "pose.npz", "run.toml", "tracks.csv"]
+def test_a_run_leaves_its_four_files_and_its_silhouettes_and_nothing_else(finished):
+    assert sorted(path.name for path in finished.iterdir()) == ["joints.csv", "pose.npz", "run.toml", "silhouettes", "tracks.csv"]
+    assert len(list((finished / "silhouettes").rglob("*.png"))) == 5 * 7
     joints, tracks, states, run = (
         read_joints(finished / "joints.csv"),
         read_tracks(finished / "tracks.csv"),
@@ -90,6 +98,50 @@ def test_a_finished_run_is_not_repeated(finished, capsys, monkeypatch):
     assert {path.name: path.stat().st_mtime_ns for path in finished.iterdir()} == before
 
 
+def test_another_run_takes_kept_silhouettes_and_comes_to_the_same_bytes(finished, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(frontend, "stream_masks", None)  # nothing is segmented
+    more = "--frames", "5", "--voxel", "0.05", "--silhouettes-from", str(finished), "--out", str(tmp_path / "again")
+    assert pose(tmp_path, *more, "--no-silhouettes") == 0
+    assert sorted(path.name for path in (tmp_path / "again").iterdir()) == ["joints.csv", "pose.npz", "run.toml", "tracks.csv"]
+    for name in ("joints.csv", "tracks.csv"):
+        assert (tmp_path / "again" / name).read_bytes() == (finished / name).read_bytes()
+    assert pose(tmp_path, *more, "--no-silhouettes") == 0
+    assert "finished before" in capsys.readouterr().out
+    told = read_run(tmp_path / "again" / "run.toml")
+    assert told["silhouettes"] == str(finished.resolve()) and told["options"]["silhouettes"] is False
+
+
+def test_a_picture_of_the_result_shows_the_silhouettes_of_the_run(finished, tmp_path, monkeypatch):
+    """Nothing is segmented; where the run kept none, something is."""
+    view = ["view", str(finished), str(TINY), "--frame", "2", "--quiet", "--out"]
+    shutil.copytree(finished, tmp_path / "other")
+    monkeypatch.setattr(frontend, "stream_masks", None)
+    assert main([*view, str(tmp_path / "kept.png")]) == 0
+    assert cv2.imread(str(tmp_path / "kept.png")).shape[2] == 3
+    shutil.rmtree(tmp_path / "other" / "silhouettes")
+    view[1] = str(tmp_path / "other")
+    with pytest.raises(TypeError):
+        main([*view, str(tmp_path / "none.png")])
+
+
+def test_kept_silhouettes_that_will_not_do_are_refused(finished, tmp_path, capsys):
+    for words, said in (
+        (("--frames", "6", "--silhouettes-from", str(finished)), "has frames 0 to 4 only"),
+        (("--silhouettes-from", str(tmp_path)), "holds no silhouettes"),
+        (("--frames", "5", "--silhouettes-from", str(tmp_path / "out")), "is what --out"),
+    ):
+        assert pose(tmp_path / "out", *words) == 2
+        assert said in capsys.readouterr().err
+
+
+def test_silhouettes_of_the_recording_itself_stay_as_they_are(tmp_path):
+    """A result that is put into its recording's folder keeps none: they would be taken for ready-made ones the next time."""
+    shutil.copytree(TINY, tmp_path / "tiny")
+    assert quick(tmp_path / "tiny", recording=tmp_path / "tiny") == 0
+    assert not (tmp_path / "tiny" / "silhouettes").exists()
+    assert any("silhouettes are not kept" in line for line in read_run(tmp_path / "tiny" / "run.toml")["problems"])
+
+
 @pytest.mark.parametrize("full", [False, pytest.param(True, marks=pytest.mark.slow)])
 @pytest.mark.slow
 def test_what_a_method_tells_of_each_frame_stands_beside_the_poses(tmp_path, monkeypatch, full):
@@ -97,7 +149,14 @@ def test_what_a_method_tells_of_each_frame_stands_beside_the_poses(tmp_path, mon
     if full:
         monkeypatch.setattr(command, "pose_method", registry.pose_method)
     assert pose(tmp_path, "--method", "pso", "--frames", "5", "--voxel", "0.04", "--height", "recording") == 0
-    assert {path.name for path in tmp_path.iterdir()} == {"fits.csv", "joints.csv", "pose.npz", "run.toml", "tracks.csv"}
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "fits.csv",
+        "joints.csv",
+        "pose.npz",
+        "run.toml",
+        "silhouettes",
+        "tracks.csv",
+    }
     with open(tmp_path / "fits.csv", newline="") as file:
         rows = list(csv.DictReader(file))
     assert list(rows[0]) == ["frame", "person", "status", "error_m", "doubts"]
@@ -143,7 +202,8 @@ def test_a_stopped_run_goes_on_and_ends_as_if_it_had_not_been(tmp_path, monkeypa
         assert (tmp_path / "cut" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
     one, other = (read_pose(tmp_path / folder / "pose.npz") for folder in ("cut", "whole"))
     assert_array_equal(one.states, other.states)
-    assert sorted(path.name for path in (tmp_path / "cut").iterdir()) == ["joints.csv", "pose.npz", "run.toml", "tracks.csv"]
+    assert sorted(path.name for path in (tmp_path / "cut").iterdir()) == ["joints.csv", "pose.npz", "run.toml", "silhouettes", "tracks.csv"]
+    assert pictures(tmp_path / "cut") == pictures(tmp_path / "whole")
 
 
 @pytest.mark.slow
@@ -165,7 +225,7 @@ def test_a_run_killed_in_the_second_pass_goes_on_there(finished, tmp_path, monke
     assert seen[before:] == list(range(seen[before], -1, -1)) and len(seen) - before < 5  # what was done is not done again
     for name in ("joints.csv", "tracks.csv"):
         assert (tmp_path / name).read_bytes() == (finished / name).read_bytes()
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["joints.csv", "pose.npz", "run.toml", "tracks.csv"]
+    assert pictures(tmp_path) == pictures(finished)
 
 
 def test_one_pass_is_another_run(finished, tmp_path):
