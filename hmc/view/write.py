@@ -9,12 +9,13 @@ import cv2
 import numpy as np
 
 from hmc.errors import InputError
-from hmc.io.files import atomic_write, sibling
+from hmc.io.files import atomic_write
 from hmc.io.keypoints import open_keypoints
 from hmc.io.recording import Recording
+from hmc.io.video import write_video
 from hmc.view.mosaic import Result, stream_mosaics
 
-__all__ = ["PICTURES", "VIDEOS", "choose_frames", "write_video", "write_view"]
+__all__ = ["PICTURES", "VIDEOS", "choose_frames", "write_view"]
 
 #: Endings of pictures, and of videos.
 PICTURES, VIDEOS = (".png", ".jpg", ".jpeg"), (".mp4", ".avi")
@@ -35,7 +36,7 @@ def write_view(
     Parameters
     ----------
     path : path
-        A picture (.png, .jpg) of some frames, or a video (.mp4, .avi) of all.
+        A picture (.png, .jpg) of some frames, or a video (.mp4, .avi) of all (`hmc.io.video.write_video`).
     recording : Recording
     result : Result
     frames : sequence of int
@@ -73,7 +74,7 @@ def write_view(
             file.write(cv2.imencode(suffix, np.concatenate(pictures))[1].tobytes())
         return
     stream: Iterable = (picture for _, picture in draw())
-    write_video(path, progress(stream, recording.n_frames) if progress else stream, recording.fps)
+    write_video(path, progress(stream, recording.n_frames) if progress else stream, recording.fps, report)
 
 
 def choose_frames(asked: list[int], start: int, n_frames: int, known) -> list[int]:
@@ -89,29 +90,3 @@ def choose_frames(asked: list[int], start: int, n_frames: int, known) -> list[in
             raise InputError(f"frame {frame} is not among the selected frames {start} to {start + n_frames - 1}")
     inside = [int(frame) for frame in known if start <= frame < start + n_frames]
     return asked or [inside[len(inside) // 2] if inside else start + n_frames // 2]
-
-
-def write_video(path: Path, pictures: Iterable, fps: float) -> None:
-    """Write pictures of one size as a video that appears under its name when it is complete.
-
-    Raises
-    ------
-    InputError
-        When the file cannot be written.
-    """
-    codec = "mp4v" if path.suffix.lower() == ".mp4" else "MJPG"
-    writer = None
-    with sibling(path) as temporary:
-        try:
-            for picture in pictures:
-                if writer is None:
-                    height, width = picture.shape[:2]
-                    writer = cv2.VideoWriter(str(temporary), cv2.VideoWriter.fourcc(*codec), fps, (width, height))
-                    if not writer.isOpened():
-                        raise InputError(f"{path}: cannot be written as a video")
-                writer.write(picture)
-        finally:
-            if writer is not None:
-                writer.release()
-        if writer is None:
-            raise InputError(f"{path}: there are no frames to show")
