@@ -1,15 +1,15 @@
 """hmc: where people are and what pose their bodies take, from calibrated videos and without markers.
 
 >>> import hmc
->>> recording = hmc.open_recording("data/synthetic/tiny", frames=8)
+>>> recording = hmc.sample(frames=8)
 >>> people = hmc.pose(recording, method="apf", seed=0)
 >>> people.positions.shape  # rows, landmarks, x y z in metres
 (8, 15, 3)
 
-These names will stay: `open_recording`, `check`, `silhouettes`, `hulls`, `track`, `views`, `pose`, `evaluate`, `view`; `recording_of` for
-images in memory, `Session` and `live` for images as they come; the records `Recording`, `Rig`, `Camera`, `TrackTable`, `PoseTable`,
-`PosedPeople`; `METHODS` and `TRACKERS`, `pose_method`, `PoseMethod`, `register_method` and `register_tracker` to add to them; and
-`InputError`.
+These names will stay: `open_recording`, `sample`, `check`, `silhouettes`, `hulls`, `track`, `views`, `pose`, `evaluate`, `view`;
+`recording_of` for images in memory, `Session` and `live` for images as they come; the records `Recording`, `Rig`, `Camera`, `TrackTable`,
+`PoseTable`, `PosedPeople`; `METHODS` and `TRACKERS`, `pose_method`, `PoseMethod`, `register_method` and `register_tracker` to add to them;
+and `InputError`.
 What is in the modules below may move.
 """
 
@@ -41,6 +41,7 @@ _WHERE = {
     "recording_of": "hmc.io.memory",
     "register_method": "hmc.pose.registry",
     "register_tracker": "hmc.tracking.trackers",
+    "sample": "hmc.io.shipped",
     "silhouettes": "hmc.api",
     "track": "hmc.api",
     "views": "hmc.api",

@@ -18,7 +18,7 @@ from hmc.errors import InputError
 
 __all__ = ["command_parser", "main", "make_parser", "repeated"]
 
-COMMANDS = ("check", "world", "sync", "synth", "track", "pose", "evaluate", "view", "run")
+COMMANDS = ("check", "world", "sync", "synth", "track", "pose", "evaluate", "view", "run", "experiments", "cite", "completion")
 
 EXIT_WORKER = 1
 EXIT_INPUT = 2
@@ -63,6 +63,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
     argv = list(sys.argv[1:] if argv is None else argv)
+    if argv[:1] == ["experiments"]:
+        from hmc.cli.experiments import hand_over
+
+        return hand_over(argv[1:])
     parser = make_parser(argv[0] if argv else None)
     args = parser.parse_args(argv)
     if args.command is None:

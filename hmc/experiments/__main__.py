@@ -20,9 +20,9 @@ from hmc.plugins import add_plugins
 EXIT_INPUT, EXIT_FAILED, EXIT_INTERRUPTED = 2, 1, 130
 
 
-def main(argv: list[str] | None = None) -> int:
-    """Run the command line; returns the exit code."""
-    args = _make_parser().parse_args(argv)
+def main(argv: list[str] | None = None, prog: str = "python -m hmc.experiments") -> int:
+    """Run the command line, which is called `prog`; returns the exit code."""
+    args = make_parser(prog).parse_args(argv)
     try:
         add_plugins(getattr(args, "plugin", ()))
         return args.act(args)
@@ -34,8 +34,9 @@ def main(argv: list[str] | None = None) -> int:
         return EXIT_INTERRUPTED
 
 
-def _make_parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="python -m hmc.experiments", description="The papers' tables and figures, computed again.")
+def make_parser(prog: str = "python -m hmc.experiments") -> argparse.ArgumentParser:
+    """The parser of `hmc experiments`."""
+    parser = argparse.ArgumentParser(prog=prog, description="The papers' tables and figures, computed again.")
     actions = parser.add_subparsers(required=True, metavar="{list,run,status,merge,report,humaneva}")
     listing = actions.add_parser("list", help="all experiments")
     listing.set_defaults(act=_list)

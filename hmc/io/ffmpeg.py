@@ -13,7 +13,7 @@ def ffmpeg_path() -> str | None:
     Returns
     -------
     str or None
-        That of the package imageio-ffmpeg (``pip install "hmc[video]"``), else the one on ``PATH``; None where there is neither.
+        That of the package imageio-ffmpeg (``pip install imageio-ffmpeg``), else the one on ``PATH``; None where there is neither.
     """
     try:
         from imageio_ffmpeg import get_ffmpeg_exe

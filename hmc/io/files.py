@@ -10,8 +10,6 @@ from dataclasses import asdict, is_dataclass
 from pathlib import Path
 from typing import IO, Any
 
-import numpy as np
-
 from hmc.errors import InputError
 
 __all__ = ["atomic_write", "sibling", "to_toml", "write_toml"]
@@ -120,7 +118,7 @@ def _plain(value: Any) -> Any:
         value = asdict(value)
     if isinstance(value, Mapping):
         return {str(key): _plain(item) for key, item in value.items() if item is not None}
-    if isinstance(value, np.ndarray | np.generic):
+    if hasattr(value, "tolist"):  # NumPy's arrays and numbers; a command that only explains itself does without NumPy
         value = value.tolist()
     if isinstance(value, list | tuple | set | frozenset):
         return [_plain(item) for item in value if item is not None]

@@ -10,6 +10,8 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from hmc import __version__
+
 __all__ = ["code_digest", "code_state", "commit", "library_versions", "machine"]
 
 PACKAGE = Path(__file__).resolve().parents[1]
@@ -17,11 +19,11 @@ PACKAGE = Path(__file__).resolve().parents[1]
 
 def library_versions() -> dict[str, str]:
     """Versions of Python, of this package and of the libraries that its numbers depend on."""
-    versions = {"python": platform.python_version()}
-    for name in ("hmc", "numpy", "scipy", "scikit-learn", "opencv-python-headless"):
+    versions = {"python": platform.python_version(), "hmc": __version__}
+    for name in ("numpy", "scipy", "scikit-learn", "opencv-python-headless"):
         try:
             versions[name] = version(name)
-        except PackageNotFoundError:  # run from a source tree, or OpenCV built by hand
+        except PackageNotFoundError:  # OpenCV built by hand
             continue
     return versions
 

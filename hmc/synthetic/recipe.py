@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import difflib
-import sysconfig
 import tomllib
 from dataclasses import MISSING, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, get_args, get_origin, get_type_hints
 
 from hmc.errors import InputError
+from hmc.io.shipped import shipped_folder
 from hmc.synthetic.clothes import PATTERNS
 from hmc.synthetic.physique import girth_of
 from hmc.synthetic.rigs import RIGS, RigRecipe
@@ -29,10 +29,6 @@ __all__ = [
 ]
 
 Color = tuple[float, float, float]
-
-_CHECKOUT = Path(__file__).resolve().parents[2] / "data" / "synthetic"
-#: Shipped recipes: in a checkout, else where an installation puts its data (pyproject.toml).
-RECIPE_FOLDER = _CHECKOUT if _CHECKOUT.is_dir() else Path(sysconfig.get_path("data")) / "share" / "hmc" / "recipes"
 
 MOTIONS = (
     "walk", "jog", "stand", "box", "gesture", "throw_catch", "sit", "pick_up", "kick_turn", "pedal_arms", "dance", "play_cube", "wave",
@@ -245,7 +241,7 @@ class Recipe:
 
 def shipped_recipes() -> list[str]:
     """Names of the recipes that come with the package."""
-    return sorted(path.stem for path in RECIPE_FOLDER.glob("*.toml"))
+    return sorted(path.stem for path in shipped_folder().glob("*.toml"))
 
 
 def load_recipe(source: str | Path) -> Recipe:
@@ -258,7 +254,7 @@ def load_recipe(source: str | Path) -> Recipe:
     """
     path = Path(source)
     if not path.is_file():
-        path = RECIPE_FOLDER / f"{source}.toml"
+        path = shipped_folder() / f"{source}.toml"
     if not path.is_file():
         near = difflib.get_close_matches(str(source), shipped_recipes(), 1)
         hint = (

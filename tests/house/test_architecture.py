@@ -76,11 +76,12 @@ MAY_IMPORT = {
     "trials": VIEW | {"trials"},
     "plugins": BASE,
     "processes": set(),
+    "citations": {"errors", "pose.registry", "tracking"},
     "session": POSE | {"session"},
     "experiments": EVERYTHING,
     "api": EVERYTHING,
     "callable_package": set(),  # finds `api` by its name, once it is called
-    "cli": EVERYTHING | {"experiments", "trials"},
+    "cli": EVERYTHING | {"citations", "experiments", "trials"},
     "__main__": {"cli"},
     "__init__": set(),
 }

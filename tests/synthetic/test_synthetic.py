@@ -10,13 +10,13 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from hmc.errors import InputError
+from hmc.io.shipped import shipped_folder
 from hmc.landmarks import landmark_index
 from hmc.synthetic import actions, gait
 from hmc.synthetic.actor import PARTS, make_actor, pose_mesh
 from hmc.synthetic.bvh import bvh_motion, bvh_positions, read_bvh
 from hmc.synthetic.motions import angles, place
 from hmc.synthetic.rasterise import rasterise
-from hmc.synthetic.recipe import RECIPE_FOLDER
 from hmc.synthetic.skeleton import BONE_NAMES, PARENTS, joint_positions, landmark_positions, make_skeleton, reach
 from hmc.synthetic.surface import Sweep, mesh_of, volume_centroid
 
@@ -282,7 +282,7 @@ def test_a_skeleton_without_known_names_is_refused(tmp_path, actor):
 
 
 def test_a_bvh_file_plays_on_an_actor_in_any_unit_and_naming(tmp_path, actor):
-    source = RECIPE_FOLDER / "wave.bvh"
+    source = shipped_folder() / "wave.bvh"
     motion = read_bvh(source)
     played = bvh_motion(motion, actor.skeleton, TIMES[:75])
     file_positions, _ = bvh_positions(motion)

@@ -12,15 +12,16 @@ from hmc.cli import main
 from hmc.errors import InputError
 from hmc.io.recording import iterate_frames, open_recording
 from hmc.io.results import read_centroids, read_joints
+from hmc.io.shipped import shipped_folder
 from hmc.landmarks import LANDMARKS
 from hmc.synthetic.image import exposure, light_crowd, make_backdrop, picture, static_shadows
-from hmc.synthetic.recipe import RECIPE_FOLDER, load_recipe, recipe_from, shipped_recipes
+from hmc.synthetic.recipe import load_recipe, recipe_from, shipped_recipes
 from hmc.synthetic.render import render_recording
 from hmc.synthetic.rigs import RIGS, RigRecipe, make_rig
 from hmc.synthetic.room import Room, cast_rays, furnish
 from hmc.synthetic.scene import build_scene, crowd_at
 
-TINY = RECIPE_FOLDER / "tiny"
+TINY = shipped_folder() / "tiny"
 
 
 def small(**changes):

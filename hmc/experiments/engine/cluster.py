@@ -48,7 +48,7 @@ def spread(compute: Compute, missing: Sequence[Mapping[str, Any]], scheduler: st
         from distributed import Client, as_completed
         from distributed.scheduler import KilledWorker
     except ImportError as error:
-        raise InputError("--scheduler needs Dask: pip install 'hmc[distributed]'") from error
+        raise InputError("--scheduler needs Dask: pip install 'dask[distributed]'") from error
     try:
         with warnings.catch_warnings():
             # Dask warns of other versions of packages on the workers, among them those that no cell uses.
