@@ -330,7 +330,8 @@ def evaluate(found: PosedPeople | TrackTable, recording: Recording) -> PoseEvalu
 
 
 def view(found: PosedPeople | TrackTable, recording: Recording, out: str | Path, frames: Sequence[int] = ()) -> None:
-    """Write poses or tracks drawn over every camera: a picture (.png, .jpg) of some frames, or a video (.mp4) of all.
+    """Write poses or tracks drawn over every camera: a picture (.png, .jpg) of some frames, a video (.mp4) of all, or a page
+    (.html) for a browser.
 
     Parameters
     ----------

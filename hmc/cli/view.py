@@ -1,4 +1,4 @@
-"""``hmc view DIR RECORDING --out FILE``: a picture or a video of a result over its recording."""
+"""``hmc view DIR RECORDING --out FILE``: a picture, a video or a page of a result over its recording."""
 
 from __future__ import annotations
 
@@ -19,11 +19,12 @@ def add_parser(subparsers) -> None:
         description="Draw the fitted bodies into every camera's image, beside a 3-D panel with the voxels; left limbs orange, right "
         "limbs blue. What a 2-D keypoint detector left in the recording is drawn as crosses. Of tracks alone, draw every person as an "
         "ellipsoid with a number, beside the room from above. A video shows all selected frames (by default those of the run), a picture "
-        "one of them (the middle one) or those of --frame, one below the other.",
+        "one of them (the middle one) or those of --frame, one below the other. A page, for any browser and without a network, has the "
+        "room to turn with the mouse, some moments' images and voxels, curves and a time line.",
     )
     parser.add_argument("directory", type=Path, metavar="DIR", help="folder of the result, with joints.csv or tracks.csv")
     add_selection_options(parser)
-    parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="FILE.mp4 (video) or FILE.png (picture)")
+    parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="FILE.mp4 (video), FILE.png (picture) or FILE.html (page)")
     parser.add_argument("--frame", type=whole_number, nargs="+", metavar="N", help="frames of a picture")
     parser.add_argument("--voxel", type=positive_float, default=0.04, metavar="M", help="voxel size in the panel, metres (default: 0.04)")
     parser.add_argument("--no-voxels", action="store_true", help="no voxels in the panel: quicker, as nothing is segmented")
@@ -35,10 +36,10 @@ def run(args: argparse.Namespace) -> int:
     """Draw and write."""
     from hmc.io.results import run_selection
     from hmc.view.mosaic import read_result
-    from hmc.view.write import VIDEOS, write_view
+    from hmc.view.write import PAGES, VIDEOS, write_view
 
-    if args.frame and args.out.suffix.lower() in VIDEOS:
-        raise InputError("--frame is for pictures; a video shows the frames of --start and --frames")
+    if args.frame and args.out.suffix.lower() in VIDEOS + PAGES:
+        raise InputError("--frame is for pictures; a video or a page shows the frames of --start and --frames")
     if not args.directory.is_dir():
         raise InputError(f"{args.directory}: no such folder; a result is the folder that `hmc pose` or `hmc track` wrote")
     result = read_result(args.directory)

@@ -9,7 +9,7 @@ from hmc.view.overlay import draw_label, draw_paths
 from hmc.voxels.grid import VoxelGrid
 from hmc.voxels.surface import surface
 
-__all__ = ["BACKGROUND", "draw_floor", "draw_rig", "draw_voxels", "from_above", "viewpoint"]
+__all__ = ["BACKGROUND", "draw_floor", "draw_rig", "draw_voxels", "from_above", "shading", "viewpoint"]
 
 BACKGROUND = (46, 40, 36)
 FLOOR = (84, 76, 70)
@@ -108,7 +108,7 @@ def draw_voxels(image: np.ndarray, camera: Camera, grid: VoxelGrid, occupied: np
     far_to_near = np.argsort(-depth, kind="stable")
     far_to_near = far_to_near[valid[far_to_near]]
     uv, depth = uv[far_to_near], depth[far_to_near]
-    shade = _shading(occupied, indices[far_to_near])
+    shade = shading(occupied, indices[far_to_near])
     # 1.2: neighbours seen at a slant leave no gaps.
     side = np.maximum(np.ceil(1.2 * camera.matrix[0, 0] * grid.voxel_size_m / depth), 1).astype(int)
     dy, dx = (offset.ravel() for offset in np.indices((side.max(), side.max())))
@@ -121,7 +121,7 @@ def draw_voxels(image: np.ndarray, camera: Camera, grid: VoxelGrid, occupied: np
     image.reshape(-1, 3)[(rows * width + columns)[inside]] = np.repeat(colors, inside.sum(axis=1), axis=0)
 
 
-def _shading(occupied: np.ndarray, indices: np.ndarray) -> np.ndarray:
+def shading(occupied: np.ndarray, indices: np.ndarray) -> np.ndarray:
     """Brightness of surface voxels by the direction in which their neighbourhood is empty, shape (n,), about .35 to 1."""
     padded = np.pad(occupied, 2).astype(np.int8)
     normals = np.zeros((len(indices), 3))

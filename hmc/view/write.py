@@ -14,11 +14,12 @@ from hmc.io.keypoints import open_keypoints
 from hmc.io.recording import Recording
 from hmc.io.video import write_video
 from hmc.view.mosaic import Result, stream_mosaics
+from hmc.view.page.write import write_page
 
-__all__ = ["PICTURES", "VIDEOS", "choose_frames", "write_view"]
+__all__ = ["PAGES", "PICTURES", "VIDEOS", "choose_frames", "write_view"]
 
-#: Endings of pictures, and of videos.
-PICTURES, VIDEOS = (".png", ".jpg", ".jpeg"), (".mp4", ".avi")
+#: Endings of pictures, of videos, and of pages.
+PICTURES, VIDEOS, PAGES = (".png", ".jpg", ".jpeg"), (".mp4", ".avi"), (".html",)
 
 
 def write_view(
@@ -36,7 +37,8 @@ def write_view(
     Parameters
     ----------
     path : path
-        A picture (.png, .jpg) of some frames, or a video (.mp4, .avi) of all (`hmc.io.video.write_video`).
+        A picture (.png, .jpg) of some frames, or a video (.mp4, .avi) of all (`hmc.io.video.write_video`), or a page for a
+        browser (.html, `hmc.view.page.write.write_page`).
     recording : Recording
     result : Result
     frames : sequence of int
@@ -57,8 +59,11 @@ def write_view(
     """
     path, (report, progress) = Path(path), how
     suffix = path.suffix.lower()
-    if suffix not in PICTURES + VIDEOS:
-        raise InputError(f"{path}: must end in .png (a picture) or .mp4 (a video)")
+    if suffix not in PICTURES + VIDEOS + PAGES:
+        raise InputError(f"{path}: must end in .png (a picture), .mp4 (a video) or .html (a page to turn)")
+    if suffix in PAGES:
+        write_page(path, recording, result, voxel_size_m, outlines, report, progress)
+        return
 
     found = open_keypoints(recording) if keypoints else None
 
