@@ -19,9 +19,10 @@ def add_parser(subparsers) -> None:
         "sync",
         help="find which frames of the cameras belong together, and write it into the recording",
         description="Find by how many frames each camera is early or late, whether its clock drifts and which frames it dropped: by "
-        "silhouettes, whose extent across the planes through any two cameras must be the same in both, and by 2-D keypoints where a "
-        "detector left some. Write it as `first_frame` of recording.toml, and as times/CAMERA.csv of cameras that drift or dropped frames; "
-        "what was there is kept. Nothing is written where it is right already, or where there is too little to go by.",
+        "silhouettes, whose extent across the planes through any two cameras must be the same in both, by 2-D keypoints where a "
+        "detector left some, and, of cameras of which these do not tell, by the sound of their videos. Write it as `first_frame` of "
+        "recording.toml, and as times/CAMERA.csv of cameras that drift or dropped frames; what was there is kept. Nothing is written "
+        "where it is right already, or where there is too little to go by.",
     )
     parser.add_argument("recording", type=Path, help="folder of the recording")
     parser.add_argument(

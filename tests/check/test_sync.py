@@ -86,6 +86,20 @@ def test_dropped_frames_are_found_where_they_were(ring, views):
     assert all(found.cameras[c].course == Course() for c in (0, 1, 3, 4))
 
 
+def test_where_nobody_moves_a_dropped_frame_may_be_anywhere():
+    places = np.concatenate([np.arange(30), np.full(30, 29), np.arange(29, 59)])  # walks, stands, and walks on
+    own = np.delete(places, 45)[:-1]
+    n = len(own)
+    costs = np.full((n, 41), np.nan)
+    for k in range(-20, 21):
+        there = (np.arange(n) + k >= 0) & (np.arange(n) + k < n)
+        costs[there, k + 20] = np.minimum(np.abs(places[:n][there] - own[np.arange(n)[there] + k]), 6) / 20 + 0.02
+    course, _ = best_course(costs)
+    assert [change for _, change in course.steps] == [-1] and course.shift == 0
+    low, high = course.spans[0]
+    assert 24 <= low <= 32 and 57 <= high <= 65
+
+
 def test_a_clock_that_drifts_is_found(ring):
     places = np.column_stack([np.interp(np.arange(4 * 310) / 4, np.arange(320), axis) for axis in path_of(320).T])
     n = 300

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -17,6 +17,8 @@ NONE = -(10**9)
 ROOM, MOST_DROPPED = 20, 5
 #: A dropped frame is believed when it is seen in as many moments after it as would be as much worse by a whole frame.
 LEAST_SEEN = 8.0
+#: It may as well have been dropped at another moment that makes no more difference than so many moments seen a whole frame off.
+AS_WELL = 2.0
 #: Where so many frames are dropped at once, a camera must be no worse than usual by so many frames' shift between any two steps.
 MANY, FITTING = 3, 2.0
 #: A moment counts for no worse than so many frames' shift.
@@ -42,12 +44,15 @@ class Course:
         before; +1 where it has a frame more than there was time for.
     start, slope : float
         Of a clock that drifts: frames, and frames a frame.
+    spans : tuple of (int, int)
+        For each step the first and the last moment that fit it as well, nearly: while nobody moves, any does.
     """
 
     shift: int = 0
     steps: tuple[tuple[int, int], ...] = ()
     start: float = 0.0
     slope: float = 0.0
+    spans: tuple[tuple[int, int], ...] = field(default=(), compare=False)
 
     @property
     def is_plain(self) -> bool:
@@ -265,4 +270,20 @@ def _stepping(costs: np.ndarray, usual: float, frame: float, charge: float) -> t
     fits.append(float(np.median(costs[: t + 1, k])))
     if max((abs(step) for _, step in found), default=0) >= MANY and max(fits) > usual + FITTING * frame:
         return Course(), -charge  # not in time anywhere: it is something else that is wrong there
-    return Course(shift=k - ROOM, steps=tuple(reversed(found))), gain
+    steps_found = tuple(reversed(found))
+    return Course(shift=k - ROOM, steps=steps_found, spans=_spans(costs, steps_found, k, AS_WELL * frame)), gain
+
+
+def _spans(costs: np.ndarray, steps: Sequence[tuple[int, int]], first: int, allowed: float) -> tuple[tuple[int, int], ...]:
+    """The moments at which each step might be as well, between those beside it; `first` is the shift before them all, as a column."""
+    spans = []
+    ends = [0, *(moment for moment, _ in steps), len(costs)]
+    k = first
+    for number, (moment, change) in enumerate(steps, 1):
+        worse = costs[:, k] - costs[:, k + change]  # of a moment that is taken for one before the step
+        later = np.cumsum(worse[moment : ends[number + 1] - 1]) < allowed
+        earlier = np.cumsum(-worse[ends[number - 1] + 1 : moment][::-1]) < allowed
+        late, early = (len(row) if row.all() else int(np.argmin(row)) for row in (later, earlier))
+        spans.append((moment - early, moment + late))
+        k += change
+    return tuple(spans)

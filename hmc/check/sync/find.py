@@ -11,7 +11,7 @@ from hmc.check.sync.courses import Course, against, best_course
 from hmc.check.sync.evidence import Evidence
 from hmc.check.sync.shifts import Certainty, certainty, find_shifts, fractions, moved_curve
 
-__all__ = ["CameraTime", "Synchrony", "find_synchrony", "joined"]
+__all__ = ["TOLD", "CameraTime", "Synchrony", "find_synchrony", "joined"]
 
 #: A camera's shift is believed when any other is so many standard errors worse, or this share of the others find it alone ...
 LEAST_MARGIN, MOST_AGREEING = 2.5, 0.6
@@ -24,6 +24,8 @@ LEAST_PARTNERS = 3
 BIAS, SIDE = 0.2, 4
 #: Who may be off by more frames than this is left as they are.
 MOST_DOUBT = 3.0
+#: Cameras of which the time is known.
+TOLD = ("sure", "sound")
 UNKNOWN = Certainty(np.nan, np.nan, np.nan)
 #: What a course must gain beyond its charge, as a share of it.
 LEAST_GAIN = 0.25
@@ -47,7 +49,11 @@ class CameraTime:
     before, after : float
         How unlike it is to the others as the recording has it now, and with the courses.
     status : str
-        "sure", "weak" (too little to go by) or "misfit" (it fits at no time).
+        "sure", "weak" (too little to go by), "misfit" (it fits at no time), or "sound": only its sound tells.
+    heard, heard_doubt : float
+        The shift that its sound tells, and by how much that may be off; NaN where it tells nothing.
+    fits : bool
+        False of a camera with the status "sound" whose images fit at no time.
     """
 
     course: Course
@@ -57,6 +63,9 @@ class CameraTime:
     before: float
     after: float
     status: str
+    heard: float = float("nan")
+    heard_doubt: float = float("nan")
+    fits: bool = True
 
 
 @dataclass(frozen=True)
@@ -69,21 +78,24 @@ class Synchrony:
     curves_before, curves_after : ndarray, shape (n_cameras, 2 * reach + 1)
         The mean unlikeness of each camera by how many frames later it is taken than now, to the others as they are now, and as their shifts
         were found; NaN where unknown.
+    note : str
+        Why sound tells nothing, where it might have; else empty.
     """
 
     cameras: tuple[CameraTime, ...]
     curves_before: np.ndarray
     curves_after: np.ndarray
+    note: str = ""
 
     @property
     def known(self) -> bool:
         """Whether there is enough to go by: two cameras at least whose times are sure."""
-        return sum(one.status == "sure" for one in self.cameras) >= 2
+        return sum(one.status in TOLD for one in self.cameras) >= 2
 
     @property
     def all_sure(self) -> bool:
         """Whether every camera's time is."""
-        return all(one.status == "sure" for one in self.cameras)
+        return all(one.status in TOLD for one in self.cameras)
 
     @property
     def in_time(self) -> bool:
@@ -186,7 +198,7 @@ def _refined(evidence: Evidence, courses: dict[int, Course], members: Sequence[i
 
 
 def _moved(course: Course, by: int) -> Course:
-    return Course(course.shift + by, course.steps, course.start, course.slope)
+    return replace(course, shift=course.shift + by)
 
 
 def _told(course: Course, part: float, doubt: float) -> bool:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hmc.check.sync.find import Synchrony
+from hmc.check.sync.find import TOLD, Synchrony
 from hmc.errors import InputError
 
 __all__ = ["save_sync_picture"]
@@ -44,7 +44,7 @@ def save_sync_picture(path: str | Path, names: Sequence[str], found: Synchrony, 
         ax.plot(shifts, 1 - before, color="0.6", label="others as they are now")
         ax.plot(shifts, 1 - after, color="tab:blue", label="others as found")
         ax.axvline(0, color="0.6", linewidth=0.8)
-        if one.status == "sure":
+        if one.status in TOLD:
             ax.axvline(one.course.shift, color="tab:red", linewidth=0.8, label="found")
         ax.set(title=f"{name}: {one.status}", xlabel="taken so many frames later", ylabel="agreement")
     for ax in axes[len(names) :]:

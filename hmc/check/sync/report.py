@@ -9,8 +9,9 @@ import numpy as np
 from hmc.check.silhouettes import covered_shares
 from hmc.check.sync.courses import Course
 from hmc.check.sync.evidence import by_keypoints, by_silhouettes, combined
-from hmc.check.sync.find import CameraTime, Synchrony, find_synchrony, joined
+from hmc.check.sync.find import TOLD, CameraTime, Synchrony, find_synchrony, joined
 from hmc.check.sync.silhouettes import masks_at, packed_silhouettes, small_recording
+from hmc.check.sync.sound import listen, with_sound
 from hmc.io.keypoints import open_keypoints
 from hmc.io.recording import Recording
 
@@ -18,6 +19,8 @@ __all__ = ["inspect_synchrony", "sync_lines"]
 
 #: Of a recording's frames, cameras are apart by this share at most: the rest must be seen by both.
 MOST_APART = 0.7
+#: Where a frame is missing is told with the frames at which it might be as well, where these are so many more.
+WIDE = 3
 
 
 def inspect_synchrony(recording: Recording, search_s: float, moments: int) -> tuple[Synchrony, np.ndarray]:
@@ -50,6 +53,7 @@ def inspect_synchrony(recording: Recording, search_s: float, moments: int) -> tu
         # Keypoints scatter more than silhouettes of a known background do, but need none.
         other = find_synchrony(combined([evidence, by_keypoints(small.rig, keypoints, recording.start, n, reach)]))
         found = joined(found, other)
+    found = with_sound(found, listen(recording, search_s), n)
     now = [np.arange(n)] * len(small.rig)
     then = [one.course.frames(n) for one in found.cameras]
     whole = [t for t in range(n) if all(0 <= own[t] < n for own in then)] or list(range(n))
@@ -73,18 +77,19 @@ def sync_lines(recording: Recording, found: Synchrony, shares: np.ndarray, first
     """A table: a head, a line a camera, and a line for what is to be said of one."""
     names = recording.rig.names
     wide = max(8, *(len(name) for name in names))
-    lines = [f"{'camera':{wide}}  offset   +/-  first frame  drift/s  dropped  how sure  unlike others   covered by hulls"]
+    lines = [f"{'camera':{wide}}  offset   +/-   sound  first frame  drift/s  dropped  how sure  unlike others   covered by hulls"]
     for c, (name, one) in enumerate(zip(names, found.cameras, strict=True)):
         course = one.course
         dropped = sum(-change for _, change in course.steps if change < 0)
         first = str(first_frames.get(name, "times"))
-        cells = f"{_offset(one):>6}  {_doubt(one):>4}  {first:>11}  {course.slope * recording.fps:7.2f}  {dropped:7d}  {one.status:>8}"
+        cells = f"{_offset(one):>6}  {_doubt(one):>4}  {_heard(one):>6}  {first:>11}  {course.slope * recording.fps:7.2f}"
+        cells += f"  {dropped:7d}  {one.status:>8}"
         lines.append(
             f"{name:{wide}}  {cells}  {_number(one.before)} -> {_number(one.after)}  {_share(shares[0, c])} -> {_share(shares[1, c])}"
         )
     for name, one in zip(names, found.cameras, strict=True):
         lines += _remarks(name, one)
-    return lines
+    return lines + [found.note] * bool(found.note)
 
 
 def _remarks(name: str, one: CameraTime) -> list[str]:
@@ -92,24 +97,48 @@ def _remarks(name: str, one: CameraTime) -> list[str]:
         return [f"camera '{name}' fits the others at no time: is this its video, and has it moved since it was calibrated?"]
     if one.status == "weak":
         return [f"camera '{name}': when it took its frames cannot be told; left as it is"]
+    if one.status == "sound":
+        by_sound = f"camera '{name}': its time is by its sound alone, to about {one.doubt:.1f} frames"
+        return [by_sound if one.fits else f"{by_sound}; its images fit the others at no time: has it moved since it was calibrated?"]
+    told = _told_otherwise(name, one)
     steps = one.course.steps
     if not steps:
-        return []
-    gone = [moment + k + one.course.shift + sum(c for m, c in steps if m < moment) for moment, change in steps for k in range(change, 0)]
-    told = [f"camera '{name}': frames are missing before its frame{'s' * (len(gone) > 1)} {_listed(gone)}"] if gone else []
+        return told
+    gone, unsure, shift = [], [], one.course.shift
+    for number, (moment, change) in enumerate(steps):
+        gone += [moment + k + shift for k in range(change, 0)]
+        low, high = one.course.spans[number] if one.course.spans else (moment, moment)
+        if change < 0 and high - low >= WIDE:
+            unsure.append(f"{low + change + shift} to {high + change + shift}")
+        shift += change
+    told += [f"camera '{name}': frames are missing before its frame{'s' * (len(gone) > 1)} {_listed(gone)}"] if gone else []
+    if unsure:
+        told += [f"camera '{name}': where people hardly move, that cannot be told well: it may be any frame from {', '.join(unsure)}"]
     return told + ([f"camera '{name}': has frames twice"] if any(change > 0 for _, change in steps) else [])
+
+
+def _told_otherwise(name: str, one: CameraTime) -> list[str]:
+    """A sentence where the sound of a camera whose images are sure says another time."""
+    seen = one.course.shift + float(np.nan_to_num(one.fraction))
+    if not one.course.is_plain or not abs(one.heard - seen) > one.heard_doubt + one.doubt + 1:
+        return []
+    return [f"camera '{name}': its sound is {one.heard:+.1f} frames ahead and its images {seen:+.1f}; images count. Is it its own sound?"]
+
+
+def _heard(one: CameraTime) -> str:
+    return "-" if np.isnan(one.heard) else f"{one.heard:+.1f}"
 
 
 def _offset(one: CameraTime) -> str:
     """Frames, to a tenth where that is known."""
     course = one.course
-    if one.status != "sure":
+    if one.status not in TOLD:
         return "-"
     return f"{course.shift:+d}" if np.isnan(one.fraction) or course != Course(course.shift) else f"{course.shift + one.fraction:+.1f}"
 
 
 def _doubt(one: CameraTime) -> str:
-    return f"{one.doubt:.1f}" if one.status == "sure" and np.isfinite(one.doubt) else "-"
+    return f"{one.doubt:.1f}" if one.status in TOLD and np.isfinite(one.doubt) else "-"
 
 
 def _listed(values: list[int]) -> str:
