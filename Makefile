@@ -2,8 +2,8 @@
 #   make demo    render a clip, find and fit the person in it, print the metrics and where the pictures are
 #   make test    the quick tests           make test-all  all tests, the slow ones too (real kills, whole chains, notebooks)
 #   make lint    style and types
-#   make bench   measured speed            make docs    pages of the functions and of the notebooks, in out/pages
-#   make figures tables of the pages, from results/
+#   make bench   measured speed            make docs    the documentation site, in out/pages
+#   make figures tables of the pages, from results/    make notebooks  run those that are stale and store what they show
 #   make clean   remove what the others made
 
 PYTHON ?= python3
@@ -19,7 +19,7 @@ export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: help setup demo test test-all lint bench docs figures clean
+.PHONY: help setup demo test test-all lint bench docs figures notebooks clean
 help:
 	@sed -n 's/^#   //p' Makefile
 
@@ -60,6 +60,9 @@ bench: $(READY)
 
 figures: $(READY)
 	$(PY) docs/make_tables.py
+
+notebooks: $(READY)
+	$(PY) docs/run_notebooks.py
 
 docs: $(READY)
 	@$(PY) -m pip install -qq --root-user-action=ignore -e ".[docs]"

@@ -1,125 +1,135 @@
-"""Pages from what is in the repository: the functions from their docstrings (by pdoc), and a gallery from the notebooks, which are run.
+"""The documentation site: guide, functions, notebooks with what they show, and a search, as plain files that need no server.
 
 python docs/make_pages.py --out out/pages
+
+Nothing is run: the notebooks are as they are stored (`make notebooks`). A link that leads nowhere is an error.
 """
 
 import argparse
-import base64
-import html
-import re
-import warnings
+import json
+import shutil
+import sys
+from collections.abc import Iterable
 from pathlib import Path
 
-import markdown2
-import nbclient
 import nbformat
-import pdoc
-from pygments import highlight
-from pygments.formatters import HtmlFormatter
-from pygments.lexers import PythonLexer
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+from site_of.gallery import gallery_page, notebook_page, picture_of, title_of
+from site_of.guide import guide_page
+from site_of.links import broken_links
+from site_of.shell import Group, Page, asset_files, page_html
 
 ROOT = Path(__file__).resolve().parents[1]
-STYLE = """
-body { font: 16px/1.55 system-ui, "DejaVu Sans", sans-serif; color: #1c2430; max-width: 1060px; margin: 0 auto; padding: 1.5rem; }
-a { color: #1f4f9c; text-decoration: none; } a:hover { text-decoration: underline; } img { max-width: 100%; height: auto; }
-pre { background: #f5f7fa; border-radius: 4px; padding: .7rem .9rem; overflow-x: auto; font-size: .84rem; line-height: 1.45; }
-pre.output { background: none; border-left: 3px solid #d4dae4; border-radius: 0; } code { font-size: .9em; }
-.gallery { display: grid; grid-template-columns: repeat(auto-fill, minmax(300px, 1fr)); gap: 1.5rem; }
-.gallery a { color: inherit; } .gallery .picture { height: 190px; overflow: hidden; border: 1px solid #e3e7ee; border-radius: 4px; }
-.gallery img { width: 100%; } .gallery h2 { font-size: 1.05rem; margin: .5rem 0 .2rem; }
-.gallery p { margin: 0; font-size: .88rem; color: #566072; }
-"""
+#: The parts of the guide, in the order in which they are read; a page of docs/ that is not named here stands in the last.
+GUIDE = {
+    "Guide": ("README.md", "docs/which_when.md", "docs/conventions.md", "docs/sessions.md"),
+    "Methods": ("docs/tracking.md", "docs/scalable.md", "docs/spectral.md", "docs/multi-cue.md"),
+    "Measured": ("docs/accuracy.md", "docs/results.md", "docs/experiments.md", "benchmarks/README.md"),
+    "The house": ("docs/architecture.md", "CONTRIBUTING.md", "CHANGELOG.md"),
+}
+#: What stands in the navigation of functions: the public face and its packages; the rest is linked from these, and found by the search.
+FACE = 2
 
 
-def page(title: str, body: str) -> str:
-    """A page around a body of HTML."""
-    colors = HtmlFormatter(style="friendly").get_style_defs(".highlight")
-    head = f'<meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1"><title>{html.escape(title)}</title>'
-    return f'<!DOCTYPE html>\n<html lang="en"><head>{head}\n<style>{STYLE}{colors}</style></head>\n<body>\n{body}\n</body></html>\n'
+def sources() -> dict[str, list[Path]]:
+    """The Markdown files by the part of the guide in which they are."""
+    parts = {part: [ROOT / name for name in names] for part, names in GUIDE.items()}
+    known = {path for paths in parts.values() for path in paths}
+    parts["Guide"] += [path for path in sorted((ROOT / "docs").glob("*.md")) if path not in known]
+    return parts
 
 
-def prose(text: str) -> str:
-    """Markdown as HTML."""
-    return markdown2.markdown(text, extras=["fenced-code-blocks", "tables"])
+def page_path(source: Path) -> str:
+    """Where the page of a Markdown file goes: the README is the first page."""
+    name = source.relative_to(ROOT).as_posix()
+    return (
+        "index.html"
+        if name == "README.md"
+        else "guide/" + name.removeprefix("docs/").removesuffix(".md").lower().replace("/", "-") + ".html"
+    )
 
 
-def title_of(notebook: nbformat.NotebookNode) -> tuple[str, str]:
-    """A notebook's heading, and the first sentence below it."""
-    heading, _, rest = notebook.cells[0].source.partition("\n")
-    return heading.lstrip("# "), re.split(r"(?<=[.?])\s", re.sub(r"[*`]", "", rest.strip().replace("\n", " ")))[0]
+class Site:
+    """The pages and files of a site as they come together: by their places in it."""
+
+    def __init__(self, modules: Iterable[Page] = ()) -> None:
+        """Make all pages; `modules` are those of the functions."""
+        self.files: dict[str, bytes] = {name: text.encode() for name, text in asset_files().items()}
+        self.missing: list[str] = []
+        self.guide = {path: page_path(path) for paths in sources().values() for path in paths}
+        self.pages = [guide_page(path, ROOT, place, self.place_of) for path, place in self.guide.items()]
+        self.cards: list[tuple[str, str, str, str]] = []
+        self.pages += self.notebooks()
+        self.modules = list(modules)
+        self.pages += self.modules
+
+    def place_of(self, target: str, page: str) -> str:
+        """Where a file of the repository is in the site; files that are no pages are taken along."""
+        path = ROOT / target
+        if path in self.guide:
+            return self.guide[path]
+        if path.suffix == ".ipynb" and path.is_file():
+            return f"gallery/{path.stem}.html"
+        if path.is_file():
+            place = f"files/{target}"
+            self.files.setdefault(place, path.read_bytes())
+            return place
+        self.missing.append(f"{page}: {target} is not a file of the repository")
+        return target
+
+    def notebooks(self) -> list[Page]:
+        """The gallery and its pages."""
+        made = []
+        for path in sorted((ROOT / "notebooks").glob("*.ipynb")):
+            notebook = nbformat.read(path, as_version=4)
+            page, pictures = notebook_page(path.stem, notebook, self.place_of)
+            self.files |= pictures
+            self.files[f"files/notebooks/{path.name}"] = path.read_bytes()
+            self.cards.append((path.stem, *title_of(notebook), picture_of(pictures)))
+            made.append(page)
+        return [gallery_page(self.cards), *made]
+
+    def groups(self) -> list[Group]:
+        """The navigation."""
+        titles = {page.path: page.title for page in self.pages}
+        found = [Group(part, tuple((self.guide[path], titles[self.guide[path]]) for path in paths)) for part, paths in sources().items()]
+        gallery = [("gallery/index.html", "All notebooks"), *((f"gallery/{name}.html", title) for name, title, _, _ in self.cards)]
+        face = [(page.path, page.title) for page in self.modules if page.title.count(".") < FACE]
+        return [*found, Group("Notebooks", tuple(gallery)), *([Group("Functions", tuple(face))] if face else [])]
+
+    def write(self, out: Path) -> list[str]:
+        """Write all of it in place of what was there; returns what is wrong with its links."""
+        groups = self.groups()
+        texts = {page.path: page_html(page, groups) for page in self.pages}
+        places = [(page.path, one) for page in self.pages for one in page.entries]
+        index = [[one.title, path + (f"#{one.anchor}" if one.anchor else ""), one.kind, one.text] for path, one in places]
+        self.files["search-index.js"] = f"window.HMC_INDEX = {json.dumps(index, ensure_ascii=False)};\n".encode()
+        shutil.rmtree(out, ignore_errors=True)
+        for place, content in {**self.files, **{path: text.encode() for path, text in texts.items()}}.items():
+            (out / place).parent.mkdir(parents=True, exist_ok=True)
+            (out / place).write_bytes(content)
+        return self.missing + broken_links(texts, set(self.files))
 
 
-def notebook_page(notebook: nbformat.NotebookNode) -> str:
-    """A notebook that has been run, as a page."""
-    parts = ['<p><a href="index.html">All notebooks</a></p>']
-    for cell in notebook.cells:
-        if cell.cell_type == "markdown":
-            parts.append(prose(cell.source))
-            continue
-        parts.append(highlight(cell.source, PythonLexer(), HtmlFormatter()))
-        for output in cell.get("outputs", ()):
-            if output.output_type == "stream":
-                parts.append(f'<pre class="output">{html.escape(output.text)}</pre>')
-            elif "image/png" in output.get("data", {}):
-                parts.append(f'<img alt="" src="data:image/png;base64,{output.data["image/png"].strip()}">')
-            elif "text/plain" in output.get("data", {}):
-                parts.append(f'<pre class="output">{html.escape(output.data["text/plain"])}</pre>')
-    return page(title_of(notebook)[0], "\n".join(parts))
-
-
-def largest_picture(notebook: nbformat.NotebookNode) -> str:
-    """The picture that stands for a notebook: the one with the most bytes, which has the most in it; empty where there is none."""
-    outputs = (output for cell in notebook.cells for output in cell.get("outputs", ()))
-    pictures = [output.data["image/png"].strip() for output in outputs if "image/png" in output.get("data", {})]
-    return max(pictures, key=lambda text: len(base64.b64decode(text)), default="")
-
-
-def gallery_page(notebooks: dict[str, nbformat.NotebookNode]) -> str:
-    """One picture, heading and sentence of each notebook."""
-    parts = ["<h1>Notebooks</h1>", '<div class="gallery">']
-    for name, notebook in notebooks.items():
-        title, sentence = title_of(notebook)
-        picture = f'<div class="picture"><img alt="" src="data:image/png;base64,{largest_picture(notebook)}"></div>'
-        parts.append(f'<a href="{name}.html">{picture}<h2>{html.escape(title)}</h2><p>{html.escape(sentence)}</p></a>')
-    return page("Notebooks", "\n".join([*parts, "</div>"]))
-
-
-def make_gallery(folder: Path, out: Path) -> None:
-    """Run every notebook of a folder and write its page and the gallery."""
-    out.mkdir(parents=True, exist_ok=True)
-    notebooks = {}
-    for path in sorted(folder.glob("*.ipynb")):
-        notebook = nbformat.read(path, as_version=4)
-        resources = {"metadata": {"path": str(path.parent)}}
-        nbclient.NotebookClient(notebook, timeout=900, kernel_name="python3", resources=resources).execute()
-        notebooks[path.stem] = notebook
-        (out / f"{path.stem}.html").write_text(notebook_page(notebook), encoding="utf-8")
-    (out / "index.html").write_text(gallery_page(notebooks), encoding="utf-8")
-
-
-def make_api(out: Path, *modules: str) -> None:
-    """The pages of modules and of all that is in them."""
-    pdoc.render.configure(docformat="numpy", show_source=False, footer_text="hmc")
-    with warnings.catch_warnings():
-        # the fields of a NamedTuple bear annotations that pdoc cannot look up
-        warnings.filterwarnings("ignore", "Error parsing type annotation")
-        pdoc.pdoc(*modules, output_directory=out)
-
-
-def main() -> None:
-    """Make all pages."""
+def main() -> int:
+    """Make the site."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--out", type=Path, default=ROOT / "out" / "pages", help="where the pages go")
-    parser.add_argument("--no-gallery", action="store_true", help="the functions alone; the notebooks take some minutes")
+    parser.add_argument("--out", type=Path, default=ROOT / "out" / "pages", help="where the pages go; what is there is replaced")
+    parser.add_argument("--no-api", action="store_true", help="without the pages of the functions, which take longest")
     args = parser.parse_args()
-    make_api(args.out / "api", "hmc")
-    links = ['<li><a href="api/hmc.html">Functions and classes</a>, from their docstrings</li>']
-    if not args.no_gallery:
-        make_gallery(ROOT / "notebooks", args.out / "gallery")
-        links.insert(0, '<li><a href="gallery/index.html">Notebooks</a>, with what they show</li>')
-    (args.out / "index.html").write_text(page("hmc", f"<h1>hmc</h1>\n<ul>{''.join(links)}</ul>"), encoding="utf-8")
+    if args.no_api:
+        site = Site()
+    else:
+        from site_of.api import api_pages
+
+        site = Site(api_pages("hmc"))
+    wrong = site.write(args.out)
+    print(*wrong, sep="\n", file=sys.stderr, end="\n" if wrong else "")
     print(args.out / "index.html")
+    return 1 if wrong else 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -59,7 +59,7 @@ def make_parser(prog: str = "python -m hmc.experiments") -> argparse.ArgumentPar
     merge = actions.add_parser("merge", help="bring the cells that several machines computed together")
     merge.add_argument("others", type=Path, nargs="+", metavar="FOLDER", help="folders of runs, as their --out")
     merge.set_defaults(act=_merge)
-    report = actions.add_parser("report", help="one page and one PDF of all that is computed, and how it compares with the papers")
+    report = actions.add_parser("report", help="one page of all that is computed, and how it compares with the papers")
     report.set_defaults(act=_report)
     for action in (run, status, merge, report):
         action.add_argument("--out", type=Path, default=Path("experiments"), metavar="DIR", help="folder of cells, inputs and reports")
@@ -191,20 +191,18 @@ def _merge(args: argparse.Namespace) -> int:
 
 
 def _report(args: argparse.Namespace) -> int:
-    from hmc.experiments.engine.booklet import write_booklet
     from hmc.experiments.engine.markdown import to_markdown
     from hmc.experiments.engine.page import to_html, verdict_counts
     from hmc.experiments.engine.summary import summarise
     from hmc.io.files import atomic_write
 
     rows = summarise(args.out)
-    page, text, booklet = (_folder(args.out) / f"report.{kind}" for kind in ("html", "md", "pdf"))
+    page, text = (_folder(args.out) / f"report.{kind}" for kind in ("html", "md"))
     for path, content in ((page, to_html(rows)), (text, to_markdown(rows, "."))):
         with atomic_write(path) as file:
             file.write(content)
-    write_booklet(booklet, rows)
     _tell(verdict_counts(rows))
-    _tell(f"wrote {page}, {text} and {booklet}")
+    _tell(f"wrote {page} and {text}")
     return 0
 
 

@@ -1,4 +1,4 @@
-"""What is on disk of every experiment, and how it compares with its paper: what the page and the booklet show."""
+"""What is on disk of every experiment, and how it compares with its paper: what the page shows."""
 
 from __future__ import annotations
 
