@@ -24,7 +24,9 @@ def add_parser(subparsers) -> None:
     )
     parser.add_argument("directory", type=Path, metavar="DIR", help="folder of the result, with joints.csv or tracks.csv")
     add_selection_options(parser)
-    parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="FILE.mp4 (video), FILE.png (picture) or FILE.html (page)")
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="FILE", help="FILE.mp4 (video), FILE.png (picture), FILE.html (page) or FILE.rrd (Rerun)"
+    )
     parser.add_argument("--frame", type=whole_number, nargs="+", metavar="N", help="frames of a picture")
     parser.add_argument("--voxel", type=positive_float, default=0.04, metavar="M", help="voxel size in the panel, metres (default: 0.04)")
     parser.add_argument("--no-voxels", action="store_true", help="no voxels in the panel: quicker, as nothing is segmented")

@@ -15,11 +15,12 @@ from hmc.io.recording import Recording
 from hmc.io.video import write_video
 from hmc.view.mosaic import Result, stream_mosaics
 from hmc.view.page.write import write_page
+from hmc.view.rerun_file import write_rrd
 
 __all__ = ["PAGES", "PICTURES", "VIDEOS", "choose_frames", "write_view"]
 
-#: Endings of pictures, of videos, and of pages.
-PICTURES, VIDEOS, PAGES = (".png", ".jpg", ".jpeg"), (".mp4", ".avi"), (".html",)
+#: Endings of pictures, of videos, and of what is turned with the mouse: pages, files of Rerun.
+PICTURES, VIDEOS, PAGES = (".png", ".jpg", ".jpeg"), (".mp4", ".avi"), (".html", ".rrd")
 
 
 def write_view(
@@ -38,7 +39,7 @@ def write_view(
     ----------
     path : path
         A picture (.png, .jpg) of some frames, or a video (.mp4, .avi) of all (`hmc.io.video.write_video`), or a page for a
-        browser (.html, `hmc.view.page.write.write_page`).
+        browser (.html, `hmc.view.page.write.write_page`), or a file of Rerun (.rrd, `hmc.view.rerun_file.write_rrd`).
     recording : Recording
     result : Result
     frames : sequence of int
@@ -60,9 +61,10 @@ def write_view(
     path, (report, progress) = Path(path), how
     suffix = path.suffix.lower()
     if suffix not in PICTURES + VIDEOS + PAGES:
-        raise InputError(f"{path}: must end in .png (a picture), .mp4 (a video) or .html (a page to turn)")
+        raise InputError(f"{path}: must end in .png (a picture), .mp4 (a video), .html (a page to turn) or .rrd (for Rerun)")
     if suffix in PAGES:
-        write_page(path, recording, result, voxel_size_m, outlines, report, progress)
+        write = write_page if suffix == ".html" else write_rrd
+        write(path, recording, result, voxel_size_m, outlines, report, progress)
         return
 
     found = open_keypoints(recording) if keypoints else None

@@ -5,6 +5,7 @@ import json
 import re
 import shutil
 import subprocess
+import sys
 from dataclasses import replace
 from html.parser import HTMLParser
 
@@ -63,21 +64,26 @@ def unpacked(packed):
 @pytest.fixture(scope="module")
 def written(tmp_path_factory, body):
     """A page of a drawn recording with both people, with its result."""
+    recording = drawn_recording(tmp_path_factory.mktemp("page") / "a <b> & c")
+    result = posed(body)
+    out = recording.path.parent / "page.html"
+    write_view(out, recording, result, (), None)
+    return out, result
+
+
+def drawn_recording(folder):
+    """Three cameras, twelve frames, each brighter than the one before."""
     from conftest import write_images
 
     from hmc.camera.model import Rig, look_at
     from hmc.io.calibration import write_calibration
 
-    folder = tmp_path_factory.mktemp("page") / "a <b> & c"
     folder.mkdir()
     rig = Rig(tuple(look_at(f"cam_{i:02d}", (160, 120), [3.5 * np.cos(i), 3.5 * np.sin(i), 2.0], [0, 0, 0.9], 70) for i in range(3)))
     write_calibration(folder / "calibration.toml", rig)
     for name in rig.names:
         write_images(folder / "images" / name, range(12), (160, 120))
-    result = posed(body)
-    out = folder.parent / "page.html"
-    write_view(out, open_recording(folder), result, (), None)
-    return out, result
+    return open_recording(folder)
 
 
 def test_what_a_page_holds_is_the_result(written, body):
@@ -180,3 +186,29 @@ def test_people_are_seen_in_their_colors(written, tmp_path, size):
     assert picture.shape[:2] == size[::-1]
     green, violet = (np.abs(picture.astype(int) - color).max(axis=-1) < 60 for color in ((110, 230, 120), (235, 110, 220)))
     assert green.sum() > 300 and violet.sum() > 300
+
+
+def test_a_file_of_rerun_is_read_by_its_own_reader(tmp_path, body):
+    reader = pytest.importorskip("rerun.chunk", exc_type=ImportError)
+    result = posed(body)
+    write_view(tmp_path / "a.rrd", drawn_recording(tmp_path / "walk"), result, (), None)
+    chunks = list(reader.RrdReader(tmp_path / "a.rrd").stream().to_chunks())
+    paths = {str(chunk.entity_path) for chunk in chunks}
+    assert {"/world/people/0/bones", "/world/people/1/landmarks", "/world/cameras/cam_02", "/images/cam_00", "/angles/0/l_elbow_z"} <= paths
+    read = {}
+    for chunk in chunks:
+        table = chunk.to_record_batch().to_pydict()
+        column = next((name for name in table if name.endswith("Points3D:positions")), None)
+        if str(chunk.entity_path) == "/world/people/1/landmarks" and column is not None:
+            read |= {frame: np.array(points) for frame, points in zip(table["frame"], table[column], strict=True) if points}
+    table = result.poses.of(1)
+    assert sorted(read) == table.frames.tolist()
+    for frame, places in zip(table.frames.tolist(), table.positions, strict=True):
+        assert_allclose(read[frame], places, atol=1e-5)
+    assert [path.name for path in tmp_path.iterdir() if path.is_file()] == ["a.rrd"]
+
+
+def test_without_rerun_a_line_says_what_to_install(tmp_path, body, monkeypatch):
+    monkeypatch.setitem(sys.modules, "rerun", None)
+    with pytest.raises(InputError, match=r"rerun-sdk; install it: pip install"):
+        write_view(tmp_path / "a.rrd", drawn_recording(tmp_path / "walk"), posed(body), (), None)

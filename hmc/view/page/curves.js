@@ -69,6 +69,9 @@ function ticks(low, high, most) {
 function told(value, step) {
   return value !== 0 && Math.abs(value) < 1e-3 ? value.toExponential(1) : value.toFixed(Math.max(0, -Math.floor(Math.log10(step) + 1e-9)));
 }
+function said(value, unit) {
+  return unit === "m" ? `${value.toFixed(3)} m` : unit ? value.toFixed(1) + unit : value.toPrecision(3);
+}
 function drawCurve(canvas, kind, at) {
   const [pen, width, height] = sized(canvas);
   let low = Infinity, high = -Infinity;
@@ -83,7 +86,7 @@ function drawCurve(canvas, kind, at) {
   low -= pad; high += pad;
   const top = 6, foot = 18, y = (value) => top + (high - value) / (high - low) * (height - top - foot);
   pen.font = "11px system-ui, sans-serif"; pen.textBaseline = "middle";
-  const [marks, step] = ticks(low, high, Math.max(2, height / 42));
+  const [marks, step] = ticks(low, high, Math.max(3, height / 30));
   pen.textAlign = "right";
   for (const mark of marks) {
     pen.fillStyle = "#2b323c"; pen.fillRect(SIDE, y(mark), width - SIDE - EDGE, 1);
@@ -118,5 +121,8 @@ function drawCurve(canvas, kind, at) {
     const value = kind.of(person, at);
     if (!isNaN(value)) { pen.beginPath(); pen.arc(placeOf(at, width, SIDE, EDGE), y(value), 3.2, 0, 7); pen.fill(); }
   });
-  return PEOPLE.filter((person) => person.shown && !isNaN(kind.of(person, at))).map((person) => `person ${person.number}: ${kind.of(person, at).toPrecision(4)} ${kind.unit}`.trim());
+}
+// What is at a frame, in words.
+function noteOf(kind, at) {
+  return PEOPLE.filter((person) => person.shown && !isNaN(kind.of(person, at))).map((person) => `person ${person.number}: ${said(kind.of(person, at), kind.unit)}`).join(" · ");
 }

@@ -59,7 +59,8 @@ function draw(now) {
     drawScene(by("scene"), at);
     drawLine(by("line"), at);
     showImages();
-    if (kind) by("curve-note").textContent = (drawCurve(by("curve"), kind, at) || []).join("   ");
+    by("curve-note").textContent = noteOf(kind, at) || "–";  // before the curve, whose height depends on it
+    drawCurve(by("curve"), kind, at);
     const frame = frameOf(at);
     by("now").textContent = `frame ${frame}, ${(frame / DATA.fps).toFixed(2)} s`;
     by("line").setAttribute("aria-valuenow", frame);
