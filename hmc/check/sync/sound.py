@@ -73,7 +73,7 @@ def listen(recording: Recording, search_s: float) -> Sound:
     if not any(_is_video(view) for view in views):
         return Sound(nothing, np.zeros(n), nothing, "")
     if ffmpeg_path() is None:
-        return Sound(nothing, np.zeros(n), nothing, 'sound: not used; there is no ffmpeg to read it (pip install imageio-ffmpeg)')
+        return Sound(nothing, np.zeros(n), nothing, "sound: not used; there is no ffmpeg to read it (pip install imageio-ffmpeg)")
     tracks, begins = [], np.zeros(n)
     for c, view in enumerate(views):
         if view is None or not _is_video(view):
