@@ -1,8 +1,8 @@
-"""The fifteen landmarks in which poses are given and compared, in one fixed order."""
+"""The fifteen landmarks in which poses are given and compared, in one fixed order, and the points of the feet beside them."""
 
 from __future__ import annotations
 
-__all__ = ["BONES", "ENOUGH_VIEWS", "LANDMARKS", "landmark_index"]
+__all__ = ["BONES", "ENOUGH_VIEWS", "FOOT_POINTS", "LANDMARKS", "landmark_index"]
 
 #: Joint centres (centres of rotation); `pelvis` is the middle of the hip centres, `neck` the base of the neck, `head_top` the crown.
 LANDMARKS: tuple[str, ...] = (
@@ -10,6 +10,9 @@ LANDMARKS: tuple[str, ...] = (
     "l_shoulder", "l_elbow", "l_wrist", "r_shoulder", "r_elbow", "r_wrist",
     "l_hip", "l_knee", "l_ankle", "r_hip", "r_knee", "r_ankle",
 )  # fmt: skip
+
+#: Ends of the soles: the rearmost point of the heel and the foremost of the toes, shoes included.
+FOOT_POINTS: tuple[str, ...] = ("l_heel", "l_toe", "r_heel", "r_toe")
 
 #: Pairs of landmarks between which a stick figure draws a line.
 BONES: tuple[tuple[str, str], ...] = (

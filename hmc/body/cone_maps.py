@@ -34,7 +34,7 @@ def cone_maps(cones: Cones, placed: np.ndarray) -> ConeMaps:
     Parameters
     ----------
     cones : Cones
-    placed : ndarray, shape (14, 3, 4, n)
+    placed : ndarray, shape (16, 3, 4, n)
         As from `hmc.body.kinematics.place_segments`.
     """
     local = np.zeros((len(cones.part), 4, 4), placed.dtype)

@@ -25,7 +25,7 @@ _EXCHANGED = {
 }
 #: Steps towards exchanged legs.
 LEG_STEPS = 8
-_LEG_ANGLES = np.concatenate([LIMBS["r_leg"].dofs, LIMBS["l_leg"].dofs])
+_LEG_ANGLES = np.concatenate([np.r_[LIMBS[leg].dofs, LIMBS[leg].end_dofs] for leg in ("r_leg", "l_leg")])
 
 
 def swapped_pose(body: BodyModel, state: np.ndarray, what: Literal["all", "legs", "arms"]) -> np.ndarray:
@@ -34,12 +34,12 @@ def swapped_pose(body: BodyModel, state: np.ndarray, what: Literal["all", "legs"
     Parameters
     ----------
     body : BodyModel
-    state : ndarray, shape (33,)
+    state : ndarray, shape (37,)
     what : {"all", "legs", "arms"}
 
     Returns
     -------
-    ndarray, shape (33,)
+    ndarray, shape (37,)
         Within the joint limits, so it fits the hull as well as the body can that way round.
     """
     points = landmarks(body, state)
@@ -60,10 +60,10 @@ def swapped_poses(body: BodyModel, state: np.ndarray) -> np.ndarray:
     Parameters
     ----------
     body : BodyModel
-    state : ndarray, shape (33,)
+    state : ndarray, shape (37,)
 
     Returns
     -------
-    ndarray, shape (3, 33)
+    ndarray, shape (3, 37)
     """
     return np.array([swapped_pose(body, state, "all"), swapped_pose(body, state, "legs"), swapped_pose(body, state, "arms")])

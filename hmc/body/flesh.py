@@ -153,8 +153,8 @@ def place_points(rotations: np.ndarray, positions: np.ndarray, points: np.ndarra
 
     Parameters
     ----------
-    rotations : ndarray, shape (..., 14, 3, 3)
-    positions : ndarray, shape (..., 14, 3)
+    rotations : ndarray, shape (..., 16, 3, 3)
+    positions : ndarray, shape (..., 16, 3)
         As from `hmc.body.kinematics.segment_transforms`.
     points : ndarray, shape (n, 3)
         Segment's frame.

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from hmc.body.joints import SEGMENTS
 from hmc.body.limbs import LIMBS
 from hmc.body.model import BodyModel
+from hmc.body.proportions import sole_ends
 
 __all__ = ["HANG_M", "SINK_M", "above_floor", "floor_gap", "lowest_support"]
 
@@ -19,6 +21,11 @@ HANG_M = 0.10
 SINK_M = 0.05
 
 _SHANKS = np.array([LIMBS[leg].segments[1] for leg in ("r_leg", "l_leg")])
+_FEET = np.array([[one.name for one in SEGMENTS].index(f"{side}_foot") for side in "rl"])
+#: Where a sole bears: at the heel and at the ball, of the way from the heel's end to the toes'.
+_BEARING = (0.1, 0.75)
+#: Carriers of the points of `lowest_support`, in their order.
+_BEARERS = np.r_[_FEET, _FEET, _SHANKS]
 
 
 def floor_gap(body: BodyModel, rotations: np.ndarray, positions: np.ndarray, floor_z: float) -> np.ndarray:
@@ -27,8 +34,8 @@ def floor_gap(body: BodyModel, rotations: np.ndarray, positions: np.ndarray, flo
     Parameters
     ----------
     body : BodyModel
-    rotations : ndarray, shape (n, 14, 3, 3)
-    positions : ndarray, shape (n, 14, 3)
+    rotations : ndarray, shape (n, 16, 3, 3)
+    positions : ndarray, shape (n, 16, 3)
         As from `hmc.body.kinematics.segment_transforms`.
     floor_z : float
         Height of the floor, metres.
@@ -48,7 +55,7 @@ def above_floor(height: np.ndarray, floor_z: float) -> np.ndarray:
 
 
 def lowest_support(body: BodyModel, rotations: np.ndarray, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The lowest of both soles and both knees.
+    """The lowest of both knees and of the heels and balls of both soles.
 
     Returns
     -------
@@ -57,12 +64,12 @@ def lowest_support(body: BodyModel, rotations: np.ndarray, positions: np.ndarray
     point : ndarray, shape (n, 3)
         World, metres.
     segment : ndarray of int, shape (n,)
-        The shank that carries it.
+        The foot or shank that carries it.
     """
-    reach = -(body.dimensions["shank"] + body.dimensions["ankle_height"])
-    knees = positions[:, _SHANKS]
-    soles = knees + reach * rotations[..., 2][:, _SHANKS]
-    points = np.concatenate([soles, knees], axis=1)
+    (heel, toe), ankle = sole_ends(body.dimensions), body.dimensions["ankle_height"]
+    turns, ankles = rotations[:, _FEET], positions[:, _FEET]
+    soles = [ankles + (heel + share * (toe - heel)) * turns[..., 0] - ankle * turns[..., 2] for share in _BEARING]
+    points = np.concatenate([*soles, positions[:, _SHANKS]], axis=1)
     lowest = points[..., 2].argmin(axis=1)
     rows = np.arange(len(points))
-    return points[rows, lowest, 2], points[rows, lowest], _SHANKS[lowest % 2]
+    return points[rows, lowest, 2], points[rows, lowest], _BEARERS[lowest]

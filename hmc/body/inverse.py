@@ -42,7 +42,7 @@ class _Misses:
         return self.miss.ravel()
 
     def pulls(self) -> tuple[slice, np.ndarray]:
-        """All residuals, and how they change with the state, shape (3 k, 33)."""
+        """All residuals, and how they change with the state, shape (3 k, 37)."""
         return slice(None), point_motions(self.axes, self.centres, self.places, self.masks).reshape(-1, N_DOF)
 
 
@@ -56,7 +56,7 @@ def fit_landmarks(
     body : BodyModel
     points : ndarray, shape (15, 3)
         World, metres; NaN where a landmark is not known.
-    start : ndarray, shape (33,)
+    start : ndarray, shape (37,)
         Start; angles that the landmarks leave open stay near it.
     iterations : int
         Most steps tried.
@@ -65,7 +65,7 @@ def fit_landmarks(
 
     Returns
     -------
-    state : ndarray, shape (33,)
+    state : ndarray, shape (37,)
     error : float
         Root mean squared distance of the known landmarks, metres.
     """

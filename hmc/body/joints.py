@@ -1,9 +1,9 @@
 """The degrees of freedom of the body and how its rigid segments hang on one another.
 
 The first 27 are those of Canton (2009), section 6.3.4 and Table 6.1: the root (pelvis) has three translations and three rotations; the
-other 21 angles turn about axes of the parent's frame, in the order of the table. Six more, of ours, come after them: the spine bends
-between waist and chest, and each shoulder girdle is raised and brought forward. The papers' bodies hold these at 0. Neutral pose:
-standing, arms stretched sideways along Y; X forward, Y to the person's left, Z up.
+other 21 angles turn about axes of the parent's frame, in the order of the table. Ten more, of ours, come after them: the spine bends
+between waist and chest, each shoulder girdle is raised and brought forward, and each foot is lowered and turned out. The papers' bodies
+hold these at 0. Neutral pose: standing, arms stretched sideways along Y; X forward, Y to the person's left, Z up.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 __all__ = [
-    "DOF_NAMES", "N_CANTON", "N_DOF", "SEGMENTS", "TRUNK_JOINTS", "JointLimits", "Segment", "canton_limits", "default_limits", "dof_index",
-    "mirror_state", "stiff_limits",
+    "ADDED_JOINTS", "DOF_NAMES", "N_CANTON", "N_DOF", "SEGMENTS", "TRUNK_JOINTS", "JointLimits", "Segment", "canton_limits",
+    "default_limits", "dof_index", "mirror_state", "stiff_limits",
 ]  # fmt: skip
 
 
@@ -60,21 +60,25 @@ SEGMENTS: tuple[Segment, ...] = (
     Segment("r_shank", 10, "r_knee", "y"),
     Segment("l_thigh", 0, "l_hip", "xyz"),
     Segment("l_shank", 12, "l_knee", "y"),
+    Segment("r_foot", 11, "r_ankle", "yz"),
+    Segment("l_foot", 13, "l_ankle", "yz"),
 )
 
-#: Joints that Canton's body does not have; their angles come last in a state.
+#: Joints of the trunk that Canton's body does not have ...
 TRUNK_JOINTS: tuple[str, ...] = ("spine", "r_girdle", "l_girdle")
+#: ... and all joints that it does not have; their angles come last in a state.
+ADDED_JOINTS: tuple[str, ...] = (*TRUNK_JOINTS, "r_ankle", "l_ankle")
 
 #: Names of the state's entries, in order: metres for the first three, radians for the others.
 DOF_NAMES: tuple[str, ...] = (
     "root_tx", "root_ty", "root_tz",
-    *(name for one in SEGMENTS if one.joint not in TRUNK_JOINTS for name in one.angles),
-    *(name for one in SEGMENTS if one.joint in TRUNK_JOINTS for name in one.angles),
+    *(name for one in SEGMENTS if one.joint not in ADDED_JOINTS for name in one.angles),
+    *(name for one in SEGMENTS if one.joint in ADDED_JOINTS for name in one.angles),
 )  # fmt: skip
 
 N_DOF = len(DOF_NAMES)
 #: Of them, those of Canton's body, which are the first.
-N_CANTON = sum(not name.startswith(TRUNK_JOINTS) for name in DOF_NAMES)
+N_CANTON = sum(not name.startswith(ADDED_JOINTS) for name in DOF_NAMES)
 
 
 def dof_index(*names: str) -> np.ndarray:
@@ -93,7 +97,7 @@ def dof_index(*names: str) -> np.ndarray:
 
 @dataclass(frozen=True)
 class JointLimits:
-    """Smallest and largest value of every degree of freedom, each of shape (33,); infinite where there is none."""
+    """Smallest and largest value of every degree of freedom, each of shape (37,); infinite where there is none."""
 
     low: np.ndarray
     high: np.ndarray
@@ -119,28 +123,35 @@ _DEFAULT_DEG: dict[str, tuple[float, float]] = _CANTON_DEG | {
     "torso_x": (-40, 40), "torso_y": (-35, 90), "torso_z": (-45, 45),
     "spine_x": (-25, 25), "spine_y": (-20, 45),
     "r_girdle_x": (-35, 12), "r_girdle_z": (-20, 35), "l_girdle_x": (-12, 35), "l_girdle_z": (-35, 20),
+    "r_ankle_y": (-30, 50), "r_ankle_z": (-30, 20), "l_ankle_y": (-30, 50), "l_ankle_z": (-20, 30),
 }  # fmt: skip
 
 
 def _limits(degrees: dict[str, tuple[float, float]]) -> JointLimits:
     free, held = (-np.inf, np.inf), (0, 0)
-    bounds = np.array([degrees.get(name, held if name.startswith(TRUNK_JOINTS) else free) for name in DOF_NAMES])
+    bounds = np.array([degrees.get(name, held if name.startswith(ADDED_JOINTS) else free) for name in DOF_NAMES])
     return JointLimits(np.radians(bounds[:, 0]), np.radians(bounds[:, 1]))
 
 
 def canton_limits() -> JointLimits:
-    """Angular ranges of Canton (2009), Table 6.1; the trunk's own joints are held at 0."""
+    """Angular ranges of Canton (2009), Table 6.1; joints that it does not have are held at 0."""
     return _limits(_CANTON_DEG)
 
 
-def default_limits() -> JointLimits:
-    """Angular ranges for joint centres: elbows and knees may stretch a little past straight, the waist may twist further."""
-    return _limits(_DEFAULT_DEG)
+def default_limits(held: tuple[str, ...] = ()) -> JointLimits:
+    """Angular ranges for joint centres: elbows and knees may stretch a little past straight, the waist may twist further.
+
+    Parameters
+    ----------
+    held : tuple of str
+        Of `ADDED_JOINTS`, those that are held at 0.
+    """
+    return _limits({name: bounds for name, bounds in _DEFAULT_DEG.items() if not name.startswith(held)})
 
 
 def stiff_limits() -> JointLimits:
     """Those of `default_limits`, but for the trunk's own joints, which are held at 0."""
-    return _limits({name: bounds for name, bounds in _DEFAULT_DEG.items() if not name.startswith(TRUNK_JOINTS)})
+    return default_limits(held=TRUNK_JOINTS)
 
 
 def mirror_state(states: np.ndarray) -> np.ndarray:
@@ -148,11 +159,11 @@ def mirror_state(states: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    states : ndarray, shape (..., 33)
+    states : ndarray, shape (..., 37)
 
     Returns
     -------
-    ndarray, shape (..., 33)
+    ndarray, shape (..., 37)
         Mirrored in the body's own XZ plane, save root and waist, which keep their angles.
     """
     states = np.asarray(states, float)

@@ -54,7 +54,7 @@ def place_keypoints(rotations: np.ndarray, positions: np.ndarray, local: np.ndar
 
     Parameters
     ----------
-    rotations, positions : ndarray, shape (..., 14, 3, 3) and (..., 14, 3)
+    rotations, positions : ndarray, shape (..., 16, 3, 3) and (..., 16, 3)
         As from `hmc.body.kinematics.segment_transforms`.
     local : ndarray, shape (15, 3)
         On their segments: `keypoint_places`, or what lies beside them.

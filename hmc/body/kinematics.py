@@ -33,7 +33,7 @@ __all__ = [
 _LANDMARK_SEGMENTS = landmark_segments()
 #: Places in the state of each segment's angles.
 SEGMENT_DOFS: tuple[tuple[int, ...], ...] = tuple(tuple(DOF_NAMES.index(name) for name in one.angles) for one in SEGMENTS)
-#: The segment at whose joint each angle turns, shape (30,).
+#: The segment at whose joint each angle turns, shape (34,).
 _SEGMENT_OF_ANGLE = np.array([next(k for k, dofs in enumerate(SEGMENT_DOFS) if place in dofs) for place in range(3, N_DOF)])
 
 #: Segments by their depth in the tree; within a depth, those that turn about one axis stand side by side.
@@ -42,7 +42,7 @@ _DEPTHS = (
     ("torso", "r_thigh", "l_thigh"),
     ("chest", "r_shank", "l_shank"),
     ("head", "r_clavicle", "l_clavicle"),
-    ("r_upper_arm", "l_upper_arm"),
+    ("r_upper_arm", "l_upper_arm", "r_foot", "l_foot"),
     ("r_forearm", "l_forearm"),
 )
 _UNIT = np.eye(3)
@@ -105,15 +105,15 @@ _SEGMENT_PLACES, _TURN_PLACES = np.argsort(_ORDER), np.argsort(_TURN_DOFS)
 
 
 def _place(body: BodyModel, states: np.ndarray, origin: np.ndarray | float, dtype: DTypeLike, axes: np.ndarray | None = None) -> np.ndarray:
-    """Frames of all segments, shape (14, 3, 4, n): rotation (world from segment) and position, from `origin`, side by side.
+    """Frames of all segments, shape (16, 3, 4, n): rotation (world from segment) and position, from `origin`, side by side.
 
     Parameters
     ----------
     body : BodyModel
-    states : ndarray, shape (n, 33)
+    states : ndarray, shape (n, 37)
     origin : ndarray, shape (3,), or 0
     dtype : data type
-    axes : ndarray, shape (30, 3, n), optional
+    axes : ndarray, shape (34, 3, n), optional
         Where the directions of the angles' axes go, world, in the order of the turns.
     """
     angles = states.T.take(_TURN_DOFS, axis=0).astype(dtype, copy=False)
@@ -147,14 +147,14 @@ def place_segments(body: BodyModel, states: np.ndarray, origin: np.ndarray) -> n
     Parameters
     ----------
     body : BodyModel
-    states : ndarray, shape (n, 33)
+    states : ndarray, shape (n, 37)
         Metres and radians.
     origin : ndarray, shape (3,)
         Somewhere near, world, metres: positions are counted from here, as single precision is coarse far from its zero.
 
     Returns
     -------
-    ndarray of float32, shape (14, 3, 4, n)
+    ndarray of float32, shape (16, 3, 4, n)
         Rotation (world from segment) and position side by side.
     """
     return _place(body, np.asarray(states, float), origin, np.float32)
@@ -166,14 +166,14 @@ def segment_transforms(body: BodyModel, states: np.ndarray) -> tuple[np.ndarray,
     Parameters
     ----------
     body : BodyModel
-    states : ndarray, shape (..., 33)
+    states : ndarray, shape (..., 37)
         Metres and radians, in the order of `hmc.body.joints.DOF_NAMES`.
 
     Returns
     -------
-    rotations : ndarray, shape (..., 14, 3, 3)
+    rotations : ndarray, shape (..., 16, 3, 3)
         World from segment.
-    positions : ndarray, shape (..., 14, 3)
+    positions : ndarray, shape (..., 16, 3)
         The segments' joints in the world, metres.
     """
     states = np.asarray(states, float)
@@ -187,7 +187,7 @@ def landmarks(body: BodyModel, states: np.ndarray) -> np.ndarray:
     Parameters
     ----------
     body : BodyModel
-    states : ndarray, shape (..., 33)
+    states : ndarray, shape (..., 37)
 
     Returns
     -------
@@ -207,13 +207,13 @@ def joint_twists(body: BodyModel, state: np.ndarray) -> tuple[np.ndarray, np.nda
     Parameters
     ----------
     body : BodyModel
-    state : ndarray, shape (33,)
+    state : ndarray, shape (37,)
 
     Returns
     -------
-    axes : ndarray, shape (33, 3)
+    axes : ndarray, shape (37, 3)
         Unit axes; for the three translations the direction of motion.
-    centres : ndarray, shape (33, 3)
+    centres : ndarray, shape (37, 3)
         A point of each axis, metres.
     rotations, positions : ndarray
         As from `segment_transforms`, for this one state.
@@ -230,15 +230,15 @@ def joint_twists(body: BodyModel, state: np.ndarray) -> tuple[np.ndarray, np.nda
 
 
 def point_motions(axes: np.ndarray, centres: np.ndarray, places: np.ndarray, masks: np.ndarray) -> np.ndarray:
-    """How points of segments move with the degrees of freedom, shape (k, 3, 33): axis x (p - centre). Canton (2009), Eq. A.1.
+    """How points of segments move with the degrees of freedom, shape (k, 3, 37): axis x (p - centre). Canton (2009), Eq. A.1.
 
     Parameters
     ----------
-    axes, centres : ndarray, shape (33, 3)
+    axes, centres : ndarray, shape (37, 3)
         As from `joint_twists`.
     places : ndarray, shape (k, 3)
         Of the points, world, metres.
-    masks : ndarray of float, shape (k, 33)
+    masks : ndarray of float, shape (k, 37)
         Which degrees of freedom move each, 1 or 0.
     """
     # Coordinate by coordinate: `numpy.cross` takes several times as long.
@@ -250,7 +250,7 @@ def point_motions(axes: np.ndarray, centres: np.ndarray, places: np.ndarray, mas
 
 
 def dof_masks() -> np.ndarray:
-    """Which degrees of freedom move which segments, shape (14, 33), bool."""
+    """Which degrees of freedom move which segments, shape (16, 37), bool."""
     masks = np.zeros((len(SEGMENTS), N_DOF), bool)
     masks[:, :3] = True
     for index, segment in enumerate(SEGMENTS):
@@ -261,7 +261,7 @@ def dof_masks() -> np.ndarray:
 
 
 def landmark_masks(body: BodyModel) -> np.ndarray:
-    """Which degrees of freedom move which landmarks, shape (15, 33), bool: a knee is not moved by its own angle."""
+    """Which degrees of freedom move which landmarks, shape (15, 37), bool: a knee is not moved by its own angle."""
     masks, at_joint = dof_masks(), np.linalg.norm(body.tips, axis=1) < 1e-9
     carriers = [
         SEGMENTS[k].parent if still and SEGMENTS[k].parent >= 0 else k for k, still in zip(_LANDMARK_SEGMENTS, at_joint, strict=True)

@@ -23,6 +23,8 @@ class Limb:
     name : str
     dofs : ndarray of int, shape (4,)
         Places in a state: the ball joint's x, y and z, and the hinge's angle.
+    end_dofs : ndarray of int, shape (0,) or (2,)
+        Those of the joint at its end: a leg's ankle.
     segments, parts : ndarray of int, shape (2,)
         Upper and lower link in `hmc.body.joints.SEGMENTS` and in `hmc.body.model.PARTS`.
     landmarks : ndarray of int, shape (2,)
@@ -31,6 +33,7 @@ class Limb:
 
     name: str
     dofs: np.ndarray
+    end_dofs: np.ndarray
     segments: np.ndarray
     parts: np.ndarray
     landmarks: np.ndarray
@@ -53,6 +56,7 @@ def _limb(side: str, kind: str, joints: tuple[str, str], links: tuple[str, str],
     return Limb(
         f"{side}_{kind}",
         np.array([k for k, name in enumerate(DOF_NAMES) if name.startswith((ball, hinge))]),
+        np.array([k for k, name in enumerate(DOF_NAMES) if name.startswith(f"{side}_{landmarks[1]}")], int),
         np.array([segment_names.index(name) for name in names]),
         np.array([PARTS.index(name) for name in names]),
         np.array([landmark_index(f"{side}_{name}") for name in landmarks]),
@@ -81,5 +85,5 @@ def _chain_of_part() -> np.ndarray:
 
 #: The kinematic chain of each part, shape (10,): 0 the trunk with the head, then the limbs in the table's order.
 CHAIN_OF_PART = _chain_of_part()
-#: The same of each degree of freedom, shape (33,).
+#: The same of each degree of freedom, shape (37,).
 CHAIN_OF_DOF = CHAIN_OF_PART[PART_OF_DOF]

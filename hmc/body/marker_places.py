@@ -46,7 +46,7 @@ def place_tips(body: BodyModel, states: np.ndarray) -> np.ndarray:
     Parameters
     ----------
     body : BodyModel
-    states : ndarray, shape (n, 33)
+    states : ndarray, shape (n, 37)
 
     Returns
     -------
@@ -72,7 +72,7 @@ def fit_tips(body: BodyModel, markers: BodyModel, states: np.ndarray, points: np
         With its landmarks as tips.
     markers : BodyModel
         The same body with markers.
-    states : ndarray, shape (n, 33)
+    states : ndarray, shape (n, 37)
     points : ndarray, shape (n, 15, 3)
         Where the markers were seen, world, metres; NaN where not.
 

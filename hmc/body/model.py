@@ -18,9 +18,9 @@ PARTS: tuple[str, ...] = (
     "r_upper_arm", "r_forearm", "l_upper_arm", "l_forearm",
     "r_thigh", "r_shank", "l_thigh", "l_shank",
 )  # fmt: skip
-#: The part that each segment carries, shape (n_segments,); pelvis, chest and clavicles are of the torso.
-PART_OF_SEGMENT = np.array([PARTS.index(segment.name) if segment.name in PARTS else 0 for segment in SEGMENTS])
-#: The part that each degree of freedom moves first, shape (33,).
+#: The part that each segment carries, shape (n_segments,): feet are of the shanks, pelvis, chest and clavicles of the torso.
+PART_OF_SEGMENT = np.array([PARTS.index(name) if name in PARTS else 0 for name in (one.name.replace("foot", "shank") for one in SEGMENTS)])
+#: The part that each degree of freedom moves first, shape (37,).
 PART_OF_DOF = np.array([PART_OF_SEGMENT[[name.startswith(one.joint) for one in SEGMENTS].index(True)] for name in DOF_NAMES])
 
 
@@ -75,7 +75,7 @@ class BodyModel:
     ----------
     height_m : float
         Stature.
-    offsets : ndarray, shape (14, 3)
+    offsets : ndarray, shape (16, 3)
         Each segment's joint in its parent's frame (row 0, the root, is zero).
     tips : ndarray, shape (15, 3)
         Each landmark in the frame of `landmark_segments`.
@@ -105,7 +105,7 @@ def neutral_state(arms: str = "down", limits: JointLimits | None = None) -> np.n
 
     Returns
     -------
-    ndarray, shape (33,)
+    ndarray, shape (37,)
     """
     if arms not in ("sideways", "down"):
         raise ValueError(f"`arms` must be 'sideways' or 'down'; got {arms!r}")

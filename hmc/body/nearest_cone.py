@@ -160,7 +160,7 @@ def part_distances(body: BodyModel, state: np.ndarray, points: np.ndarray) -> np
     Parameters
     ----------
     body : BodyModel
-    state : ndarray, shape (33,)
+    state : ndarray, shape (37,)
     points : ndarray, shape (k, 3) or (k, 6)
         World, metres (`hmc.pose.views.rays`).
 

@@ -77,8 +77,8 @@ def penetration_depth(body: BodyModel, axes: AxisPoints, rotations: np.ndarray, 
     ----------
     body : BodyModel
     axes : AxisPoints
-    rotations : ndarray, shape (n, 14, 3, 3)
-    positions : ndarray, shape (n, 14, 3)
+    rotations : ndarray, shape (n, 16, 3, 3)
+    positions : ndarray, shape (n, 16, 3)
         As from `hmc.body.kinematics.segment_transforms`.
 
     Returns
@@ -97,7 +97,7 @@ def depths_placed(body: BodyModel, axes: AxisPoints, placed: np.ndarray, maps: C
     ----------
     body : BodyModel
     axes : AxisPoints
-    placed : ndarray, shape (14, 3, 4, n)
+    placed : ndarray, shape (16, 3, 4, n)
         As from `hmc.body.kinematics.place_segments`.
     maps : ConeMaps
         Of the same.
@@ -142,8 +142,8 @@ def penetration_rows(
     ----------
     body : BodyModel
     axes : AxisPoints
-    rotations : ndarray, shape (14, 3, 3)
-    positions : ndarray, shape (14, 3)
+    rotations : ndarray, shape (16, 3, 3)
+    positions : ndarray, shape (16, 3)
     maps : ConeMaps
         Of the one state.
 

@@ -13,7 +13,7 @@ __all__ = ["POSTURE", "posture_spread"]
 _SPREAD_DEG = {
     "torso_x": 25, "torso_y": 45, "torso_z": 25, "spine_x": 10, "spine_y": 15, "girdle_x": 10, "girdle_z": 12, "neck_x": 25, "neck_y": 30,
     "shoulder_x": 90, "shoulder_y": 40, "shoulder_z": 70, "elbow_z": 90,
-    "hip_x": 30, "hip_y": 70, "hip_z": 25, "knee_y": 90,
+    "hip_x": 30, "hip_y": 70, "hip_z": 25, "knee_y": 90, "ankle_y": 30, "ankle_z": 10,
 }  # fmt: skip
 
 
@@ -22,7 +22,7 @@ def _posture() -> tuple[np.ndarray, np.ndarray]:
     return np.radians([RELAXED_DEG.get(name, 0.0) for name in DOF_NAMES]), np.radians(spread)
 
 
-#: Rest and spread of every angle, radians, each of shape (33,); the root's are free (spread infinite).
+#: Rest and spread of every angle, radians, each of shape (37,); the root's are free (spread infinite).
 POSTURE = _posture()
 #: Legs open widely and cross little: which way each angle crosses them, and the spread that way, radians. Hulls confuse crossed legs with
 #: legs side by side where furniture hides the thighs.
@@ -31,10 +31,10 @@ _INWARD_SPREAD = np.radians(8)
 
 
 def posture_spread(states: np.ndarray) -> np.ndarray:
-    """How far each angle commonly goes to the side of rest on which it is, radians, shape (..., 33): `POSTURE`, less for crossed legs.
+    """How far each angle commonly goes to the side of rest on which it is, radians, shape (..., 37): `POSTURE`, less for crossed legs.
 
     Parameters
     ----------
-    states : ndarray, shape (..., 33)
+    states : ndarray, shape (..., 37)
     """
     return np.where(states * _INWARD > 0, _INWARD_SPREAD, POSTURE[1])

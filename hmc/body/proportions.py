@@ -18,7 +18,7 @@ from hmc.landmarks import LANDMARKS
 
 __all__ = [
     "CANTON_LENGTHS", "DEFAULT_LENGTHS", "GIRTHS", "SOLE", "canton_body", "default_body", "landmark_segments", "make_bodies", "make_body",
-    "stature", "stiff_body",
+    "sole_ends", "stature", "stiff_body",
 ]  # fmt: skip
 
 #: Joint-centre lengths over stature. Trunk: hip centres' middle to the base of the neck. Sources: Winter (2009), figure 4.1
@@ -49,10 +49,14 @@ CANTON_LENGTHS: dict[str, float] = DEFAULT_LENGTHS | {
     "ankle_height": 0.0, "foot": 0.0, "chest_forward": 0.0, "head_forward": 0.0, **dict.fromkeys(_ONCE_UNKNOWN, 0.0),
 }  # fmt: skip
 
-#: The foot's axis at the heel, over the floor and over stature. Soles are round and cameras stand higher: the lowest 2 cm of feet are
+#: Where the foot's flesh begins, over the floor and over stature. Soles are round and cameras stand higher: the lowest 2 cm of feet are
 #: hardly in any hull, and a flesh that reached to the floor would lift the whole body out of it (`python -m hmc.experiments run
-#: body-bias`).
+#: body-bias`). For the same reason the flesh that fits hulls best points down from a flat sole, by 8 degrees.
 SOLE = 0.036
+
+#: The sole's ends, from below the ankle forward: the heel's over stature, and the sole's length over that of `DEFAULT_LENGTHS`, which is
+#: the foot's from the ankle on.
+HEEL, SOLE_LENGTH = -0.032, 1.35
 
 #: What hulls do not show of a hand, over stature.
 FINGER_TIPS = 0.006
@@ -120,6 +124,7 @@ def make_body(dimensions: dict[str, float], limits: JointLimits | None = None, s
         put(f"{side}_forearm", (0, sign * d["upper_arm"], 0))
         put(f"{side}_thigh", (0, sign * d["hip_half_width"], 0))
         put(f"{side}_shank", (0, 0, -d["thigh"]))
+        put(f"{side}_foot", (0, 0, -d["shank"]))
         tips[LANDMARKS.index(f"{side}_wrist")] = (0, sign * d["forearm"], 0)
         tips[LANDMARKS.index(f"{side}_ankle")] = (0, 0, -d["shank"])
     tips[LANDMARKS.index("head_top")] = (d["head_forward"], 0, d["head"])
@@ -179,6 +184,12 @@ def stature(dimensions: Mapping[str, float]) -> float:
     # Canton's lengths, which have no ankle, are of that table; he let them sum to the height.
     table = DEFAULT_LENGTHS if dimensions["ankle_height"] > 0 else CANTON_LENGTHS
     return float(sum(dimensions[name] for name in upright) / sum(table[name] for name in upright))
+
+
+def sole_ends(dimensions: Mapping[str, float]) -> tuple[float, float]:
+    """How far the sole reaches from below the ankle, to the heel's end (negative) and to the toes', metres; parameters as of `stature`."""
+    heel = HEEL * dimensions["height"]
+    return heel, heel + SOLE_LENGTH * dimensions["foot"]
 
 
 def _scaled(height_m: float, lengths: dict[str, float]) -> dict[str, float]:
@@ -241,7 +252,8 @@ def _flesh(d: dict[str, float], sole: float) -> Cones:
         cone(f"{side}_shank", ((0, 0, 0), calf), ((0.030, 0.032), (0.031, 0.033)), y, shanks)
         cone(f"{side}_shank", (calf, (0, ankle_y, -shank - 0.3 * ankle)), ((0.031, 0.033), (0.020, 0.021)), y, shanks)
         if foot > 0:
-            low = -shank - ankle + sole * h
-            heel, toe = (-0.032 * h, ankle_y, low), (-0.032 * h + 1.35 * foot, ankle_y, low - 0.012 * h)
-            cone(f"{side}_shank", (heel, toe), ((0.020, 0.024), (0.028, 0.012)), y, (1.0, 1.0))
+            low = -ankle + sole * h
+            heel, toe = sole_ends(d)
+            ends = (heel, ankle_y, low + 0.0045 * h), (toe, ankle_y, low - 0.027 * h)
+            cone(f"{side}_foot", ends, ((0.020, 0.024), (0.028, 0.012)), y, (1.0, 1.0))
     return Cones(*(np.array(column) for column in zip(*rows, strict=True)))

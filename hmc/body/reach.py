@@ -38,7 +38,7 @@ def reach(body: BodyModel, state: np.ndarray, limb: str, points: np.ndarray, swi
     Parameters
     ----------
     body : BodyModel
-    state : ndarray, shape (33,)
+    state : ndarray, shape (37,)
     limb : {"r_arm", "l_arm", "r_leg", "l_leg"}
     points : ndarray, shape (n, 3)
         World, metres. A limb stretches towards a point that is too far.

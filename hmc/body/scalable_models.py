@@ -60,6 +60,11 @@ class Model:
         """Places of the angles in a state, shape (k,), rising."""
         return np.sort(dof_index(*self.angles))
 
+    @cached_property
+    def placing(self) -> np.ndarray:
+        """Of `dofs`, those that say where the links are: ankles turn what a shank carries and not the shank."""
+        return np.sort(dof_index(*(name for name in self.angles if "ankle" not in name)))
+
 
 @dataclass(frozen=True)
 class Inclusive:
@@ -107,7 +112,7 @@ class Inclusive:
 
     @cached_property
     def group(self) -> np.ndarray:
-        """The first model (from 0) that has each degree of freedom, shape (33,); the number of models where none has it."""
+        """The first model (from 0) that has each degree of freedom, shape (37,); the number of models where none has it."""
         group = np.full(len(DOF_NAMES), len(self.models))
         for level in range(len(self.models) - 1, -1, -1):
             group[self.models[level].dofs] = level
@@ -249,7 +254,7 @@ def _united(name: str, members: Sequence[Model]) -> Model:
 _ROOT = ("root_tx", "root_ty", "root_tz", "root_rz", "root_ry", "root_rx")
 _WAIST = ("torso_x", "torso_y", "torso_z", "spine_x", "spine_y")
 _GIRDLES = tuple(name for name in DOF_NAMES if "girdle" in name)
-_TRUNK = (*_WAIST, *_GIRDLES)
+_ADDED = (*_WAIST, *_GIRDLES, *(name for name in DOF_NAMES if "ankle" in name))
 _SECOND = (
     "neck_x", "neck_y", "r_shoulder_x", "r_shoulder_z", "l_shoulder_x", "l_shoulder_z", "r_hip_x", "r_hip_y", "l_hip_x", "l_hip_y",
 )  # fmt: skip
@@ -268,7 +273,7 @@ def _shbm(name: str, first_parts: tuple[str, ...]) -> Inclusive:
         (
             Model("trunk", _ROOT, first_parts),
             Model("limbs", (*_ROOT, *_SECOND), first_parts),
-            Model("body", (*_ROOT, *_SECOND, *_THIRD, *_TRUNK), PARTS),
+            Model("body", (*_ROOT, *_SECOND, *_THIRD, *_ADDED), PARTS),
         ),
         thinning=2,
     )
@@ -284,7 +289,7 @@ def _printed(name: str, second_parts: tuple[str, ...]) -> Inclusive:
         (
             Model("torso", _ROOT, ("torso",)),
             Model("limbs", (*_ROOT, *_SECOND), second_parts),
-            Model("body", (*_ROOT, *_SECOND, *_THIRD, *_TRUNK), PARTS),
+            Model("body", (*_ROOT, *_SECOND, *_THIRD, *_ADDED), PARTS),
         ),
         held="rest",
     )
@@ -311,6 +316,8 @@ def _unitive(name: str, with_forearms: bool) -> Unitive:
         members = [Model(f"{side}_{part}", _angles(side, joint), (f"{side}_{part}",)) for part, joint in (upper, lower)]
         if pieces and name == "arm":
             members[0] = replace(members[0], angles=(*members[0].angles, *_angles(side, "girdle")))
+        if name == "leg":
+            members[1] = replace(members[1], angles=(*members[1].angles, *_angles(side, "ankle")))
         whole = _united(f"{side}_{name}", members)
         if not pieces:
             leaves.append(whole)

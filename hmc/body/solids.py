@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from hmc.body.joints import DOF_NAMES, SEGMENTS, TRUNK_JOINTS, dof_index
+from hmc.body.joints import ADDED_JOINTS, DOF_NAMES, SEGMENTS, dof_index
 from hmc.body.limbs import CHAIN_OF_PART, LIMBS
 from hmc.body.model import PART_OF_SEGMENT, BodyModel
 from hmc.body.superellipsoids import Superellipsoids
@@ -19,7 +19,7 @@ from hmc.body.superellipsoids import Superellipsoids
 __all__ = ["CHAINS", "FREE", "FREE_NAMES", "GROUPS", "SolidBody", "solid_body", "to_world"]
 
 #: The 24 degrees of freedom, as places in a state.
-FREE: np.ndarray = np.array([k for k, name in enumerate(DOF_NAMES) if not name.startswith(("torso", *TRUNK_JOINTS))])
+FREE: np.ndarray = np.array([k for k, name in enumerate(DOF_NAMES) if not name.startswith(("torso", *ADDED_JOINTS))])
 FREE_NAMES: tuple[str, ...] = tuple(DOF_NAMES[k] for k in FREE)
 #: What samples are shared out among: the trunk and the five chains that hang on it.
 GROUPS: tuple[str, ...] = ("trunk", "head", *LIMBS)
@@ -76,7 +76,7 @@ def to_world(body: SolidBody, rotations: np.ndarray, positions: np.ndarray) -> t
     Parameters
     ----------
     body : SolidBody
-    rotations, positions : ndarray, shapes (14, 3, 3) and (14, 3)
+    rotations, positions : ndarray, shapes (16, 3, 3) and (16, 3)
         Of the segments, from `hmc.body.kinematics.joint_twists`.
 
     Returns
@@ -99,8 +99,8 @@ def solid_body(skeleton: BodyModel) -> SolidBody:
     """The solids around a skeleton, as thick as its girths say.
 
     A limb is a truncated superellipsoid that tapers from its joint to the next, with a spherical cap at its joint. Hands are part of the
-    forearms. Trunk and head are two superellipsoids of different length each. The paper leaves feet out; here they are solids that the
-    shanks carry, for the hull has them.
+    forearms. Trunk and head are two superellipsoids of different length each. The paper leaves feet out; here they are solids, for the
+    hull has them.
 
     Parameters
     ----------
@@ -139,8 +139,8 @@ def solid_body(skeleton: BodyModel) -> SolidBody:
         ):
             solid(f"{side}_{name}", f"{side}_{name}", frame, (radius, radius), (radius, length), eps1)
         if d["foot"] > 0:
-            sole = (0, 0, -d["shank"] - d["ankle_height"] + 0.022 * h)
-            solid(f"{side}_foot", f"{side}_shank", (sole, ahead), (0.021 * h, 0.027 * h), (0.032 * h, 1.05 * d["foot"]), (0.9, 0.7))
+            sole = (0, 0, -d["ankle_height"] + 0.022 * h)
+            solid(f"{side}_foot", f"{side}_foot", (sole, ahead), (0.021 * h, 0.027 * h), (0.032 * h, 1.05 * d["foot"]), (0.9, 0.7))
     names, segment, group, edges, origin, axes, across, along, eps1, eps2 = zip(*rows, strict=True)
     solids = Superellipsoids(np.array(across, float), np.array(along, float), np.array(eps1, float), np.array(eps2, float))
     return SolidBody(

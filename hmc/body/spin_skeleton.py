@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hmc.body.joints import DOF_NAMES, N_DOF, TRUNK_JOINTS, JointLimits, dof_index
+from hmc.body.joints import ADDED_JOINTS, DOF_NAMES, N_DOF, JointLimits, dof_index
 from hmc.body.joints import default_limits as body_limits
 from hmc.body.model import BodyModel
 from hmc.body.proportions import default_body, make_body
@@ -136,7 +136,7 @@ def thesis_body(height_m: float) -> BodyModel:
     low, high = np.full(N_DOF, -np.inf), np.full(N_DOF, np.inf)
     places = dof_index(*ANGLES)
     low[places], high[places] = thesis_limits()
-    lacking = [k for k, name in enumerate(DOF_NAMES) if name.startswith(("torso", "r_hip_z", "l_hip_z", *TRUNK_JOINTS))]
+    lacking = [k for k, name in enumerate(DOF_NAMES) if name.startswith(("torso", "r_hip_z", "l_hip_z", *ADDED_JOINTS))]
     low[lacking] = high[lacking] = 0.0
     straight = {"shoulder_drop": 0.0, "chest_forward": 0.0, "head_forward": 0.0, "lumbar": 0.0, "collar": 0.0}
     return make_body(default_body(height_m).dimensions | straight, JointLimits(low, high))
@@ -178,7 +178,7 @@ def skeleton_state(model: SkeletonModel, points: np.ndarray, state: np.ndarray) 
     model : SkeletonModel
     points : ndarray, shape (15, 3)
         The body's landmarks, world, metres.
-    state : ndarray, shape (33,)
+    state : ndarray, shape (37,)
         The body's angles; a bent waist is taken into the torso's axis and spin, and arms and legs keep their angles.
 
     Returns

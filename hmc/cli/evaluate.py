@@ -119,6 +119,10 @@ def run(args: argparse.Namespace) -> int:
         write_rows(args.directory / "metrics.csv", poses.rows)
         report["pose"] = poses.summary
         notes += poses.notes
+        feet = _feet(args, poses.persons)
+        if feet:
+            print(f"ends of the soles: heels {feet['heels_mm']:.1f} mm, toes {feet['toes_mm']:.1f} mm from the true ones, mean")
+            report["feet"] = feet
         if args.angles:
             groups = {str(person.person): (person.estimate, person.truth) for person in poses.persons}
             angles = angle_rows("person", groups, poses.thresholds_m[0])
@@ -153,6 +157,18 @@ def run(args: argparse.Namespace) -> int:
     report["notes"] = notes
     write_toml(args.directory / "metrics.toml", {"truth": str(args.truth or args.recording), "start": start, "frames": frames, **report})
     return 0
+
+
+def _feet(args: argparse.Namespace, persons) -> dict[str, float]:
+    """Errors of the ends of the soles, where both the result and the recording have them."""
+    from hmc.io.results import read_joints
+    from hmc.landmarks import FOOT_POINTS
+    from hmc.metrics.scores.feet import feet_errors
+
+    files = (args.directory / "feet.csv", Path(args.recording or "") / "truth" / "feet.csv")
+    if args.recording is None or args.truth is not None or not all(file.is_file() for file in files):
+        return {}
+    return feet_errors(*(read_joints(file, FOOT_POINTS) for file in files), persons)
 
 
 def _in_images(args: argparse.Namespace, estimated, true_poses, truth_images: Path | None, selected):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -133,7 +132,7 @@ def run(args: argparse.Namespace) -> int:
     from hmc.errors import InputError
     from hmc.io.files import to_toml
     from hmc.io.fits import write_fits
-    from hmc.io.results import write_joints, write_pose, write_run, write_tracks
+    from hmc.io.results import write_run, write_tracks
     from hmc.pose.backward import backward
     from hmc.pose.clear_views import with_clear_views
     from hmc.pose.follow import FollowOptions, follow, for_method
@@ -236,8 +235,7 @@ def run(args: argparse.Namespace) -> int:
     if hulls:
         leave_silhouettes(args, recording, key, problems.append)
     write_tracks(paths["tracks.csv"], _pelvis_tracks(people) if tracks is None else tracks)
-    write_joints(paths["joints.csv"], people.poses)
-    write_pose(paths["pose.npz"], replace(people.states, costs=people.costs))
+    people.save(args.out)
     if any(people.details):
         write_fits(args.out / "fits.csv", people.frames.tolist(), people.persons.tolist(), people.status, people.details)
     write_run(paths["run.toml"], name, parameters, args.seed, **source, options=told_options(args), problems=gather_problems(problems))

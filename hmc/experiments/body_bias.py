@@ -13,6 +13,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from hmc.body.inverse import fit_landmarks
+from hmc.body.joints import default_limits
 from hmc.body.kinematics import landmarks
 from hmc.body.model import BodyModel
 from hmc.body.proportions import DEFAULT_LENGTHS, SOLE, default_body, make_body, stature
@@ -34,22 +35,23 @@ from hmc.pose.views.person_view import views_of
 from hmc.tracking.resumable import person_grid
 from hmc.voxels.hulls import stream_hulls
 
-__all__ = ["AS_IT_IS", "EXPERIMENT", "MIDDLE", "NEITHER", "STIFF", "VARIANTS"]
+__all__ = ["AS_IT_IS", "EXPERIMENT", "FLAT", "MIDDLE", "NEITHER", "STIFF", "VARIANTS"]
 
 CLIPS = ("crossing", "close_white", "jog", "pale", "dance", "close_queue", "throw_catch", "gesture")
 QUICK_CLIPS, QUICK_FRAMES = 3, 61
 #: The sole's axis at which the flesh of feet ends at the floor, over stature.
 FLOOR_SOLE = 0.024
-AS_IT_IS, NEITHER, MIDDLE, STIFF = "as it is", "neither", "joints in the middle", "a stiff trunk"
+AS_IT_IS, NEITHER, MIDDLE, STIFF, FLAT = "as it is", "neither", "joints in the middle", "a stiff trunk", "stiff ankles"
 _HAIR, _MIDDLE = ("hair",), tuple(name for name in DEFAULT_LENGTHS if "_flesh_" in name)
-#: Which of the body's lengths are 0, and where the soles of its flesh are.
-VARIANTS: dict[str, tuple[tuple[str, ...], float]] = {
-    AS_IT_IS: ((), SOLE),
-    "no hair": (_HAIR, SOLE),
-    "feet to the floor": ((), FLOOR_SOLE),
-    NEITHER: (_HAIR, FLOOR_SOLE),
-    MIDDLE: (_MIDDLE, SOLE),
-    STIFF: (("lumbar", "collar"), SOLE),
+#: Which of the body's lengths are 0, where the soles of its flesh are, and which joints are held.
+VARIANTS: dict[str, tuple[tuple[str, ...], float, tuple[str, ...]]] = {
+    AS_IT_IS: ((), SOLE, ()),
+    "no hair": (_HAIR, SOLE, ()),
+    "feet to the floor": ((), FLOOR_SOLE, ()),
+    NEITHER: (_HAIR, FLOOR_SOLE, ()),
+    MIDDLE: (_MIDDLE, SOLE, ()),
+    STIFF: (("lumbar", "collar"), SOLE, ()),
+    FLAT: ((), SOLE, ("r_ankle", "l_ankle")),
 }
 #: A pose that our joints cannot take tells of them and not of the flesh: one that starts farther off is left out, metres.
 MOST_START_M = 0.06
@@ -109,7 +111,7 @@ def _true_masks(recording: Recording, frames: int) -> Iterator[MaskStep]:
             yield MaskStep(frame, nothing, masks, nothing)
 
 
-def _body(points: np.ndarray, without: tuple[str, ...], sole: float) -> BodyModel:
+def _body(points: np.ndarray, without: tuple[str, ...], sole: float, held: tuple[str, ...]) -> BodyModel:
     """The body of the joint lengths that a person's landmarks (n, 15, 3) have; what they do not tell is as usual for the stature."""
 
     def apart(*pairs: tuple[str, str]) -> float:
@@ -132,7 +134,7 @@ def _body(points: np.ndarray, without: tuple[str, ...], sole: float) -> BodyMode
         "shank": both("knee", "ankle"),
     }
     dimensions = default_body(stature(DEFAULT_LENGTHS | lengths)).dimensions | lengths
-    return make_body(dimensions | dict.fromkeys(without, 0.0), sole=sole)
+    return make_body(dimensions | dict.fromkeys(without, 0.0), default_limits(held), sole)
 
 
 def report(cells: Sequence[Cell], plan: Plan) -> Report:
@@ -179,6 +181,7 @@ def _claims(labels: Sequence[str], means: dict[str, np.ndarray], up: np.ndarray)
         _nearer("hair and soles together bring", labels, means, NEITHER),
         _nearer("joints beside the middle of their flesh bring", labels, means, MIDDLE),
         _nearer("a spine that bends and shoulder girdles bring", labels, means, STIFF),
+        _nearer("ankles that bend bring", labels, means, FLAT),
         Claim(
             f"with hair and soles bodies are lifted or lowered by less than {MOST_UP_MM:g} mm on each recording",
             bool(abs(up[worst]) < MOST_UP_MM),

@@ -55,7 +55,7 @@ def measured_truth(recording: Recording, label: str) -> PoseTable:
 
 
 def action_drift(recording: Recording, label: str) -> np.ndarray:
-    """P0 of a recording's action, shape (33,), metres and radians: as `largest_variation` of its exploratory part. As `measured_truth`."""
+    """P0 of a recording's action, shape (37,), metres and radians: as `largest_variation` of its exploratory part. As `measured_truth`."""
     action = action_of(label)
     if action:
         return _third_person(action, recording.fps)
@@ -74,7 +74,7 @@ def largest_variation(body: BodyModel, positions: np.ndarray) -> np.ndarray:
 
     Returns
     -------
-    ndarray, shape (33,)
+    ndarray, shape (37,)
         Metres and radians.
     """
     if len(positions) < 2:

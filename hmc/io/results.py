@@ -48,6 +48,8 @@ class PoseTable:
         World, metres, in the order of `hmc.landmarks.LANDMARKS`; NaN where a landmark is missing.
     views : ndarray, shape (n, 15), optional
         Cameras that show each landmark clear of all else (`hmc.pose.clear_views`); NaN where it is not known.
+    names : tuple of str
+        Other points than the fifteen landmarks, as `hmc.landmarks.FOOT_POINTS`.
 
     Raises
     ------
@@ -59,14 +61,16 @@ class PoseTable:
     persons: np.ndarray
     positions: np.ndarray
     views: np.ndarray | None = None
+    names: tuple[str, ...] = LANDMARKS
 
     def __post_init__(self) -> None:
-        _set_rows(self, positions=(len(LANDMARKS), 3), **({} if self.views is None else {"views": (len(LANDMARKS),)}))
+        n = len(self.names)
+        _set_rows(self, positions=(n, 3), **({} if self.views is None else {"views": (n,)}))
 
     def where(self, chosen: np.ndarray) -> PoseTable:
         """The chosen rows: a mask, shape (n,), or row numbers."""
         views = None if self.views is None else self.views[chosen]
-        return PoseTable(self.frames[chosen], self.persons[chosen], self.positions[chosen], views)
+        return PoseTable(self.frames[chosen], self.persons[chosen], self.positions[chosen], views, self.names)
 
     def of(self, person: int) -> PoseTable:
         """The rows of one person."""
@@ -167,10 +171,16 @@ def _set_rows(table: Any, **tails: tuple[int, ...]) -> None:
         object.__setattr__(table, name, values)
 
 
-def read_joints(path: str | Path) -> PoseTable:
+def read_joints(path: str | Path, names: Sequence[str] = LANDMARKS) -> PoseTable:
     """Read a table `frame, person, joint, x, y, z`; `views` too where there is such a column.
 
     A landmark without a row, or with an empty or `nan` coordinate, is missing (NaN). Columns beyond these are ignored.
+
+    Parameters
+    ----------
+    path : path
+    names : sequence of str
+        Of the points in it.
 
     Returns
     -------
@@ -185,22 +195,22 @@ def read_joints(path: str | Path) -> PoseTable:
     path = Path(path)
     columns, lines = read_columns(path, JOINT_COLUMNS)
     frames, persons = (integer_column(path, name, columns[name], lines) for name in ("frame", "person"))
-    places = {name: place for place, name in enumerate(LANDMARKS)}
+    places = {name: place for place, name in enumerate(names)}
     joints = np.array([places.get(name.strip(), -1) for name in columns["joint"]], int)
     if (joints < 0).any():
         row = int(np.argmax(joints < 0))
-        raise InputError(f"{path}, line {lines[row]}: no landmark named {columns['joint'][row]!r}; they are {', '.join(LANDMARKS)}")
+        raise InputError(f"{path}, line {lines[row]}: no landmark named {columns['joint'][row]!r}; they are {', '.join(names)}")
     xyz = _points(path, ("x", "y", "z"), columns, lines)
     keys, rows = np.unique(np.stack([frames, persons], axis=1), axis=0, return_inverse=True)
-    cells = rows.ravel() * len(LANDMARKS) + joints
+    cells = rows.ravel() * len(names) + joints
     _refuse_twice(path, cells, lines, "this frame, person and joint")
-    positions = np.full((len(keys) * len(LANDMARKS), 3), np.nan)
+    positions = np.full((len(keys) * len(names), 3), np.nan)
     positions[cells] = xyz
     views = None
     if VIEWS_COLUMN in columns:
-        views = np.full((len(keys), len(LANDMARKS)), np.nan)
+        views = np.full((len(keys), len(names)), np.nan)
         views.flat[cells] = _numbers(path, VIEWS_COLUMN, columns[VIEWS_COLUMN], lines, "a number of cameras")
-    return PoseTable(keys[:, 0], keys[:, 1], positions.reshape(len(keys), len(LANDMARKS), 3), views)
+    return PoseTable(keys[:, 0], keys[:, 1], positions.reshape(len(keys), len(names), 3), views, tuple(names))
 
 
 def write_joints(path: str | Path, table: PoseTable) -> None:
@@ -213,10 +223,10 @@ def write_joints(path: str | Path, table: PoseTable) -> None:
         file.write(",".join((*JOINT_COLUMNS, *(() if table.views is None else (VIEWS_COLUMN,)))) + "\n")
         for row in order:
             start = f"{table.frames[row]},{table.persons[row]},"
-            ends = [""] * len(LANDMARKS) if table.views is None else [f",{n:.0f}" if n >= 0 else "," for n in table.views[row]]
+            ends = [""] * len(table.names) if table.views is None else [f",{n:.0f}" if n >= 0 else "," for n in table.views[row]]
             file.writelines(
                 f"{start}{name},{x:.6f},{y:.6f},{z:.6f}{end}\n"
-                for name, (x, y, z), end in zip(LANDMARKS, table.positions[row], ends, strict=True)
+                for name, (x, y, z), end in zip(table.names, table.positions[row], ends, strict=True)
             )
 
 

@@ -72,7 +72,7 @@ class _Person:
         With the person's own body.
     row_of : mapping of int to int
         Frame to its place in `rows`.
-    own, back : ndarray, shape (n, 33)
+    own, back : ndarray, shape (n, 37)
         The first pass's poses, refined, and those of the backward one.
     costs : ndarray, shape (n, 32)
         Of `mixed_poses` of both; zero where nothing tells them apart.

@@ -13,15 +13,17 @@ from pathlib import Path
 
 import numpy as np
 
+from hmc.body.feet import foot_points
 from hmc.body.joints import DOF_NAMES
 from hmc.body.kinematics import landmark_masks, landmarks
 from hmc.body.model import BodyModel
+from hmc.body.proportions import make_bodies
 from hmc.errors import InputError
 from hmc.io.detections import DetectionTable
 from hmc.io.masks import MaskStep, keep_masks, kept_frames
 from hmc.io.recording import Recording, for_voxels
 from hmc.io.results import PoseStates, PoseTable, TrackTable, write_joints, write_pose
-from hmc.landmarks import LANDMARKS
+from hmc.landmarks import FOOT_POINTS, LANDMARKS, landmark_index
 from hmc.pose.keypoint_cues import KeypointCues, with_keypoints
 from hmc.pose.method import Capture, PoseMethod
 from hmc.pose.person import DecidedFrames, PersonState, PersonTrack, PoseTask, person_step, resumed
@@ -91,6 +93,17 @@ class PosedPeople:
         """What each angle is called."""
         return self.states.dof_names[3:]
 
+    @property
+    def feet(self) -> PoseTable:
+        """Heels and toes (`hmc.landmarks.FOOT_POINTS`) of each row, with the views of the ankle; NaN of bodies without feet."""
+        points = np.full((len(self.frames), len(FOOT_POINTS), 3), np.nan)
+        for person, body in make_bodies(self.states.bodies).items():
+            own = self.states.persons == person
+            points[own] = foot_points(body, self.states.states[own])
+        ankles = [landmark_index(f"{name[0]}_ankle") for name in FOOT_POINTS]
+        views = None if self.poses.views is None else self.poses.views[:, ankles]
+        return PoseTable(self.frames, self.persons, points, views, FOOT_POINTS)
+
     def to_frame(self):
         """A pandas frame with the columns of ``joints.csv``: frame, person, joint, x, y, z in metres, and views where they are known."""
         import pandas as pd
@@ -101,8 +114,13 @@ class PosedPeople:
         return pd.DataFrame(columns if self.poses.views is None else columns | {"views": self.poses.views.ravel().astype(int)})
 
     def save(self, folder: str | Path) -> None:
-        """Write ``joints.csv`` and ``pose.npz``, as `hmc pose` does."""
+        """Write ``joints.csv``, ``feet.csv`` where the body has feet, and ``pose.npz``, as `hmc pose` does."""
         write_joints(Path(folder) / "joints.csv", self.poses)
+        feet = self.feet
+        if np.isfinite(feet.positions).any():
+            write_joints(Path(folder) / "feet.csv", feet)
+        else:
+            (Path(folder) / "feet.csv").unlink(missing_ok=True)
         write_pose(Path(folder) / "pose.npz", replace(self.states, costs=self.costs))
 
 
@@ -119,7 +137,7 @@ class FollowOptions:
         Stature of every person; estimated for each where left out.
     detections : DetectionTable or None
         For methods that need them; one person's.
-    drift : ndarray, shape (33,), or None
+    drift : ndarray, shape (37,), or None
         P0 of filters, as in `hmc.pose.method.Capture`.
     keypoints : KeypointCues or None
         What a detector of 2-D keypoints saw.
@@ -325,8 +343,8 @@ def known_landmarks(body: BodyModel, states: np.ndarray, missing: np.ndarray) ->
     Parameters
     ----------
     body : BodyModel
-    states : ndarray, shape (n, 33)
-    missing : ndarray of bool, shape (n, 33)
+    states : ndarray, shape (n, 37)
+    missing : ndarray of bool, shape (n, 37)
         Angles that no data shows.
 
     Returns

@@ -123,7 +123,7 @@ def beside_body(body: BodyModel, state: np.ndarray, seen: SeenKeypoints) -> np.n
     Parameters
     ----------
     body : BodyModel
-    state : ndarray, shape (33,)
+    state : ndarray, shape (37,)
     seen : SeenKeypoints
     """
     rotations, positions = segment_transforms(body, state)

@@ -45,7 +45,7 @@ def agreeing_cameras(body: BodyModel, state: np.ndarray, seen: SeenKeypoints) ->
     Parameters
     ----------
     body : BodyModel
-    state : ndarray, shape (33,)
+    state : ndarray, shape (37,)
     seen : SeenKeypoints
 
     Returns

@@ -30,7 +30,7 @@ _LIMBS = np.concatenate([limb.landmarks for limb in LIMBS.values()])
 
 
 #: Legs can be told apart where none of these is missing.
-LEG_DOFS = np.concatenate([LIMBS[leg].dofs for leg in ("r_leg", "l_leg")])
+LEG_DOFS = np.concatenate([np.r_[LIMBS[leg].dofs, LIMBS[leg].end_dofs] for leg in ("r_leg", "l_leg")])
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class LegSettings:
 
 
 def limb_points(body: BodyModel, states: np.ndarray, settings: LegSettings) -> np.ndarray:
-    """Points by whose motion limbs are told apart, world, metres: states (n, 33) to points (n, k, 3)."""
+    """Points by whose motion limbs are told apart, world, metres: states (n, 37) to points (n, k, 3)."""
     return landmarks(body, states)[:, _LIMBS if settings.arms_too else _LEGS]
 
 
@@ -79,7 +79,7 @@ def leg_alternatives(
     ----------
     rng : numpy.random.Generator
     subject : Subject
-    state : ndarray, shape (33,)
+    state : ndarray, shape (37,)
     view : PersonView
         With hulls.
     polish : PolishSettings
@@ -94,7 +94,7 @@ def leg_alternatives(
 
 
 def no_alternatives(state: np.ndarray, n: int = 2) -> Alternatives:
-    """The same pose (33,) again, for a frame that tells nothing of the legs."""
+    """The same pose (37,) again, for a frame that tells nothing of the legs."""
     return Alternatives(np.repeat(state[None], n, axis=0), np.zeros(n))
 
 

@@ -65,7 +65,7 @@ class Capture:
     room : ndarray, shape (2, 3), or None
         Limits of the room, metres; its lowest z is the floor, 0 where left out.
     rig : Rig or None
-    drift : ndarray, shape (33,), or None
+    drift : ndarray, shape (37,), or None
         P0 of filters: half of the largest variation expected in one frame, metres and radians (Canton 2009, section 3.2.2); None: that of
         everyday motion (`hmc.pose.steps.presets.drift`).
     beside : Beside
@@ -102,7 +102,7 @@ class Subject:
         The body's flesh, where the four scores are used, be it by scouts for missing limbs alone.
     parts : ndarray of bool, shape (n_parts,)
         Which of `hmc.body.model.PARTS` are there: limbs that the data does not show may be left out.
-    free : ndarray of bool, shape (33,)
+    free : ndarray of bool, shape (37,)
         Angles that may move: those of the parts that are there.
     extras : mapping of str to object
         What else a method makes of a body.
@@ -129,9 +129,9 @@ class Tracked:
     Parameters
     ----------
     subject : Subject
-    state : ndarray, shape (33,)
+    state : ndarray, shape (37,)
         The estimate, metres and radians in the order of `hmc.body.joints.DOF_NAMES`.
-    velocity : ndarray, shape (33,)
+    velocity : ndarray, shape (37,)
         Change of the estimate in the last frame; zero at the start.
     memory : mapping of str to ndarray
         All else that steps want from the frames before. The journal saves and restores it without knowing what it is.
@@ -146,7 +146,7 @@ class Tracked:
 def begin_tracking(
     subject: Subject, state: np.ndarray, velocity: np.ndarray | None = None, memory: Mapping[str, np.ndarray] | None = None
 ) -> Tracked:
-    """A person in this pose (33,), at rest where no velocity is given."""
+    """A person in this pose (37,), at rest where no velocity is given."""
     state = np.asarray(state, float)
     velocity = np.zeros_like(state) if velocity is None else np.asarray(velocity, float)
     return Tracked(subject, state, velocity, {} if memory is None else memory)
@@ -158,7 +158,7 @@ class Alternatives:
 
     Parameters
     ----------
-    states : ndarray, shape (m, 33)
+    states : ndarray, shape (m, 37)
         As followed, and with exchanged legs; of markers, other exchanges too.
     costs : ndarray, shape (m,)
         Square metres, from the same points; zero in a frame that tells nothing.
@@ -180,7 +180,7 @@ class StepInfo:
         Of the estimate, square metres or what the method minimises; NaN without a fit, and of likelihoods that are no costs.
     evaluations : int
         Of the objective, in all.
-    missing : ndarray of bool, shape (33,), or None
+    missing : ndarray of bool, shape (37,), or None
         Angles of limbs that the data does not show; None: of none.
     alternatives : Alternatives or None
         Other poses of the frame, between which later frames decide.
@@ -188,7 +188,7 @@ class StepInfo:
         Of the annealed layers, where there are any.
     structural : StructuralInfo or None
         Of the layers of a hierarchy's models, where there are any.
-    levels : ndarray, shape (n_models, 33), or None
+    levels : ndarray, shape (n_models, 37), or None
         The estimates of a hierarchy's models, NaN where a model lacks the angle.
     details : mapping
         Plain values that a method tells of the frame, for its own tables.
@@ -237,7 +237,7 @@ class StartPose:
         With the person's body.
     anchor : int
         Place of its frame among those that were watched.
-    state : ndarray, shape (33,)
+    state : ndarray, shape (37,)
     memory : mapping of str to ndarray
         What steps are to know in that frame.
     costs : ndarray, shape (n,)

@@ -13,8 +13,7 @@ from itertools import product
 import numpy as np
 
 from hmc.body.dimensions import FitBodySettings
-from hmc.body.joints import N_DOF
-from hmc.body.limbs import LIMBS
+from hmc.body.limbs import CHAIN_OF_DOF, LIMBS
 from hmc.body.model import BodyModel
 from hmc.pose.legs import LegSettings, choose_legs, limb_points
 from hmc.pose.steps.polish import PolishSettings
@@ -23,9 +22,8 @@ __all__ = ["N_MIXTURES", "BackwardSettings", "choose_path", "mixed_poses", "mixt
 
 #: Frames between whose poses one path is looked for, and how many before them are known and after them looked at.
 BLOCK, CONTEXT, AHEAD = 600, 30, 60
-#: Every way to take the rest of the body, and each limb, from one pose (0) or another (1); and in which column each angle stands.
+#: Every way to take the rest of the body, and each limb, from one pose (0) or another (1); the column of each angle is its chain.
 _TAKEN = np.array(list(product((0, 1), repeat=1 + len(LIMBS))), bool)
-_COLUMN = sum(column * np.isin(np.arange(N_DOF), limb.dofs) for column, limb in enumerate(LIMBS.values(), 1))
 N_MIXTURES = len(_TAKEN)
 
 
@@ -62,11 +60,11 @@ def mixed_poses(one: np.ndarray, other: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    one, other : ndarray, shape (..., 33)
+    one, other : ndarray, shape (..., 37)
 
     Returns
     -------
-    ndarray, shape (..., 32, 33)
+    ndarray, shape (..., 32, 37)
         The first is `one`, the last `other`.
     """
     return mixture(one[..., None, :], other[..., None, :], np.arange(N_MIXTURES))
@@ -77,14 +75,14 @@ def mixture(one: np.ndarray, other: np.ndarray, picks: np.ndarray) -> np.ndarray
 
     Parameters
     ----------
-    one, other : ndarray, shape (..., 33)
+    one, other : ndarray, shape (..., 37)
     picks : ndarray of int, shape (...)
 
     Returns
     -------
-    ndarray, shape (..., 33)
+    ndarray, shape (..., 37)
     """
-    return np.where(_TAKEN[picks][..., _COLUMN], other, one)
+    return np.where(_TAKEN[picks][..., CHAIN_OF_DOF], other, one)
 
 
 def choose_path(
@@ -97,7 +95,7 @@ def choose_path(
     body : BodyModel
     frames : ndarray of int, shape (n,)
         Rising.
-    one, other : ndarray, shape (n, 33)
+    one, other : ndarray, shape (n, 37)
     costs : ndarray, shape (n, 32)
         Of their `mixed_poses`, square metres.
     fps : float

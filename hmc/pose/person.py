@@ -102,7 +102,7 @@ class DecidedFrames:
     ----------
     person : int
     frames : tuple of int
-    states : ndarray, shape (n, 33)
+    states : ndarray, shape (n, 37)
         NaN where there was nothing to start from.
     infos : tuple of StepInfo
         One a frame; of the journal's rows only what it keeps.
@@ -134,7 +134,7 @@ class PersonState:
         The window that is not over. The only views that are kept.
     followed : tuple of FollowedFrame
         Frames that are not decided.
-    context : tuple of (int, ndarray of shape (33,))
+    context : tuple of (int, ndarray of shape (37,))
         The last decided frames, with their poses.
     done_to : int
         The last decided frame; -1: none is.

@@ -97,7 +97,7 @@ class LivePerson:
         Centroid and centre of the head, in this frame.
     landmarks : ndarray, shape (15, 3), or None
         The newest decided pose, in the order of `hmc.landmarks.LANDMARKS`; NaN where nothing shows a limb. None: there is none yet.
-    state : ndarray, shape (33,), or None
+    state : ndarray, shape (37,), or None
         The same as angles (`hmc.body.joints.DOF_NAMES`), metres and radians.
     body : BodyModel or None
     decided_frame : int or None

@@ -55,7 +55,7 @@ def marker_visibility(body: BodyModel, state: np.ndarray, points: np.ndarray, ce
     Parameters
     ----------
     body : BodyModel
-    state : ndarray, shape (33,)
+    state : ndarray, shape (37,)
     points : ndarray, shape (m, 3)
         Markers, world, metres.
     centres : ndarray, shape (n_views, 3)
@@ -95,14 +95,14 @@ def seen_by_ideal_detector(body: BodyModel, rig: Rig, points: np.ndarray, start:
     rig : Rig
     points : ndarray, shape (15, 3)
         True markers, at the body's landmarks; NaN where there is none.
-    start : ndarray, shape (33,)
+    start : ndarray, shape (37,)
         Where inverse kinematics starts: the state of the frame before.
 
     Returns
     -------
     detections : list of ndarray, shape (n, 2)
         Pixels (with the lens's distortion), one array a view.
-    state : ndarray, shape (33,)
+    state : ndarray, shape (37,)
         The body's pose.
     """
     state, _ = fit_landmarks(body, points, start)

@@ -19,8 +19,9 @@ from hmc.errors import InputError
 from hmc.io.calibration import write_calibration
 from hmc.io.files import write_toml
 from hmc.io.results import PoseTable, TrackTable, write_joints, write_tracks
-from hmc.landmarks import LANDMARKS
+from hmc.landmarks import FOOT_POINTS, LANDMARKS
 from hmc.synthetic.actor import PARTS
+from hmc.synthetic.feet import true_foot_points
 from hmc.synthetic.image import Backdrop, develop, exposure, light_crowd, make_backdrop, picture, relit, static_shadows
 from hmc.synthetic.recipe import Recipe, load_recipe
 from hmc.synthetic.scene import Scene, build_scene, crowd_at
@@ -99,10 +100,11 @@ def _write_tables(scene: Scene, folder: Path) -> None:
     n, persons = recipe.n_frames, len(scene.actors)
     present = np.array([scene.in_room(k) for k in range(persons)], bool).reshape(persons, n).T
     frames, actors = np.nonzero(present)
-    joints = np.zeros((n, persons, len(LANDMARKS), 3))
+    joints, feet = np.zeros((n, persons, len(LANDMARKS), 3)), np.zeros((n, persons, len(FOOT_POINTS), 3))
     centroids, heads = np.zeros((n, persons, 3)), np.zeros((n, persons, 3))
     for k, (actor, motion) in enumerate(zip(scene.actors, scene.motions, strict=True)):
         joints[:, k] = landmark_positions(actor.skeleton, motion.root, motion.orientations)
+        feet[:, k] = true_foot_points(actor, motion.root, motion.orientations)
     for frame in range(n):
         crowd = crowd_at(scene, frame)
         for k in np.flatnonzero(present[frame]).tolist():
@@ -110,6 +112,7 @@ def _write_tables(scene: Scene, folder: Path) -> None:
             centroids[frame, k] = volume_centroid(own, scene.actors[k].triangles)[1]
             heads[frame, k] = own[scene.actors[k].parts == list(PARTS).index("head")].mean(axis=0)
     write_joints(folder / "truth" / "joints.csv", PoseTable(frames, actors, joints[present]))
+    write_joints(folder / "truth" / "feet.csv", PoseTable(frames, actors, feet[present], names=FOOT_POINTS))
     write_tracks(folder / "truth" / "centroids.csv", TrackTable(frames, actors, centroids[present], heads[present]))
 
 

@@ -111,9 +111,9 @@ def read_result(directory: str | Path) -> Result:
         raise InputError(f"{directory}: neither joints.csv nor tracks.csv; give the folder that `hmc pose` or `hmc track` wrote")
     states = read_pose(directory / "pose.npz") if (directory / "pose.npz").exists() else None
     result = Result(poses, tracks, silhouettes=open_silhouettes(directory))
-    if states is not None and states.dof_names == DOF_NAMES[:N_CANTON]:
-        # Of before the trunk bent: its joints, which come last, are at 0.
-        states = replace(states, dof_names=DOF_NAMES, states=np.pad(states.states, ((0, 0), (0, N_DOF - N_CANTON))))
+    if states is not None and N_CANTON <= len(states.dof_names) < N_DOF and states.dof_names == DOF_NAMES[: len(states.dof_names)]:
+        # Of before the trunk bent, or the ankles did: their joints, which come last, are at 0.
+        states = replace(states, dof_names=DOF_NAMES, states=np.pad(states.states, ((0, 0), (0, N_DOF - len(states.dof_names)))))
     return result if states is None or states.dof_names != DOF_NAMES else with_bodies(result, states)
 
 

@@ -86,7 +86,7 @@ def draw_outline(image: np.ndarray, camera: Camera, body: BodyModel, state: np.n
     image, camera, person, width
         As for `draw_sticks`.
     body : BodyModel
-    state : ndarray, shape (33,)
+    state : ndarray, shape (37,)
     """
     uv, valid = project(camera, cone_rings(body, state))
     mask = np.zeros(image.shape[:2], np.uint8)

@@ -170,7 +170,7 @@ def draw_body(body: BodyModel, state: np.ndarray, ax: Axes3D | None = None, pers
     Parameters
     ----------
     body : BodyModel
-    state : ndarray, shape (33,)
+    state : ndarray, shape (37,)
         Metres and radians.
     ax : Axes (3-D), optional
     person : int

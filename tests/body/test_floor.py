@@ -44,7 +44,18 @@ def test_lowest_of_soles_and_knees_carries():
     knee = 1.0 - BODY.dimensions["thigh"]
     assert_allclose(height, [1.0 - leg_length(), 1.0 - leg_length(), knee], atol=1e-12)
     assert_allclose(point[:, 2], height)
-    assert SEGMENTS[segment[1]].name == "r_shank"
+    assert [SEGMENTS[k].name[2:] for k in segment] == ["foot", "foot", "shank"] and SEGMENTS[segment[1]].name == "r_foot"
+
+
+def test_a_foot_that_points_down_bears_on_its_ball_and_one_that_is_lifted_on_its_heel():
+    states = np.repeat(standing(1.0)[None], 2, axis=0)
+    states[0, dof_index("r_ankle_y")], states[1, dof_index("r_ankle_y", "l_ankle_y")] = np.radians(30), np.radians(-20)
+    rotations, positions = segment_transforms(BODY, states)
+    height, point, segment = lowest_support(BODY, rotations, positions)
+    ankles = positions[np.arange(2), segment]  # a foot begins at its ankle
+    assert [SEGMENTS[k].name[2:] for k in segment] == ["foot", "foot"] and SEGMENTS[segment[0]].name == "r_foot"
+    assert point[0, 0] > ankles[0, 0] + 0.05 and point[1, 0] < ankles[1, 0]
+    assert np.all(height < 1.0 - leg_length())
 
 
 def test_floor_row_against_finite_differences():

@@ -28,7 +28,9 @@ def test_names_of_a_limb(name):
 @pytest.mark.parametrize("limb", LIMBS.values(), ids=list(LIMBS))
 def test_a_limb_moves_its_own_segments_and_landmarks_alone(limb):
     moved = dof_masks()[:, limb.dofs].any(axis=1)
-    assert set(np.flatnonzero(moved)) == set(limb.segments)
+    feet = {k for k, one in enumerate(SEGMENTS) if one.name == f"{limb.name[0]}_foot" and not limb.is_arm}
+    assert set(np.flatnonzero(moved)) == set(limb.segments) | feet
+    assert set(np.flatnonzero(dof_masks()[:, limb.end_dofs].any(axis=1))) == feet
     assert set(np.flatnonzero(landmark_masks(default_body(1.7))[:, limb.dofs].any(axis=1))) == set(limb.landmarks)
     assert set(landmark_segments()[limb.landmarks]) == {limb.segments[1]}
 
@@ -38,7 +40,7 @@ def test_chains_are_the_trunk_and_the_limbs():
     assert CHAIN_OF_PART.tolist() == [0, 0, 1, 1, 2, 2, 3, 3, 4, 4]
     assert len(CHAIN_OF_DOF) == N_DOF
     for number, limb in enumerate(LIMBS.values(), 1):
-        assert np.flatnonzero(CHAIN_OF_DOF == number).tolist() == limb.dofs.tolist()
+        assert np.flatnonzero(CHAIN_OF_DOF == number).tolist() == [*limb.dofs, *limb.end_dofs]
 
 
 def test_rest_is_the_same_on_both_sides():

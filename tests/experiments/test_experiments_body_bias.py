@@ -12,7 +12,7 @@ from hmc.body.model import PARTS, neutral_state
 from hmc.body.proportions import DEFAULT_LENGTHS, SOLE, default_body, make_body
 from hmc.errors import InputError
 from hmc.experiments import body_bias
-from hmc.experiments.body_bias import AS_IT_IS, MIDDLE, NEITHER, STIFF
+from hmc.experiments.body_bias import AS_IT_IS, FLAT, MIDDLE, NEITHER, STIFF
 from hmc.experiments.engine.experiment import Cell, Plan
 from hmc.experiments.engine.inputs import Inputs
 from hmc.experiments.engine.library import find_experiment
@@ -35,7 +35,7 @@ def test_the_body_has_the_joint_lengths_of_the_landmarks():
     told = ("trunk", "shoulder_half_width", "hip_half_width", "upper_arm", "forearm", "thigh", "shank")
     person = make_body(usual | {name: usual[name] * rng.uniform(0.9, 1.1) for name in told})
     states = neutral_state("down", person.limits) + rng.normal(size=(5, N_DOF)) * MOVED
-    found = body_bias._body(landmarks(person, states), (), SOLE)
+    found = body_bias._body(landmarks(person, states), (), SOLE, ())
     assert_allclose([found.dimensions[name] for name in (*told, "head")], [person.dimensions[name] for name in (*told, "head")])
     upright = ("trunk", "head", "thigh", "shank")
     stature = sum(person.dimensions[name] for name in upright) / sum(DEFAULT_LENGTHS[name] for name in upright)
@@ -45,7 +45,10 @@ def test_the_body_has_the_joint_lengths_of_the_landmarks():
 def test_variants_differ_in_hair_in_soles_and_in_where_joints_are_alone():
     points = landmarks(default_body(1.7), neutral_state("down"))[None]
     bodies = {name: body_bias._body(points, *variant) for name, variant in body_bias.VARIANTS.items()}
-    middle, stiff = bodies.pop(MIDDLE), bodies.pop(STIFF)
+    middle, stiff, flat = bodies.pop(MIDDLE), bodies.pop(STIFF), bodies.pop(FLAT)
+    held = dof_index("l_ankle_y", "l_ankle_z", "r_ankle_y", "r_ankle_z")
+    assert set(np.flatnonzero(flat.limits.low == flat.limits.high)) == set(held)
+    assert np.all(bodies[AS_IT_IS].limits.low < bodies[AS_IT_IS].limits.high)
     assert_allclose(landmarks(stiff, neutral_state("down")), points[0], atol=1e-9)
     shrugging = neutral_state("down")
     shrugging[dof_index("l_girdle_x", "r_girdle_x")] = 0.4, -0.4
@@ -108,17 +111,19 @@ def holding(off_m):
 
 def test_claims_follow_the_figures():
     def bare(body):
-        return body in (NEITHER, MIDDLE, STIFF)
+        return body in (NEITHER, MIDDLE, STIFF, FLAT)
 
-    assert holding(lambda body, name: (0, 0, 0.012 if bare(body) else 0.008)) == [True, True, True, True]
-    assert holding(lambda body, name: (0, 0, 0.012 if body == MIDDLE else 0.008)) == [False, True, False, True]
-    assert holding(lambda body, name: (0, 0, 0.012 if body == NEITHER else 0.008)) == [True, False, False, True]
-    assert holding(lambda body, name: (0, 0, 0.012 if body == STIFF else 0.008)) == [False, False, True, True]
-    assert holding(lambda body, name: (0, 0, 0.008)) == [False, False, False, True]
+    assert holding(lambda body, name: (0, 0, 0.012 if bare(body) else 0.008)) == [True, True, True, True, True]
+    assert holding(lambda body, name: (0, 0, 0.012 if body == MIDDLE else 0.008)) == [False, True, False, False, True]
+    assert holding(lambda body, name: (0, 0, 0.012 if body == NEITHER else 0.008)) == [True, False, False, False, True]
+    assert holding(lambda body, name: (0, 0, 0.012 if body == STIFF else 0.008)) == [False, False, True, False, True]
+    assert holding(lambda body, name: (0, 0, 0.012 if body == FLAT else 0.008)) == [False, False, False, True, True]
+    assert holding(lambda body, name: (0, 0, 0.008)) == [False, False, False, False, True]
     # On five of eight only, and on seven of eight with a harm on the last that outweighs them.
     some, last = body_bias.CLIPS[:5], body_bias.CLIPS[-1]
-    assert holding(lambda body, name: (0.03 if bare(body) or name not in some else 0.02, 0, 0)) == [False, False, False, True]
+    assert holding(lambda body, name: (0.03 if bare(body) or name not in some else 0.02, 0, 0)) == [False, False, False, False, True]
     assert holding(lambda body, name: (0.03 if bare(body) == (name == last) else 0.1 if name == last else 0.031, 0, 0)) == [
+        False,
         False,
         False,
         False,
@@ -126,4 +131,4 @@ def test_claims_follow_the_figures():
     ]
     for sign in (1, -1):
         lifted = holding(lambda body, name, sign=sign: (0.02 * bare(body), 0, sign * (0.012 if name == last else 0.005)))
-        assert lifted == [True, True, True, False]
+        assert lifted == [True, True, True, True, False]

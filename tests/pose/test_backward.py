@@ -122,7 +122,7 @@ def test_mixtures_take_each_limb_from_one_pose_or_the_other():
     rng = np.random.default_rng(0)
     one, other = rng.normal(size=(2, N_DOF))
     mixed = mixed_poses(one, other)
-    limbs = [set(np.asarray(limb.dofs).tolist()) for limb in LIMBS.values()]
+    limbs = [{*limb.dofs.tolist(), *limb.end_dofs.tolist()} for limb in LIMBS.values()]
     rest = set(range(N_DOF)) - set().union(*limbs)
     expected = set()
     for number in range(2 ** (1 + len(limbs))):

@@ -337,12 +337,15 @@ def test_an_upper_arm_that_went_into_the_trunk_without_its_forearm_is_put_where_
     memory = replace(LimbMemory.first(SETTINGS), active=np.array([name != "l_forearm" for name in LIMBS]))
 
     def elbow_off(settings):
-        step = annealed_pose_step(replace(DDM["default"], limbs=settings))
-        tracked, info = step(np.random.default_rng(0), begin_tracking(subject, astray, memory=memory.kept()), view_of(target))
-        assert info.missing is not None
-        return np.linalg.norm((landmarks(subject.body, tracked.state) - landmarks(subject.body, standing()))[elbow])
+        step, off = annealed_pose_step(replace(DDM["default"], limbs=settings)), []
+        for seed in range(8):  # it is a matter of luck: two runs in five find it
+            tracked, info = step(np.random.default_rng(seed), begin_tracking(subject, astray, memory=memory.kept()), view_of(target))
+            assert info.missing is not None
+            off.append(np.linalg.norm((landmarks(subject.body, tracked.state) - landmarks(subject.body, standing()))[elbow]))
+        return np.array(off)
 
-    assert elbow_off(SETTINGS) < 0.1 < elbow_off(replace(SETTINGS, lost_inside=1.0))
+    assert sum(elbow_off(SETTINGS) < 0.1) >= 2
+    assert np.all(elbow_off(replace(SETTINGS, lost_inside=1.0)) > 0.4)
 
 
 def test_a_hidden_shank_is_dropped_and_taken_back_and_the_rest_stays(subjects):
@@ -357,7 +360,7 @@ def test_a_hidden_shank_is_dropped_and_taken_back_and_the_rest_stays(subjects):
         away = np.linalg.norm(landmarks(subject.body, tracked.state) - landmarks(subject.body, state), axis=1)
         assert away[:-1].max() < 0.1  # the right ankle is the last
     assert away[-1] < 0.08
-    knee = set(dof_index("r_knee_y").tolist())
+    knee = set(dof_index("r_knee_y", "r_ankle_y", "r_ankle_z").tolist())
     assert missing[:2] == [set(), set()] and missing[7] == knee and missing[-1] == set()
     assert all(one in (set(), knee) for one in missing)
 
@@ -395,13 +398,13 @@ def test_any_step_is_told_what_is_there_and_what_it_finds_of_the_rest_does_not_c
     before = begin_tracking(subject, standing(), memory=lost.kept())
     look = with_hidden_limbs(step, SETTINGS)
     after, info = look(np.random.default_rng(0), before, view_of(target))
-    (part, asked), knee = given[0], dof_index("r_knee_y")
+    (part, asked), knee = given[0], dof_index("r_knee_y", "r_ankle_y", "r_ankle_z")
     assert_array_equal(part.parts, without("r_shank"))
     assert_array_equal(np.flatnonzero(~part.free), knee)
     assert asked.floor_z is None and len(asked.surface) <= len(target.surface)
     assert_array_equal(np.flatnonzero(after.state == before.state), knee)
     assert_array_equal(np.flatnonzero(info.missing), knee)
-    assert after.subject is subject and after.memory["own"] == 1 and after.velocity[knee] == 0
+    assert after.subject is subject and after.memory["own"] == 1 and not after.velocity[knee].any()
     assert_array_equal(LimbMemory.of(after.memory, SETTINGS).active, lost.active)
     assert info.evaluations > 5  # scouts looked for the shank
     # With every limb there, the step's answer stands as it is.

@@ -29,7 +29,7 @@ class PosedBody:
 
     Parameters
     ----------
-    rotations, positions : ndarray, shapes (14, 3, 3) and (14, 3)
+    rotations, positions : ndarray, shapes (16, 3, 3) and (16, 3)
         Of the segments, world.
     twists : ndarray, shape (24, 6)
         Angular velocity and velocity at the world's origin that each of the 24 degrees of freedom gives what it moves.
@@ -78,7 +78,7 @@ def joined(matches: Sequence[Matches]) -> Matches:
 
 
 def pose_body(body: SolidBody, state: np.ndarray) -> PosedBody:
-    """Segments and twists of a state (33,)."""
+    """Segments and twists of a state (37,)."""
     axes, centres, rotations, positions = joint_twists(body.skeleton, state)
     twists = np.concatenate([axes, np.cross(centres, axes)], axis=1)
     twists[:3] = np.eye(6)[3:]

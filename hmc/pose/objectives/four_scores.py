@@ -90,7 +90,7 @@ class ScoreTable:
         Homogeneous, metres, segment's frame; sorted by part, within a part the surface first.
     blocks : tuple of (part, segment, is_surface, start, stop)
         Runs of rows of `points`.
-    corners : ndarray of float32, shape (14, 8, 4)
+    corners : ndarray of float32, shape (16, 8, 4)
         Homogeneous corners of the box around each segment's points, metres, segment's frame.
     counts : ndarray of int, shape (n_parts, 4)
         Points behind each score: the surface's for ``surface``, all for the others.
@@ -232,7 +232,7 @@ def scores(table: ScoreTable, states: np.ndarray, maps: ScoreMaps, exact: bool =
     Parameters
     ----------
     table : ScoreTable
-    states : ndarray, shape (n, 33)
+    states : ndarray, shape (n, 37)
     maps : ScoreMaps
     exact : bool
         Count double occupancy voxel by voxel instead of by the quick estimate; some ten times slower.
@@ -260,7 +260,7 @@ def map_scores(table: ScoreTable, placed: np.ndarray, maps: ScoreMaps) -> tuple[
     Parameters
     ----------
     table : ScoreTable
-    placed : ndarray of float32, shape (14, 3, 4, n)
+    placed : ndarray of float32, shape (16, 3, 4, n)
         From `place_segments`, counted from the maps' origin.
     maps : ScoreMaps
 

@@ -76,7 +76,7 @@ class _MissesAt:
     misfit: None = None
 
     def pulls(self) -> tuple[np.ndarray, np.ndarray]:
-        """All residuals, and how they change with the state, shape (2 n, 33)."""
+        """All residuals, and how they change with the state, shape (2 n, 37)."""
         moves = point_motions(self.axes, self.centres, self.places, _MASKS)
         return np.arange(len(self.residuals)), (self.directions @ moves[self.keypoint]).reshape(-1, N_DOF)
 
@@ -99,7 +99,7 @@ class KeypointCost:
     settings: KeypointSettings = field(default_factory=KeypointSettings)
 
     def cost(self, states: np.ndarray) -> np.ndarray:
-        """The sum over lines of sight, square metres: states (n, 33) to (n,)."""
+        """The sum over lines of sight, square metres: states (n, 37) to (n,)."""
         return self._weights() @ self._by_line(states).T
 
     def by_part(self, states: np.ndarray) -> np.ndarray:
@@ -107,7 +107,7 @@ class KeypointCost:
         return (self._by_line(states) * self._weights()) @ np.eye(len(PARTS))[KEYPOINT_PART[self.seen.keypoint]]
 
     def linearise(self, state: np.ndarray, near: Any = None) -> _MissesAt:
-        """Residuals at one state (33,), two a line."""
+        """Residuals at one state (37,), two a line."""
         axes, centres, rotations, positions = joint_twists(self.body, state)
         places = place_keypoints(rotations, positions, self._local())
         missed = self.seen.missed(places)

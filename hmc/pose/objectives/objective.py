@@ -59,7 +59,7 @@ class Linearisation(Protocol):
     @property
     def misfit(self) -> Misfit | None: ...
     def pulls(self) -> tuple[np.ndarray, np.ndarray]:
-        """Which residuals change with the state, (m,), and how, (m, 33)."""
+        """Which residuals change with the state, (m,), and how, (m, 37)."""
 
 
 class Objective(Protocol):
@@ -68,13 +68,13 @@ class Objective(Protocol):
     @property
     def body(self) -> BodyModel: ...
     def cost(self, states: np.ndarray) -> np.ndarray:
-        """The cost of states (n, 33), shape (n,)."""
+        """The cost of states (n, 37), shape (n,)."""
 
     def by_part(self, states: np.ndarray) -> np.ndarray | None:
         """The share of each of `hmc.body.model.PARTS` in the cost, shape (n, n_parts); None where it cannot be told."""
 
     def linearise(self, state: np.ndarray, near: Any = None) -> Linearisation:
-        """Residuals at a state (33,), with what it takes to tell how they change."""
+        """Residuals at a state (37,), with what it takes to tell how they change."""
 
     def coarser(self, rng: np.random.Generator, n: int) -> Objective:
         """The objective on about `n` of the data's points."""
@@ -156,6 +156,6 @@ class Sum:
 
 
 def cost_at(objective: Objective, state: np.ndarray) -> float:
-    """The cost of one state (33,), by its residuals: what a refinement compares, square metres."""
+    """The cost of one state (37,), by its residuals: what a refinement compares, square metres."""
     residuals = objective.linearise(state).residuals
     return float(residuals @ residuals)

@@ -74,7 +74,7 @@ def quick_overlap(table: OverlapTable, placed: np.ndarray) -> np.ndarray:
     Parameters
     ----------
     table : OverlapTable
-    placed : ndarray of float32, shape (14, 3, 4, n)
+    placed : ndarray of float32, shape (16, 3, 4, n)
         From `hmc.body.kinematics.place_segments`.
 
     Returns

@@ -16,7 +16,7 @@ def exact_overlap(flesh: FleshTable, rotations: np.ndarray, positions: np.ndarra
     Parameters
     ----------
     flesh : FleshTable
-    rotations, positions : ndarray, shape (n, 14, 3, 3) and (n, 14, 3)
+    rotations, positions : ndarray, shape (n, 16, 3, 3) and (n, 16, 3)
     origin : ndarray, shape (3,)
         A corner of the voxels' lattice, world, metres.
     voxel_size_m : float

@@ -208,7 +208,7 @@ def place_pieces(pieces: Pieces, placed: np.ndarray) -> np.ndarray:
     Parameters
     ----------
     pieces : Pieces
-    placed : ndarray of float32, shape (14, 3, 4, n)
+    placed : ndarray of float32, shape (16, 3, 4, n)
         From `hmc.body.kinematics.place_segments`.
 
     Returns

@@ -50,7 +50,7 @@ class _PostureAt:
     misfit: None = None
 
     def pulls(self) -> tuple[np.ndarray, np.ndarray]:
-        """The residuals of parts inside of others and of all angles, and how they change with the state, shape (m, 33)."""
+        """The residuals of parts inside of others and of all angles, and how they change with the state, shape (m, 37)."""
         return self.rows, self.jacobian
 
 
@@ -71,7 +71,7 @@ class PostureCost:
     settings: PostureSettings = field(default_factory=PostureSettings)
 
     def cost(self, states: np.ndarray) -> np.ndarray:
-        """Squared angles and mean squared depth, square metres: states (n, 33) to (n,)."""
+        """Squared angles and mean squared depth, square metres: states (n, 37) to (n,)."""
         depth, posture = self._terms(states)
         return self.settings.overlap_weight * (depth**2).mean(axis=1) + posture.sum(axis=1)
 
@@ -83,7 +83,7 @@ class PostureCost:
         return posture @ columns[PART_OF_DOF] + self.settings.overlap_weight / depth.shape[1] * of_depth
 
     def linearise(self, state: np.ndarray, near: Any = None) -> _PostureAt:
-        """Residuals at one state (33,): of each point of the limbs' axes, then of each angle."""
+        """Residuals at one state (37,): of each point of the limbs' axes, then of each angle."""
         axes, centres, rotations, positions = joint_twists(self.body, state)
         maps = cone_maps(self.body.cones, np.concatenate([rotations, positions[..., None]], axis=-1)[..., None])
         depth, outward, points, segment, other = penetration_rows(self.body, self.axes, rotations, positions, maps)
@@ -108,7 +108,7 @@ class PostureCost:
         return replace(self, body=body, axes=points.axes)
 
     def _terms(self, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Depths, metres, shape (n, n_points), and what each angle costs, square metres, shape (n, 33)."""
+        """Depths, metres, shape (n, n_points), and what each angle costs, square metres, shape (n, 37)."""
         rotations, positions = segment_transforms(self.body, states)
         depth = penetration_depth(self.body, self.axes, rotations, positions)
         return depth, self.settings.posture_weight * ((states - POSTURE[0]) / posture_spread(states)) ** 2

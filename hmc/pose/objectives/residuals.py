@@ -42,11 +42,11 @@ class Distances:
 
     Parameters
     ----------
-    residuals : ndarray, shape (n + 33,)
+    residuals : ndarray, shape (n + 37,)
         Weighted: of the body's surface, of what is to be covered, of the axes' depth, of the floor, and of the posture.
     weights : ndarray, shape (4,)
         Of the first four.
-    axes, centres : ndarray, shape (33, 3)
+    axes, centres : ndarray, shape (37, 3)
         The joints' twists.
     maps : ConeMaps
     pairs : Candidates
@@ -61,7 +61,7 @@ class Distances:
         As from `penetration_rows`.
     floor : tuple of ndarray
         As from `lowest_support`; empty where there is no floor.
-    spread : ndarray, shape (33,)
+    spread : ndarray, shape (37,)
         Of the posture (`posture_spread`), radians.
     objective : Symmetric
         Of which these are the distances.
@@ -98,7 +98,7 @@ class Distances:
         return Misfit(self.outside, self.objective.points.surface.part, places, self.nearest.distance)
 
     def pulls(self) -> tuple[np.ndarray, np.ndarray]:
-        """Which residuals change with the state, ndarray of int, shape (m,), and how, shape (m, 33)."""
+        """Which residuals change with the state, ndarray of int, shape (m,), and how, shape (m, 37)."""
         return _pulls(self)
 
 
@@ -108,7 +108,7 @@ def distances(objective: Symmetric, state: np.ndarray, before: Candidates | None
     Parameters
     ----------
     objective : Symmetric
-    state : ndarray, shape (33,)
+    state : ndarray, shape (37,)
     before : Candidates, optional
         Of a pose near this one.
     """
@@ -189,13 +189,13 @@ def residual_rows(objective: Objective, state: np.ndarray) -> tuple[np.ndarray, 
     Parameters
     ----------
     objective : Objective
-    state : ndarray, shape (33,)
+    state : ndarray, shape (37,)
 
     Returns
     -------
     residuals : ndarray, shape (n_residuals,)
         Metres; their squares sum to the cost.
-    jacobian : ndarray, shape (n_residuals, 33)
+    jacobian : ndarray, shape (n_residuals, 37)
         Zero where a distance is zero or beyond the cap.
     """
     found = objective.linearise(state)

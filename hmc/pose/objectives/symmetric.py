@@ -103,7 +103,7 @@ def outside_distance(body: BodyModel, samples: SurfaceSamples, states: np.ndarra
     ----------
     body : BodyModel
     samples : SurfaceSamples
-    states : ndarray, shape (n, 33)
+    states : ndarray, shape (n, 37)
     target : HullTarget
 
     Returns
@@ -155,7 +155,7 @@ def body_distance(body: BodyModel, states: np.ndarray, points: np.ndarray) -> np
     Parameters
     ----------
     body : BodyModel
-    states : ndarray, shape (n, 33)
+    states : ndarray, shape (n, 37)
     points : ndarray, shape (k, 3) or (k, 6)
         World, metres (`hmc.pose.views.rays`).
 
@@ -234,7 +234,7 @@ class Symmetric:
 
         Parameters
         ----------
-        states : ndarray, shape (n, 33)
+        states : ndarray, shape (n, 37)
 
         Returns
         -------
@@ -256,7 +256,7 @@ class Symmetric:
 
         Parameters
         ----------
-        states : ndarray, shape (n, 33)
+        states : ndarray, shape (n, 37)
 
         Returns
         -------
@@ -279,7 +279,7 @@ class Symmetric:
         return cost
 
     def linearise(self, state: np.ndarray, near: Candidates | None = None) -> Distances:
-        """Residuals at one state (33,); `near` are the candidates of a state near it."""
+        """Residuals at one state (37,); `near` are the candidates of a state near it."""
         return distances(self, state, near)
 
     def coarser(self, rng: np.random.Generator, n: int) -> Symmetric:
@@ -294,7 +294,7 @@ class Symmetric:
         """What the cost is made of.
 
         Metres, each of shape (., n): distances of body from hulls; of silhouettes from the body, of points that are not in it in every
-        state, and which these are; depths. Square metres: the cost of hanging in the air, shape (n,), and of each angle, shape (n, 33).
+        state, and which these are; depths. Square metres: the cost of hanging in the air, shape (n,), and of each angle, shape (n, 37).
         """
         body, settings = self.body, self.settings
         cap = np.float32(settings.cap_m)

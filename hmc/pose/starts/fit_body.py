@@ -45,9 +45,9 @@ class _Prior:
 
     Parameters
     ----------
-    anchors : ndarray, shape (n_frames, 33)
+    anchors : ndarray, shape (n_frames, 37)
         Poses near which those of the frames stay.
-    hold : ndarray, shape (33,)
+    hold : ndarray, shape (37,)
         Cost of a squared unit away from them.
     precision : ndarray, shape (n_fitted,)
         Cost a frame of a squared change of each dimension's logarithm.
@@ -72,7 +72,7 @@ def fit_body(
     ----------
     objectives : sequence of Objective
         One a frame, all of one body: the start and the centre of the prior.
-    states : ndarray, shape (n_frames, 33)
+    states : ndarray, shape (n_frames, 37)
         Poses to start from.
     coordinates : tuple of ndarray
         Where the surface is sampled (`hmc.body.flesh.surface_coordinates`).
@@ -81,7 +81,7 @@ def fit_body(
     Returns
     -------
     body : BodyModel
-    states : ndarray, shape (n_frames, 33)
+    states : ndarray, shape (n_frames, 37)
     info : FitBodyInfo
     """
     body = objectives[0].body

@@ -62,7 +62,7 @@ def own_body(
     ----------
     subject : Subject
         From whose body the fit starts, and to which a prior holds it.
-    poses : mapping of int to (Objective, ndarray of shape (33,))
+    poses : mapping of int to (Objective, ndarray of shape (37,))
         Of the frames: the objective, with the subject's body, and the pose.
     chosen : (list of int, list of int)
         As from `choose_frames`.

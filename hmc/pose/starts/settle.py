@@ -28,13 +28,13 @@ FIT_FRAMES, LEAST_FRAMES = 6, 3
 
 @dataclass(frozen=True)
 class FirstPose:
-    """Body and pose (33,) of one of the frames that were watched, by its place among them.
+    """Body and pose (37,) of one of the frames that were watched, by its place among them.
 
     Parameters
     ----------
     place : int
     body : BodyModel
-    state : ndarray, shape (33,)
+    state : ndarray, shape (37,)
     """
 
     place: int
@@ -92,7 +92,7 @@ def fitted_body(
     ----------
     rng : numpy.random.Generator
     body : BodyModel
-    states : sequence of ndarray, shape (33,)
+    states : sequence of ndarray, shape (37,)
     targets : sequence of HullTarget
         Of the same frames.
     height_known : bool

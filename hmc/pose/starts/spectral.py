@@ -48,7 +48,7 @@ def body_state(body: BodyModel, points: np.ndarray) -> np.ndarray:
 
     Returns
     -------
-    ndarray, shape (33,)
+    ndarray, shape (37,)
     """
     across = points[9] - points[12] + points[3] - points[6]
     start = neutral_state("down", body.limits)

@@ -63,7 +63,7 @@ def template_states(body: BodyModel, xy: np.ndarray, floor_z: float, headings: n
 
     Returns
     -------
-    ndarray, shape (n, n_templates, 33)
+    ndarray, shape (n, n_templates, 37)
     """
     states = []
     for angles, pelvis in TEMPLATES.values():
@@ -100,7 +100,7 @@ def first_poses(
 
     Returns
     -------
-    states : ndarray, shape (keep, 33)
+    states : ndarray, shape (keep, 37)
     costs : ndarray, shape (keep,)
         Square metres.
     """

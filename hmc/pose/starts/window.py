@@ -243,7 +243,7 @@ def walk(
     step : callable
         `PoseStep`.
     subject : Subject
-    state : ndarray, shape (33,), or Tracked
+    state : ndarray, shape (37,), or Tracked
         Pose in the frame `anchor`.
     anchor : int
     views : sequence of PersonView
@@ -384,7 +384,7 @@ def search_all(rng: np.random.Generator, objective: Objective, state: np.ndarray
     ----------
     rng : numpy.random.Generator
     objective : Objective
-    state : ndarray, shape (33,)
+    state : ndarray, shape (37,)
     settings : PolishSettings
     """
     cost = cost_at(objective, state)

@@ -66,7 +66,7 @@ def annealed(preset: PosePreset) -> Propose:
 
 
 def first_spread(tracked: Tracked, preset: PosePreset) -> np.ndarray:
-    """Deviations of the first layer, shape (33,): P0, and 0 for angles of limbs that are not there."""
+    """Deviations of the first layer, shape (37,): P0, and 0 for angles of limbs that are not there."""
     subject = tracked.subject
     return np.where(subject.free, preset.drift_scale * drift_of(subject.capture), 0.0)
 

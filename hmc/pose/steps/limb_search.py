@@ -76,7 +76,7 @@ def lost_limbs(rng: np.random.Generator, body: BodyModel, state: np.ndarray, mis
     ----------
     rng : numpy.random.Generator
     body : BodyModel
-    state : ndarray, shape (33,)
+    state : ndarray, shape (37,)
         The pose.
     misfit : Misfit
         Of the pose.
@@ -115,7 +115,7 @@ def search_limbs(
     ----------
     rng : numpy.random.Generator
     objective : Objective
-    found : (ndarray of shape (33,), float)
+    found : (ndarray of shape (37,), float)
         The pose, and its cost as the refinement gives it, square metres.
     limbs : sequence of str
         As from `lost_limbs`.
@@ -124,7 +124,7 @@ def search_limbs(
 
     Returns
     -------
-    state : ndarray, shape (33,)
+    state : ndarray, shape (37,)
     cost : float
     evaluations : int
     """

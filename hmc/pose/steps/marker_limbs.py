@@ -59,7 +59,7 @@ def fit_all_points(
     body : BodyModel
         With its markers as tips.
     seen : SeenMarkers
-    state : ndarray, shape (33,)
+    state : ndarray, shape (37,)
         As refined.
     points : ndarray, shape (15, 3)
         What its markers were refined to, world, metres; NaN where nothing was found.
@@ -67,7 +67,7 @@ def fit_all_points(
 
     Returns
     -------
-    state : ndarray, shape (33,)
+    state : ndarray, shape (37,)
     points : ndarray, shape (15, 3)
         As from `refine_to_points`.
     choice : Alternatives
@@ -93,7 +93,7 @@ def fit_all_points(
 
 
 def strain(body: BodyModel, points: np.ndarray, views: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
-    """How badly states, shape (n, 33), fit points, shape (n,), square metres: `point_cost`, and how far they are from rest.
+    """How badly states, shape (n, 37), fit points, shape (n,), square metres: `point_cost`, and how far they are from rest.
 
     Parameters
     ----------
@@ -114,14 +114,14 @@ def refine_to_points(body: BodyModel, seen: SeenMarkers, state: np.ndarray, gate
     body : BodyModel
         With its markers as tips.
     seen : SeenMarkers
-    state : ndarray, shape (33,)
+    state : ndarray, shape (37,)
         Start.
     gate_px : float
         Farther than this from where it should be a detection is not a marker's; half of it the second time.
 
     Returns
     -------
-    state : ndarray, shape (33,)
+    state : ndarray, shape (37,)
     points : ndarray, shape (15, 3)
         Where the markers were seen, world, metres; NaN where not.
     """

@@ -30,7 +30,7 @@ HEADINGS = 12
 SEARCH = AnnealedSettings(layers=14, particles=2000, survival_rate=0.05, spread=0.8)
 SEARCH_SD = {
     "root_t": 0.15, "root_rz": 0.3, "root_r": 0.15,
-    "torso": 0.2, "spine": 0.0, "girdle": 0.0, "neck": 0.2, "shoulder": 0.8, "elbow": 0.8, "hip": 0.4, "knee": 0.5,
+    "torso": 0.2, "spine": 0.0, "girdle": 0.0, "neck": 0.2, "shoulder": 0.8, "elbow": 0.8, "hip": 0.4, "knee": 0.5, "ankle": 0.0,
 }  # fmt: skip
 #: The search near a pose, with so many times those deviations.
 NEAR_SEARCH = AnnealedSettings(layers=8, particles=1000, survival_rate=0.05, spread=0.7)
@@ -61,7 +61,7 @@ def start_poses(rng: np.random.Generator, body: BodyModel, points: np.ndarray, v
     Returns
     -------
     list of (state, cost)
-        States, shape (33,), no two alike, and a cost, square metres: the mean over markers of the squared distance to the nearest point,
+        States, shape (37,), no two alike, and a cost, square metres: the mean over markers of the squared distance to the nearest point,
         with what its views leave in doubt, and of the trusted points to the nearest marker. Empty where there are too few points.
     """
     if len(points) < LEAST_POINTS:
@@ -96,11 +96,11 @@ def search_near(
     body : BodyModel
     points : ndarray, shape (n, 3)
     views : ndarray of int, shape (n,)
-    state : ndarray, shape (33,)
+    state : ndarray, shape (37,)
 
     Returns
     -------
-    state : ndarray, shape (33,)
+    state : ndarray, shape (37,)
     better : bool
         Whether it fits them better, at the cost of `start_poses`.
     """
@@ -132,7 +132,7 @@ def left_over(body: BodyModel, state: np.ndarray, points: np.ndarray, views: np.
     ----------
     body : BodyModel
         With its markers as tips.
-    state : ndarray, shape (33,)
+    state : ndarray, shape (37,)
     points : ndarray, shape (n, 3)
     views : ndarray of int, shape (n,)
     gate_m : float
@@ -150,7 +150,7 @@ def _trust(views: np.ndarray) -> np.ndarray:
 
 
 def point_cost(body: BodyModel, points: np.ndarray, views: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
-    """How badly states, shape (n, 33), fit points: the cost of `start_poses`, shape (n,), square metres.
+    """How badly states, shape (n, 37), fit points: the cost of `start_poses`, shape (n,), square metres.
 
     Parameters
     ----------
@@ -187,7 +187,7 @@ def lay_body(
         With its markers as tips.
     points : ndarray, shape (n, 3)
         World, metres.
-    state : ndarray, shape (33,)
+    state : ndarray, shape (37,)
         Start.
     gates_m : tuple of float
         How far a marker may be from the point that it takes, round by round, metres.
@@ -196,7 +196,7 @@ def lay_body(
 
     Returns
     -------
-    state : ndarray, shape (33,)
+    state : ndarray, shape (37,)
     cost : float
         Mean squared distance of the markers to their points, square metres; that of the last gate for a marker without one. Infinite where
         too few markers found a point.

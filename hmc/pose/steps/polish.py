@@ -78,14 +78,14 @@ def polish(
     ----------
     rng : numpy.random.Generator
     objective : Objective
-    starts : sequence of ndarray, shape (33,)
-    anchor : ndarray, shape (33,)
+    starts : sequence of ndarray, shape (37,)
+    anchor : ndarray, shape (37,)
         Pose on which what no data speaks of is held.
     settings : PolishSettings
 
     Returns
     -------
-    state : ndarray, shape (33,)
+    state : ndarray, shape (37,)
     cost : float
         Square metres.
     evaluations : int

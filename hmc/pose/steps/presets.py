@@ -27,7 +27,7 @@ __all__ = ["PRESETS", "PosePreset", "drift", "drift_of"]
 # Half of the largest variation expected in a thirtieth of a second: metres for the translations, radians for the angles.
 _DRIFT = {
     "root_tx": 0.05, "root_ty": 0.05, "root_tz": 0.04, "root_rz": 0.14, "root_ry": 0.10, "root_rx": 0.08,
-    "torso": 0.08, "spine": 0.04, "girdle": 0.06, "neck": 0.10, "shoulder": 0.30, "elbow": 0.35, "hip": 0.20, "knee": 0.28,
+    "torso": 0.08, "spine": 0.04, "girdle": 0.06, "neck": 0.10, "shoulder": 0.30, "elbow": 0.35, "hip": 0.20, "knee": 0.28, "ankle": 0.06,
 }  # fmt: skip
 
 
@@ -41,7 +41,7 @@ def drift(fps: float) -> np.ndarray:
 
     Returns
     -------
-    ndarray, shape (33,)
+    ndarray, shape (37,)
         Metres and radians.
     """
     scale = float(np.clip(30.0 / fps, 0.5, 3.0))
@@ -53,7 +53,7 @@ def drift(fps: float) -> np.ndarray:
 
 
 def drift_of(capture: Capture) -> np.ndarray:
-    """P0 of a recording: its own, or that of everyday motion at its frame rate; shape (33,)."""
+    """P0 of a recording: its own, or that of everyday motion at its frame rate; shape (37,)."""
     return drift(capture.fps) if capture.drift is None else capture.drift
 
 

@@ -26,9 +26,9 @@ class Proposal:
 
     Parameters
     ----------
-    estimate : ndarray, shape (33,)
+    estimate : ndarray, shape (37,)
         The search's own answer.
-    best : ndarray, shape (33,)
+    best : ndarray, shape (37,)
         From where a refinement starts.
     cost : float
         Of the estimate, in the search's own terms; NaN where it has none.
@@ -39,7 +39,7 @@ class Proposal:
         ``"fitted"``, or why there is no pose.
     annealed : AnnealedInfo or None
     structural : StructuralInfo or None
-    levels : ndarray, shape (n_models, 33), or None
+    levels : ndarray, shape (n_models, 37), or None
     details : mapping
         As in `StepInfo`.
     """

@@ -74,19 +74,19 @@ def refine(
     Parameters
     ----------
     objective : Objective
-    state : ndarray, shape (33,)
+    state : ndarray, shape (37,)
         Start.
     settings : RefineSettings
-    free : ndarray of bool, shape (33,), optional
+    free : ndarray of bool, shape (37,), optional
         Degrees of freedom that may move; all by default.
-    anchor : ndarray, shape (33,), optional
+    anchor : ndarray, shape (37,), optional
         Pose on which the hold pulls; the start by default.
-    deviation : ndarray, shape (33,), optional
+    deviation : ndarray, shape (37,), optional
         Deviations of the hold, metres and radians; .1 m and .5 rad by default.
 
     Returns
     -------
-    state : ndarray, shape (33,)
+    state : ndarray, shape (37,)
         Within the body's joint limits.
     info : RefineInfo
     """
@@ -108,8 +108,8 @@ def refine_best(
     ----------
     objective, settings
         As for `refine`.
-    starts : sequence of ndarray, shape (33,)
-    anchor : ndarray, shape (33,), optional
+    starts : sequence of ndarray, shape (37,)
+    anchor : ndarray, shape (37,), optional
         As for `refine`; each start's own by default.
     trial_steps : int
         Accepted steps after which the best goes on alone.
@@ -118,7 +118,7 @@ def refine_best(
 
     Returns
     -------
-    state : ndarray, shape (33,)
+    state : ndarray, shape (37,)
     info : RefineInfo
         Of the best, with the evaluations of all.
     """
@@ -149,7 +149,7 @@ def refine_all(
     ----------
     objective, settings
         As for `refine`.
-    starts : sequence of ndarray, shape (33,)
+    starts : sequence of ndarray, shape (37,)
     anchor, trial_steps
         As for `refine_best`.
     same_m : float

@@ -78,7 +78,7 @@ def restricted(subject: Subject, keep: np.ndarray, free: np.ndarray | None = Non
     ----------
     subject : Subject
     keep : ndarray of bool, shape (n_parts,)
-    free : ndarray of bool, shape (33,), optional
+    free : ndarray of bool, shape (37,), optional
         Angles that may move; as before by default.
     """
     free = subject.free if free is None else free
@@ -139,7 +139,7 @@ def nearest_part(body: BodyModel, state: np.ndarray, points: np.ndarray) -> np.n
     Parameters
     ----------
     body : BodyModel
-    state : ndarray, shape (33,)
+    state : ndarray, shape (37,)
     points : ndarray, shape (k, 3) or (k, 6)
         As from `hmc.pose.views.rays.points_to_cover`.
 

@@ -71,9 +71,9 @@ def suited(hierarchies: Sequence[Inclusive], state: np.ndarray, there: np.ndarra
     ----------
     hierarchies : sequence of Inclusive
         One, or two.
-    state : ndarray, shape (33,)
+    state : ndarray, shape (37,)
         The last pose.
-    there : ndarray of bool, shape (33,)
+    there : ndarray of bool, shape (37,)
         Angles of limbs that are there: others say nothing.
     """
     hinges = HINGES[there[HINGES]]

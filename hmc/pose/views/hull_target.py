@@ -149,7 +149,7 @@ def make_target(
         hidden[tuple(inside.T)] = True
         np.minimum(distance, look_up(far + UNSEEN_M, near_squares(hidden, reach)), out=distance)
     if floor_z is not None:
-        # Hulls end at the floor because voxels do. A toe that points down, as the body has no ankles, is not outside of them for that; how
+        # Hulls end at the floor because voxels do. A sole is not outside of them for that; how
         # deep a sole may sink is for `hmc.body.floor`.
         layer = ground - int(low[2])
         distance[..., :layer] = distance[..., layer : layer + 1]

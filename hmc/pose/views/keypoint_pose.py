@@ -34,12 +34,12 @@ def keypoint_pose(body: BodyModel, seen: SeenKeypoints | None, start: np.ndarray
     ----------
     body : BodyModel
     seen : SeenKeypoints or None
-    start : ndarray, shape (33,)
+    start : ndarray, shape (37,)
         What keypoints leave open stays near it.
 
     Returns
     -------
-    list of ndarray, shape (33,)
+    list of ndarray, shape (37,)
         One or none.
     """
     if seen is None:
@@ -60,7 +60,7 @@ def standing_pose(body: BodyModel, seen: SeenKeypoints | None) -> list[np.ndarra
 
     Returns
     -------
-    list of ndarray, shape (33,)
+    list of ndarray, shape (37,)
         One or none.
     """
     if seen is None:

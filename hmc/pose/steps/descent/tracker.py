@@ -82,7 +82,7 @@ class TrackState:
 
     Parameters
     ----------
-    state, velocity : ndarray, shape (33,)
+    state, velocity : ndarray, shape (37,)
         Pose and its last change.
     colors : ColorModel or None
         None before the first frame, and where colors do not count.
@@ -122,7 +122,7 @@ def make_tracker(skeleton: BodyModel, preset: SmdPreset) -> SmdTracker:
 
 
 def track_init(state: np.ndarray) -> TrackState:
-    """A person in this pose (33,), at rest."""
+    """A person in this pose (37,), at rest."""
     return TrackState(np.asarray(state, float), np.zeros(len(state)))
 
 
@@ -191,7 +191,7 @@ class CueFrame:
         None: no edges.
     chosen : ndarray of int
         Views that edges are looked for in.
-    base : ndarray, shape (33,)
+    base : ndarray, shape (37,)
         A pose with the waist as it is held.
     """
 
@@ -227,7 +227,7 @@ def make_cue_frame(
     parameters : ndarray, shape (24,)
         Where the body is expected.
     colors : ColorModel, optional
-    base : ndarray, shape (33,), optional
+    base : ndarray, shape (37,), optional
         A pose with the waist as it is to be held; straight by default, as in the paper.
     """
     cues, base = tracker.preset.cues, np.zeros(N_DOF) if base is None else base

@@ -34,7 +34,7 @@ class ScoutReport:
 
     Parameters
     ----------
-    state : ndarray, shape (33,)
+    state : ndarray, shape (37,)
         The body with the limb at the scouts' mean.
     spread_deg : float
         Median spread of the limb's own angles, degrees.
@@ -56,10 +56,10 @@ class ScoutReport:
 
 
 def limb_dofs(settings: LimbSettings, limb: int) -> np.ndarray:
-    """Places in a state of what moves a limb: its own angles, and those of the limbs on which it hangs."""
+    """Places in a state of what places a limb: its own angles, and those of the limbs on which it hangs."""
     tree, dofs = settings.tree, []
     while limb >= 0:
-        dofs.append(tree.limbs[limb].dofs)
+        dofs.append(tree.limbs[limb].placing)
         limb = tree.parent[limb]
     return np.concatenate(dofs)
 
@@ -78,7 +78,7 @@ def scout(
     ----------
     rng : numpy.random.Generator
     looked : FleshInHulls
-    state : ndarray, shape (33,)
+    state : ndarray, shape (37,)
         Estimate of the tracked limbs.
     limb : int
         Place in the tree's `limbs`; what it hangs on must be there.
@@ -97,7 +97,7 @@ def scout(
     def log_likelihood(angles: np.ndarray) -> np.ndarray:
         return log_likelihood_factorised(scores(lean, _with(state, dofs, angles), looked.maps)[:, scored], variances)
 
-    own = tree.limbs[limb].dofs
+    own = tree.limbs[limb].placing
     starts = np.repeat(state[None, dofs], settings.scouts, axis=0)
     broad = np.isin(dofs, own)
     common = settings.scouts // 2

@@ -109,7 +109,7 @@ def place_flesh(looked: FleshInHulls, state: np.ndarray, parts: Collection[str])
     Parameters
     ----------
     looked : FleshInHulls
-    state : ndarray, shape (33,)
+    state : ndarray, shape (37,)
     parts : collection of str
     """
     table, maps = looked.table, looked.maps

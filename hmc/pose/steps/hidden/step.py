@@ -24,7 +24,7 @@ __all__ = ["with_hidden_limbs"]
 
 @dataclass(frozen=True)
 class _There:
-    """What of the body is there: parts, shape (n_parts,), and angles, shape (33,)."""
+    """What of the body is there: parts, shape (n_parts,), and angles, shape (37,)."""
 
     parts: np.ndarray
     dofs: np.ndarray
@@ -104,7 +104,7 @@ def _look(
     for k, limb in enumerate(tree.limbs):
         if memory.active[k]:
             evaluations += 1
-            spread = limb_spread_deg(particles.particles[:, limb.dofs], weights).min()
+            spread = limb_spread_deg(particles.particles[:, limb.placing], weights).min()
             if spread > limbs.lost_spread_deg:
                 evidence[k] = in_doubt(flesh, k, memory.active, limbs)
         elif tree.parent[k] < 0 or memory.active[tree.parent[k]]:
