@@ -78,6 +78,8 @@ def tidied(notebook: nbformat.NotebookNode) -> nbformat.NotebookNode:
         for output in cell.outputs:
             if output.output_type == "stream" and output.name == "stderr":
                 continue  # progress bars
+            if "text" in output:
+                output.text = re.sub(r"[^\s'\"]*/tmp\w{8}/", "", output.text)  # where a temporary folder was
             if "image/png" in output.get("data", {}):
                 output.data = nbformat.NotebookNode({"image/png": smaller(output.data["image/png"])})
                 output.metadata = nbformat.NotebookNode()
