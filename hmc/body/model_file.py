@@ -14,6 +14,9 @@ from hmc.errors import InputError
 
 __all__ = ["read_hierarchy"]
 
+#: No model needs more; deep tables in a larger file would take long to read.
+MAX_BYTES = 100_000
+
 _KEYS = {"inclusive": ("kind", "name", "held", "thinning", "model"), "unitive": ("kind", "name", "leaf", "union", "needs")}
 _MODEL_KEYS = ("name", "angles", "parts")
 _UNION_KEYS = (*_MODEL_KEYS, "of")
@@ -38,8 +41,10 @@ def read_hierarchy(path: str | Path) -> Inclusive | Unitive:
     if not path.is_file():
         raise InputError(f"{path}: there is no such file; a model is 1, 2, auto or a TOML file")
     try:
+        if path.stat().st_size > MAX_BYTES:
+            raise ValueError(f"larger than {MAX_BYTES} bytes")
         content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, OSError, RecursionError) as error:
         raise InputError(f"{path}: not a TOML file ({error})") from None
     kind = content.get("kind")
     if kind not in _KEYS:

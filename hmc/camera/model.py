@@ -20,6 +20,8 @@ __all__ = ["Camera", "Rig", "backproject", "look_at", "project", "undistort"]
 NEAR_M = 1e-6
 #: No image is larger than this on a side.
 MAX_SIDE_PX = 100_000
+#: Pixels, coefficients and places (of any unit) are no larger.
+MAX_NUMBER = 1e12
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,9 +73,11 @@ class Camera:
         def array(label: str) -> np.ndarray:
             try:
                 return np.array(getattr(self, label), float)
-            except (ValueError, TypeError):
+            except (ValueError, TypeError, OverflowError):
                 raise say(f"`{label}` must be numbers; got {str(getattr(self, label))[:60]!r}") from None
 
+        if not self.name.strip(".") or not self.name.isprintable() or set(self.name) & set("/\\"):
+            raise say("a name must be a file's too: neither empty nor dots alone, without / and \\; name the camera otherwise")
         sides = array("size").ravel()
         if sides.shape != (2,) or not np.all(np.isfinite(sides)) or sides.min() < 1 or sides.max() > MAX_SIDE_PX:
             raise say(f"`size` must be [width, height] in pixels; got {sides.tolist()}")
@@ -99,6 +103,8 @@ class Camera:
         for label, value in (("matrix", matrix), ("distortions", distortions), ("rotation", rotation), ("translation", translation)):
             if not np.all(np.isfinite(value)):
                 raise say(f"`{label}` holds a number that is not finite; calibrate this camera again or leave it out")
+            if np.abs(value).max(initial=0.0) > MAX_NUMBER:
+                raise say(f"`{label}` holds {np.abs(value).max():g}, which no camera has; calibrate it again or leave it out")
         if matrix[0, 0] <= 0 or matrix[1, 1] <= 0 or abs(matrix[2, 2] - 1) > 1e-6 or np.abs(matrix[[1, 2, 2], [0, 0, 1]]).max() > 1e-6:
             raise say("`matrix` is no intrinsic matrix [[fx, s, cx], [0, fy, cy], [0, 0, 1]] with positive focal lengths")
         if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-3 or np.linalg.det(rotation) < 0:

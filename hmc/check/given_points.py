@@ -15,6 +15,7 @@ from hmc.camera.model import Rig, project
 from hmc.camera.triangulation import triangulate_pixels
 from hmc.camera.world import World
 from hmc.errors import InputError
+from hmc.io.door import open_text
 
 __all__ = ["GroundPoints", "board_points", "read_points"]
 
@@ -65,7 +66,7 @@ def read_points(path: Path, rig: Rig) -> GroundPoints:
         When the file is not of this form, or points do not lie as they should.
     """
     try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
+        with open_text(path) as file:
             rows = list(csv.DictReader(file))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path}: cannot be read as CSV ({error})") from None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from hmc.cli.common import add_session_option, camera_names, given_places
+from hmc.cli.common import add_session_option, camera_names, given_places, output_path
 
 __all__ = ["add_parser", "run"]
 
@@ -21,7 +21,7 @@ def add_parser(subparsers) -> None:
     )
     parser.add_argument("recording", type=Path, help="folder of the recording")
     add_session_option(parser)
-    parser.add_argument("--out", type=Path, default=None, metavar="FILE.png", help="the picture (default: NAME_check.png here)")
+    parser.add_argument("--out", type=output_path, default=None, metavar="FILE.png", help="the picture (default: NAME_check.png here)")
     parser.add_argument("--cameras", type=camera_names, default=None, metavar="A,B,...", help="look at these cameras only (default: all)")
     parser.add_argument("--all", action="store_true", help="read every frame (default: the first 90)")
 

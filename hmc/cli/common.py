@@ -15,12 +15,15 @@ __all__ = [
     "add_session_option",
     "add_workers_option",
     "camera_names",
+    "file_digest",
     "gather_problems",
     "given_places",
     "image_parameters",
     "load_given_plugins",
+    "note_changes",
     "open_given_keypoints",
     "open_selected",
+    "output_path",
     "places_source",
     "positive_float",
     "print_problems",
@@ -29,6 +32,7 @@ __all__ = [
     "selected_workers",
     "was_finished",
     "whole_number",
+    "written_digests",
 ]
 
 T = TypeVar("T")
@@ -167,6 +171,15 @@ def print_problems(problems: Iterable[str]) -> None:
         print(f"note: {problem}", file=sys.stderr)
 
 
+def output_path(text: str) -> Path:
+    """argparse type: where something is to be written, whose name can be typed again: no sign before, no blank around it."""
+    path = Path(text)
+    odd = [part for part in path.parts if part != part.strip() or part.startswith("-") or not part.isprintable()]
+    if odd or not text:
+        raise argparse.ArgumentTypeError(f"{text!r}: names of files and folders may not begin with - or have blanks around them")
+    return path
+
+
 def whole_number(text: str) -> int:
     """argparse type: an integer of zero or more."""
     value = int(text) if text.strip().isdigit() else -1
@@ -211,6 +224,26 @@ def places_source(places) -> dict[str, Any]:
     return source | ({"given": given} if given else {})
 
 
+def file_digest(path: Path) -> str:
+    """Digest of a file, 16 hexadecimal digits."""
+    from hashlib import sha256
+
+    from hmc.io.door import read_bytes
+
+    return sha256(read_bytes(path)).hexdigest()[:16]
+
+
+def written_digests(written: Sequence[Path]) -> dict[str, str]:
+    """What `run.toml` says of the results beside it, by which `was_finished` tells a damaged one."""
+    return {path.name: file_digest(path) for path in written}
+
+
+def note_changes(recording, source: Mapping[str, Any], problems: list[str]) -> None:
+    """Add to the problems that files of a recording are not those that a run began with."""
+    if recording_source(recording)["recording_changed"] != source["recording_changed"]:
+        problems.append(f"{recording.path}: its files changed during the run, of which the result may have both; delete it and run again")
+
+
 def was_finished(written: Sequence[Path], run_path: Path, depends_on: Mapping[str, Any]) -> bool:
     """Whether a run wrote all of its files before, with the same parameters; says so, or that they were others.
 
@@ -222,13 +255,23 @@ def was_finished(written: Sequence[Path], run_path: Path, depends_on: Mapping[st
         Its `run.toml`.
     depends_on : mapping
         Method, seed, recording and parameters.
+
+    Raises
+    ------
+    InputError
+        When a result is not as the run wrote it.
     """
+    from hmc.errors import InputError
     from hmc.io.files import to_toml
     from hmc.io.results import read_run
 
     if not all(path.exists() for path in (*written, run_path)):
         return False
     before = read_run(run_path)
+    for path in written:
+        said = before.get("written", {})
+        if isinstance(said, dict) and path.name in said and said[path.name] != file_digest(path):
+            raise InputError(f"{path}: is not as its run wrote it (changed, or damaged); delete it to compute it again")
     if to_toml({name: before.get(name) for name in depends_on}) != to_toml(depends_on):
         print(f"{run_path.parent}: its result has other parameters or another recording; starting anew")
         return False

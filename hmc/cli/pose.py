@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +15,10 @@ from hmc.cli.common import (
     gather_problems,
     image_parameters,
     load_given_plugins,
+    note_changes,
     open_given_keypoints,
     open_selected,
+    output_path,
     positive_float,
     print_problems,
     progress,
@@ -23,6 +26,7 @@ from hmc.cli.common import (
     selected_workers,
     was_finished,
     whole_number,
+    written_digests,
 )
 from hmc.cli.kept import MASKS, add_silhouette_options, given_silhouettes, leave_silhouettes, silhouettes_source, take_silhouettes
 from hmc.cli.option_tables import add_like_option, repeated_preset, told_options
@@ -53,7 +57,7 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     )
     add_selection_options(parser)
     add_workers_option(parser)
-    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the result")
+    parser.add_argument("--out", type=output_path, required=True, metavar="DIR", help="folder of the result")
     add_like_option(parser)
     parser.add_argument(
         "--method",
@@ -129,9 +133,15 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
+    with ExitStack() as held:
+        return _run(args, held)
+
+
+def _run(args: argparse.Namespace, held: ExitStack) -> int:
     from hmc.errors import InputError
     from hmc.io.files import to_toml
     from hmc.io.fits import write_fits
+    from hmc.io.lock import only_run
     from hmc.io.results import write_run, write_tracks
     from hmc.pose.backward import backward
     from hmc.pose.clear_views import with_clear_views
@@ -191,6 +201,7 @@ def run(args: argparse.Namespace) -> int:
         source |= markers.source
     depends_on = {"method": name, "seed": args.seed, **source, "parameters": parameters}
     key, paths = to_toml(depends_on), {name: args.out / name for name in RESULTS}
+    held.enter_context(only_run(args.out))
     if was_finished([paths[name] for name in RESULTS[:3]], paths["run.toml"], depends_on):
         return 0
 
@@ -238,7 +249,10 @@ def run(args: argparse.Namespace) -> int:
     people.save(args.out)
     if any(people.details):
         write_fits(args.out / "fits.csv", people.frames.tolist(), people.persons.tolist(), people.status, people.details)
-    write_run(paths["run.toml"], name, parameters, args.seed, **source, options=told_options(args), problems=gather_problems(problems))
+    note_changes(recording, source, problems)
+    said = {"options": told_options(args), "problems": gather_problems(problems)}
+    said["written"] = written_digests([paths[result] for result in RESULTS[:3]])
+    write_run(paths["run.toml"], name, parameters, args.seed, **source, **said)
     for name in (JOURNAL, POSE_JOURNAL, BACK_JOURNAL, MARKERS_JOURNAL, MASKS):
         for file in args.out.glob(f"{name}*"):
             file.unlink()

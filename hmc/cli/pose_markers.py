@@ -159,7 +159,7 @@ def _detect(args: argparse.Namespace, recording, labels: Path, settings, journal
     for camera in range(len(recording.rig)):
         without = list(background_frames(recording, camera, limit=BACKGROUND_FRAMES))
         empty.append(np.median(np.stack(without), axis=0).astype(np.uint8) if without else None)
-    records = open_journal(journal, key)
+    records = open_journal(journal, key, problems.append)
     first = recording.start + len(records)
     steps = iterate_frames(recording, first=first, on_problem=problems.append) if first < recording.start + recording.n_frames else iter(())
     for frame in progress(steps, recording.start + recording.n_frames - first, "markers", args.quiet):

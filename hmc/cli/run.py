@@ -13,7 +13,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from hmc.cli.common import add_workers_option, camera_names, whole_number
+from hmc.cli.common import add_workers_option, camera_names, output_path, whole_number
 from hmc.cli.one_trial import TrialOptions, pose_arguments, run_trial
 from hmc.errors import InputError
 
@@ -34,7 +34,7 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
         "setting changed. A trial that fails does not stop the others: it is told at the end, by the exit code too (2: input was wrong).",
     )
     parser.add_argument("session", type=Path, metavar="SESSION", help="session.toml, or its folder")
-    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the results")
+    parser.add_argument("--out", type=output_path, required=True, metavar="DIR", help="folder of the results")
     parser.add_argument(
         "--trials",
         type=camera_names,

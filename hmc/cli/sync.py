@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from hmc.cli.common import positive_float, whole_number
+from hmc.cli.common import output_path, positive_float, whole_number
 
 __all__ = ["add_parser", "run"]
 
@@ -31,7 +31,7 @@ def add_parser(subparsers) -> None:
     parser.add_argument(
         "--frames", type=whole_number, default=FRAMES, metavar="N", help="look at so many frames from the start (default: %(default)s)"
     )
-    parser.add_argument("--out", type=Path, default=None, metavar="FILE.png", help="the picture (default: NAME_sync.png here)")
+    parser.add_argument("--out", type=output_path, default=None, metavar="FILE.png", help="the picture (default: NAME_sync.png here)")
     parser.add_argument("--dry-run", action="store_true", help="tell and draw, and write nothing into the recording")
 
 

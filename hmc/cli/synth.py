@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import argparse
 import os
-from pathlib import Path
 
-from hmc.cli.common import whole_number
+from hmc.cli.common import output_path, whole_number
 
 __all__ = ["add_parser", "run"]
 
@@ -20,7 +19,7 @@ def add_parser(subparsers) -> None:
     )
     parser.add_argument("recipe", metavar="RECIPE", help="a TOML file, or the name of a shipped recipe (data/synthetic), such as demo")
     parser.add_argument(
-        "--out", type=Path, required=True, metavar="RECORDING", help="folder to make; a rendered recording there is replaced"
+        "--out", type=output_path, required=True, metavar="RECORDING", help="folder to make; a rendered recording there is replaced"
     )
     parser.add_argument("--seed", type=whole_number, default=None, metavar="N", help="in place of the recipe's seed")
     parser.add_argument("--workers", type=whole_number, default=None, metavar="N", help="processes (default: one a core)")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hmc.cli.common import (
@@ -16,8 +16,10 @@ from hmc.cli.common import (
     gather_problems,
     image_parameters,
     load_given_plugins,
+    note_changes,
     open_given_keypoints,
     open_selected,
+    output_path,
     positive_float,
     print_problems,
     progress,
@@ -25,6 +27,7 @@ from hmc.cli.common import (
     selected_workers,
     was_finished,
     whole_number,
+    written_digests,
 )
 from hmc.cli.kept import MASKS, add_silhouette_options, given_silhouettes, leave_silhouettes, silhouettes_source, take_silhouettes
 from hmc.cli.option_tables import add_like_option, told_options
@@ -61,7 +64,7 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     )
     add_selection_options(parser)
     add_workers_option(parser)
-    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the result")
+    parser.add_argument("--out", type=output_path, required=True, metavar="DIR", help="folder of the result")
     add_like_option(parser)
     add_tracker_options(parser)
     add_plugin_option(parser)
@@ -135,8 +138,14 @@ def selected_tracker(args: argparse.Namespace):
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
+    with ExitStack() as held:
+        return _run(args, held)
+
+
+def _run(args: argparse.Namespace, held: ExitStack) -> int:
     from hmc.errors import InputError
     from hmc.io.files import to_toml
+    from hmc.io.lock import only_run
     from hmc.io.results import read_tracks, write_run, write_tracks
     from hmc.voxels.run_options import RunOptions
 
@@ -160,6 +169,7 @@ def run(args: argparse.Namespace) -> int:
     source = recording_source(recording) | silhouettes_source(silhouettes)
     depends_on = {"method": work.method, "seed": args.seed, **source, "parameters": parameters}
     key = to_toml(depends_on)
+    held.enter_context(only_run(args.out))
     if was_finished([tracks_path], run_path, depends_on):
         print(_summary(read_tracks(tracks_path), recording.n_frames))
         return 0
@@ -181,9 +191,9 @@ def run(args: argparse.Namespace) -> int:
         leave_silhouettes(args, work.recording, key, problems.append)
     write_tracks(tracks_path, table)
     speed = {name: value for timing in timings for name, value in _speed(timing, recording.fps).items()}
-    write_run(
-        run_path, work.method, parameters, args.seed, **source, options=told_options(args), problems=gather_problems(problems), speed=speed
-    )
+    note_changes(recording, source, problems)
+    said = {"options": told_options(args), "problems": gather_problems(problems), "speed": speed, "written": written_digests([tracks_path])}
+    write_run(run_path, work.method, parameters, args.seed, **source, **said)
     for path in (journal, args.out / MASKS):
         path.unlink(missing_ok=True)
     print(_summary(table, recording.n_frames))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from hmc.cli.common import add_selection_options, open_selected, positive_float, print_problems, progress, whole_number
+from hmc.cli.common import add_selection_options, open_selected, output_path, positive_float, print_problems, progress, whole_number
 from hmc.errors import InputError
 
 __all__ = ["add_parser", "run"]
@@ -25,7 +25,7 @@ def add_parser(subparsers) -> None:
     parser.add_argument("directory", type=Path, metavar="DIR", help="folder of the result, with joints.csv or tracks.csv")
     add_selection_options(parser)
     parser.add_argument(
-        "--out", type=Path, required=True, metavar="FILE", help="FILE.mp4 (video), FILE.png (picture), FILE.html (page) or FILE.rrd (Rerun)"
+        "--out", type=output_path, required=True, metavar="FILE", help="FILE.mp4 (video), .png (picture), .html (page) or .rrd (Rerun)"
     )
     parser.add_argument("--frame", type=whole_number, nargs="+", metavar="N", help="frames of a picture")
     parser.add_argument("--voxel", type=positive_float, default=0.04, metavar="M", help="voxel size in the panel, metres (default: 0.04)")

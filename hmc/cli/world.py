@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from hmc.cli.common import positive_float
+from hmc.cli.common import output_path, positive_float
 
 __all__ = ["add_parser", "run"]
 
@@ -49,7 +49,7 @@ def add_parser(subparsers) -> None:
         help="a chessboard of so many inner corners lies on the floor in the first images",
     )
     parser.add_argument("--square", type=positive_float, default=None, metavar="M", help="side of that board's squares, metres")
-    parser.add_argument("--out", type=Path, default=None, metavar="FILE.png", help="the picture (default: NAME_world.png here)")
+    parser.add_argument("--out", type=output_path, default=None, metavar="FILE.png", help="the picture (default: NAME_world.png here)")
     parser.add_argument("--dry-run", action="store_true", help="tell and draw, and write no calibration")
 
 

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from hmc.errors import InputError
+from hmc.io.door import read_bytes
 
 __all__ = ["PointData", "read_c3d"]
 
@@ -70,13 +71,10 @@ def read_c3d(path: str | Path) -> PointData:
         When the file cannot be read, is no C3D file, or has no points.
     """
     path = Path(path)
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"{path}: cannot read it ({error.strerror})") from error
+    content = read_bytes(path)
     try:
         return _parse(content)
-    except (struct.error, IndexError, KeyError, ValueError, UnicodeDecodeError) as error:
+    except (struct.error, IndexError, KeyError, ValueError, TypeError, OverflowError) as error:
         raise InputError(f"{path}: not a C3D file, or a damaged one ({error}); copy it again") from error
 
 

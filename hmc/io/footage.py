@@ -16,6 +16,7 @@ import numpy as np
 
 from hmc.errors import InputError
 from hmc.io.calibration import natural_key
+from hmc.io.door import MAX_FRAME_NUMBER, check_file, limit, read_image
 from hmc.io.naming import IMAGE_SUFFIXES, VIDEO_SUFFIXES
 
 __all__ = [
@@ -147,8 +148,12 @@ def open_video(path: Path, count: bool = True) -> Footage:
     InputError
         When the file cannot be opened or holds no frame.
     """
+    check_file(path)
     capture = cv2.VideoCapture(str(path))
     try:
+        width, height = (capture.get(prop) for prop in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT))
+        if width * height > limit("HMC_MAX_IMAGE_MPIXEL") * 1e6:
+            raise InputError(f"{path}: {width:.0f} x {height:.0f} pixels are too many; make it smaller, or set HMC_MAX_IMAGE_MPIXEL higher")
         image = capture.read()[1] if capture.isOpened() else None
         if image is None:
             raise InputError(f"{path}: this video cannot be read (empty, cut off or of an unknown codec); copy or convert it again")
@@ -229,8 +234,15 @@ def _footage_of_images(path: Path, images: dict[int, Path], first_number: int = 
     images = {number - first_number: file for number, file in images.items() if number >= first_number}
     if not images:
         raise InputError(f"{path}: no image in this folder ({', '.join(sorted(IMAGE_SUFFIXES))}); fill or remove it")
+    if max(images) > MAX_FRAME_NUMBER:
+        raise InputError(f"{images[max(images)]}: a frame number in its name is above {MAX_FRAME_NUMBER}; rename or remove it")
     for file in images.values():
-        image = cv2.imread(str(file), cv2.IMREAD_COLOR)
+        try:
+            image = read_image(file)
+        except InputError:
+            if len(images) == 1:
+                raise
+            continue
         if image is not None:
             return Footage(path, max(images) + 1, (image.shape[1], image.shape[0]), images)
     raise InputError(f"{path}: none of its {len(images)} images can be read; copy or convert them again")
@@ -362,4 +374,7 @@ def _read_video(footage: Footage, first: int, last: int) -> Iterator[np.ndarray 
 
 def _read_images(images: dict[int, Path], first: int, last: int) -> Iterator[np.ndarray | None]:
     for index in range(first, last):
-        yield cv2.imread(str(images[index]), cv2.IMREAD_COLOR) if index in images else None
+        try:
+            yield read_image(images[index]) if index in images else None
+        except InputError:
+            yield None  # told as a frame that cannot be read

@@ -2,7 +2,7 @@
 
 One file, to which each frame is appended, packed to bits and deflated: 1.2 kB a silhouette of 640 x 480 (measured), and as much again
 for doubts in the few frames that have any. An hour of seven cameras at 30 frames a second takes 0.9 GB. What is read back is bit for bit
-what was kept. Frames of which a killed run wrote only a part are dropped.
+what was kept. Frames of which a killed run wrote only a part, and all after one that is damaged, are dropped.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ Masks = tuple[np.ndarray | None, ...]
 #: Called with one line for everything that was survived.
 Report = Callable[[str], None]
 
-#: Before each frame: its number, and the bytes that follow.
-FRAME = struct.Struct("<II")
+#: Before each frame: its number, the bytes that follow, and a checksum of both.
+FRAME = struct.Struct("<III")
 #: Before each mask: height and width (0 where there is none), and the bytes that follow.
 MASK = struct.Struct("<III")
 #: Quickest: others save a tenth of the bytes for thrice the time.
@@ -90,7 +90,7 @@ def keep_masks(path: str | Path, key: str, first: int, steps: Iterable[Step], on
                     _begin(path, key, first)
                 record = b"".join(_packed(mask) for mask in (*step.masks, *step.doubtful))
                 with open(path, "ab") as file:
-                    file.write(FRAME.pack(step.index, len(record)) + record)
+                    file.write(FRAME.pack(step.index, len(record), zlib.crc32(record, step.index)) + record)
             except OSError as error:
                 keeping = False
                 with suppress(OSError):
@@ -133,7 +133,7 @@ def kept_frames(path: str | Path, key: str, frames: Iterable[int]) -> Iterator[M
 
 
 def _header(key: str) -> bytes:
-    return b"hmc masks 1 " + sha256(key.encode()).hexdigest().encode() + b"\n"
+    return b"hmc masks 2 " + sha256(key.encode()).hexdigest().encode() + b"\n"
 
 
 def _begin(path: Path, key: str, first: int) -> None:
@@ -157,11 +157,11 @@ def _places(path: Path, key: str) -> dict[int, tuple[int, int]]:
         if file.read(len(header)) != header:
             return places
         while len(head := file.read(FRAME.size)) == FRAME.size:
-            index, length = FRAME.unpack(head)
-            if file.tell() + length > size:
+            index, length, checksum = FRAME.unpack(head)
+            start = file.tell()
+            if start + length > size or zlib.crc32(file.read(length), index) != checksum:
                 break
-            places[index] = file.tell(), length
-            file.seek(length, 1)
+            places[index] = start, length
     return places
 
 

@@ -20,7 +20,6 @@ from __future__ import annotations
 import difflib
 import math
 import reprlib
-import tomllib
 import types
 import typing
 from collections.abc import Iterator, Mapping, Sequence
@@ -29,6 +28,7 @@ from pathlib import Path
 from typing import Any, Literal, TypeVar
 
 from hmc.errors import InputError
+from hmc.io.door import read_toml_file
 from hmc.io.files import to_toml
 
 __all__ = ["SettingsTable", "changed", "read_settings_table"]
@@ -63,12 +63,7 @@ def read_settings_table(path: str | Path) -> SettingsTable:
     InputError
         When it cannot be read.
     """
-    try:
-        return SettingsTable(str(path), tomllib.loads(Path(path).read_text(encoding="utf-8")))
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: not a TOML file ({error}); mend it") from None
+    return SettingsTable(str(path), read_toml_file(path))
 
 
 def changed(value: T, tables: Sequence[SettingsTable]) -> T:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hmc.io.door import read_text_file
 from hmc.io.files import atomic_write
 from hmc.io.new_world import keep_before
 from hmc.io.timing import times_file, write_times
@@ -34,7 +35,7 @@ def write_new_timing(path: Path, first_frames: Mapping[str, int], times: Mapping
     """
     lines = []
     file = path / "recording.toml"
-    text = file.read_text(encoding="utf-8") if file.is_file() else ""
+    text = read_text_file(file) if file.is_file() else ""
     new = with_first_frames(text, first_frames)
     if new != text:
         kept = f"; kept what was there: {keep_before(file)}" if file.is_file() else ""

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from hmc.camera.model import Rig
 from hmc.io.calibration import write_calibration
+from hmc.io.door import read_text_file
 
 __all__ = ["keep_before", "write_new_world"]
 
@@ -38,7 +39,7 @@ def write_new_world(path: Path, rig: Rig) -> list[str]:
     write_calibration(target, rig)
     lines.insert(0, f"written: {target}")
     if settings.is_file():
-        text = settings.read_text(encoding="utf-8")
+        text = read_text_file(settings)
         new, taken = without_old_terms(text)
         if taken:
             kept = keep_before(settings)

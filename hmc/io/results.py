@@ -6,9 +6,6 @@ Nothing here is pickled, so loading a result never runs code; every file appears
 
 from __future__ import annotations
 
-import tomllib
-import zipfile
-import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,9 +14,10 @@ from typing import Any
 import numpy as np
 
 from hmc.errors import InputError
+from hmc.io.door import MAX_FRAME_NUMBER, read_arrays, read_toml_file
 from hmc.io.files import atomic_write, write_toml
 from hmc.io.provenance import code_state, library_versions
-from hmc.io.tables import integer_column, read_columns
+from hmc.io.tables import frame_column, integer_column, read_columns
 from hmc.landmarks import LANDMARKS
 
 __all__ = [
@@ -194,7 +192,8 @@ def read_joints(path: str | Path, names: Sequence[str] = LANDMARKS) -> PoseTable
     """
     path = Path(path)
     columns, lines = read_columns(path, JOINT_COLUMNS)
-    frames, persons = (integer_column(path, name, columns[name], lines) for name in ("frame", "person"))
+    frames = frame_column(path, columns["frame"], lines)
+    persons = integer_column(path, "person", columns["person"], lines)
     places = {name: place for place, name in enumerate(names)}
     joints = np.array([places.get(name.strip(), -1) for name in columns["joint"]], int)
     if (joints < 0).any():
@@ -253,7 +252,8 @@ def read_centroids(path: str | Path) -> TrackTable:
 
 def _read_positions(path: Path, heads_needed: bool) -> TrackTable:
     columns, lines = read_columns(path, TRACK_COLUMNS + (HEAD_COLUMNS if heads_needed else ()))
-    frames, persons = (integer_column(path, name, columns[name], lines) for name in ("frame", "person"))
+    frames = frame_column(path, columns["frame"], lines)
+    persons = integer_column(path, "person", columns["person"], lines)
     positions = _points(path, ("x", "y", "z"), columns, lines)
     heads = _points(path, HEAD_COLUMNS, columns, lines) if set(HEAD_COLUMNS) <= set(columns) else None
     _, cells = np.unique(np.stack([frames, persons], axis=1), axis=0, return_inverse=True)
@@ -319,20 +319,27 @@ def read_pose(path: str | Path) -> PoseStates:
     InputError
         When the file is missing, damaged, or not such a file.
     """
+    data = read_arrays(path)
     try:
-        with open(path, "rb") as file, np.load(file, allow_pickle=False) as data:
-            bodies: dict[int, dict[str, np.ndarray]] = {}
-            for key in data.files:
-                if key.startswith("body/"):
-                    _, person, name = key.split("/", 2)
-                    bodies.setdefault(int(person), {})[name] = data[key]
-            names = tuple(str(name) for name in data["dof_names"])
-            costs = data["costs"] if "costs" in data.files else None
-            return PoseStates(data["frames"], data["persons"], data["states"], names, bodies, costs)
-    except OSError as error:
-        raise InputError(f"{path}: cannot read the poses ({error.strerror or error})") from error
-    except (ValueError, KeyError, EOFError, TypeError, AttributeError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
+        bodies: dict[int, dict[str, np.ndarray]] = {}
+        for key, values in data.items():
+            if key.startswith("body/"):
+                _, person, name = key.split("/", 2)
+                values = np.asarray(values, float)
+                if not np.isfinite(values).all():
+                    raise ValueError(f"{key} is not finite")
+                bodies.setdefault(int(person), {})[name] = values
+        names = tuple(str(name) for name in data["dof_names"])
+        _refuse_far(data["frames"])
+        return PoseStates(data["frames"], data["persons"], data["states"], names, bodies, data.get("costs"))
+    except (ValueError, KeyError, TypeError, OverflowError) as error:
         raise InputError(f"{path}: not a pose file of this program ({error})") from error
+
+
+def _refuse_far(frames: np.ndarray) -> None:
+    """Frame numbers that no recording has."""
+    if frames.size and (frames.dtype.kind not in "iu" or frames.min() < 0 or frames.max() > MAX_FRAME_NUMBER):
+        raise ValueError(f"frames must be from 0 to {MAX_FRAME_NUMBER}")
 
 
 def write_run(path: str | Path, method: str, parameters: Mapping[str, Any], seed: int | None, **more: Any) -> None:
@@ -361,13 +368,7 @@ def read_run(path: str | Path) -> dict[str, Any]:
     InputError
         When the file is missing or is not TOML.
     """
-    try:
-        with open(path, "rb") as file:
-            return tomllib.load(file)
-    except OSError as error:
-        raise InputError(f"{path}: cannot read it ({error.strerror})") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: not a TOML file ({error}); mend it, or delete it and run again") from error
+    return read_toml_file(path)
 
 
 def run_selection(directory: str | Path) -> tuple[int, int | None]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
-import tomllib
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from hmc.errors import InputError
+from hmc.io.door import MAX_FRAME_NUMBER, read_toml_file
 from hmc.io.naming import FILES, PLACE
 from hmc.io.sizes import FITS
 from hmc.io.world import UNITS, UPS
@@ -32,13 +33,9 @@ def read_settings(path: Path) -> dict[str, Any]:
         When a key is unknown or its value is not what it must be.
     """
     file = path / "recording.toml"
-    if not file.is_file():
+    if not os.path.lexists(file):
         return {}
-    try:
-        settings = tomllib.loads(file.read_text(encoding="utf-8-sig"))
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{file}: not a TOML file ({error}); mend or remove it") from None
-    return check_settings(settings, file)
+    return check_settings(read_toml_file(file), file)
 
 
 def check_settings(settings: Mapping[str, Any], file: Path) -> dict[str, Any]:
@@ -79,11 +76,14 @@ def _checked(settings: Mapping[str, Any], file: Path) -> dict[str, Any]:
         table = isinstance(files, dict) and all(isinstance(file, str) and file for file in files.values())
         demand(key, pattern or table, f'a table {{ cam_00 = "{key}/FILE" }} or a pattern such as "{key}/{PLACE}_*.mp4"')
     demand("fps", is_number(fps) and fps > 0, "a number above 0")
+    demand("fps", is_number(fps) and 1e-3 <= fps <= 1e5, "frames a second, .001 to 100,000")
     for key, least in (("frames", 1), ("persons", 0)):
         value = settings.get(key)
         demand(key, isinstance(value, int) and not isinstance(value, bool) and value >= least, f"a whole number, {least} or more")
     starts = settings.get("first_frame", {})
-    whole = isinstance(starts, dict) and all(isinstance(n, int) and not isinstance(n, bool) and n >= 0 for n in starts.values())
+    whole = isinstance(starts, dict) and all(
+        isinstance(n, int) and not isinstance(n, bool) and 0 <= n <= MAX_FRAME_NUMBER for n in starts.values()
+    )
     demand("first_frame", whole, "a table of cameras, each with the frame of its video that is frame 0 of the recording: { cam_00 = 12 }")
     if "subject_height_m" in settings:
         heights = settings["subject_height_m"] if isinstance(settings["subject_height_m"], list) else [settings["subject_height_m"]]
@@ -92,7 +92,7 @@ def _checked(settings: Mapping[str, Any], file: Path) -> dict[str, Any]:
     if "room" in settings:
         try:
             room = np.array(settings["room"], float)
-        except (ValueError, TypeError):
+        except (ValueError, TypeError, OverflowError):
             room = np.zeros(0)
         fine = room.shape == (2, 3) and bool(np.all(np.isfinite(room))) and bool(np.all(room[1] > room[0]))
         demand("room", fine, "[[x0, y0, z0], [x1, y1, z1]] in metres, lower corner first")

@@ -18,6 +18,7 @@ import numpy as np
 
 from hmc.camera.reduction import reduce_mask
 from hmc.errors import InputError
+from hmc.io.door import read_image
 from hmc.io.masks import MaskStep
 from hmc.io.recording import Recording
 from hmc.io.results import read_run
@@ -86,7 +87,7 @@ class KeptSilhouettes:
         path = _file(self.directory, kind, recording.rig.names[camera], index)
         if not path.is_file():
             return None
-        image, factor = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE), recording.factors[camera]
+        image, factor = read_image(path, cv2.IMREAD_GRAYSCALE), recording.factors[camera]
         if image is None:
             raise InputError(f"{path}: cannot be read; remove {path.parents[1]} and the silhouettes are made anew")
         size = tuple(side // factor for side in image.shape[::-1])

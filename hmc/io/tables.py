@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from hmc.errors import InputError
+from hmc.io.door import MAX_FRAME_NUMBER, open_text
 
-__all__ = ["integer_column", "read_columns"]
+__all__ = ["frame_column", "integer_column", "read_columns"]
 
 
 def read_columns(path: Path, needed: Sequence[str]) -> tuple[dict[str, tuple[str, ...]], np.ndarray]:
@@ -33,7 +34,7 @@ def read_columns(path: Path, needed: Sequence[str]) -> tuple[dict[str, tuple[str
         When the file cannot be read, is no such table or lacks a column; with the line.
     """
     try:
-        with open(path, encoding="utf-8-sig", newline="") as file:
+        with open_text(path) as file:
             reader = csv.reader(file)
             header = [name.strip() for name in next(reader, [])]
             missing = [name for name in needed if name not in header]
@@ -48,7 +49,7 @@ def read_columns(path: Path, needed: Sequence[str]) -> tuple[dict[str, tuple[str
                 rows.append(row)
                 lines.append(reader.line_num)
     except OSError as error:
-        raise InputError(f"{path}: cannot read the table ({error.strerror})") from error
+        raise InputError(f"{path}: cannot be read ({error.strerror})") from error
     except (UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path}: not a table of comma-separated text ({error})") from error
     cells = list(zip(*rows, strict=True)) if rows else [()] * len(header)
@@ -76,3 +77,19 @@ def integer_column(path: Path, name: str, cells: Sequence[str], lines: np.ndarra
     except (ValueError, OverflowError):
         row = next(row for row, cell in enumerate(cells) if not cell.strip().lstrip("+-").isdigit() or len(cell) > 18)
         raise InputError(f"{path}, line {lines[row]}: `{name}` must be a whole number; got {cells[row]!r}") from None
+
+
+def frame_column(path: Path, cells: Sequence[str], lines: np.ndarray) -> np.ndarray:
+    """The column of frame numbers, shape (n,). Arguments as `integer_column`.
+
+    Raises
+    ------
+    InputError
+        When a cell is no whole number from 0 to `MAX_FRAME_NUMBER`; with its line.
+    """
+    frames = integer_column(path, "frame", cells, lines)
+    wrong = (frames < 0) | (frames > MAX_FRAME_NUMBER)
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        raise InputError(f"{path}, line {lines[row]}: `frame` must be from 0 to {MAX_FRAME_NUMBER}; got {cells[row]!r}")
+    return frames

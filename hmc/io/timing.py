@@ -6,12 +6,14 @@ Times are needed where cameras differ in rate, drop frames or have a clock of th
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from hmc.errors import InputError
+from hmc.io.door import MAX_FRAME_NUMBER, read_text_file
 from hmc.io.files import atomic_write
 from hmc.io.footage import Footage, stamps
 
@@ -77,12 +79,9 @@ def read_times(file: Path) -> np.ndarray | None:
     InputError
         When it is not of that form, or time does not rise.
     """
-    if not file.is_file():
+    if not os.path.lexists(file):
         return None
-    try:
-        lines = [line.strip() for line in file.read_text(encoding="utf-8").splitlines() if line.strip()]
-    except UnicodeDecodeError:
-        lines = []
+    lines = [line.strip() for line in read_text_file(file).splitlines() if line.strip()]
     if not lines or lines[0].replace(" ", "") != HEAD:
         raise InputError(f"{file}: its first line must be `{HEAD}`: a frame of the camera's files and its time in seconds, a line each")
     rows: dict[int, float] = {}
@@ -92,7 +91,7 @@ def read_times(file: Path) -> np.ndarray | None:
             rows[int(frame)] = float(time)
         except ValueError:
             raise InputError(f"{file}: line {number} is no frame and time in seconds, as in 12,0.4: {line[:40]!r}") from None
-    if not rows or min(rows) < 0 or not np.isfinite(list(rows.values())).all():
+    if not rows or min(rows) < 0 or max(rows) > MAX_FRAME_NUMBER or not np.isfinite(list(rows.values())).all():
         raise InputError(f"{file}: must hold the times of frames from 0 on, in seconds; mend or remove it")
     frames = sorted(rows)
     seconds = np.array([rows[frame] for frame in frames])

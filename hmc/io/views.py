@@ -173,10 +173,14 @@ def gaps(views: Sequence[Footage | None]) -> list[str]:
     """A sentence for each camera whose numbered images have holes."""
     sentences = []
     for view in views:
-        taken = [] if view is None else [frame for frame in range(view.n_frames) if view.in_file(frame) is not None]
-        missing = [] if view is None or view.images is None else sorted(set(taken) - view.images.keys())
-        if view is not None and missing:
-            sentences.append(f"{view.path}: {len(missing)} of {view.n_frames} images are missing, the first is frame {missing[0]}")
+        if view is None or view.images is None:
+            continue
+        images = view.images
+        missing = (frame for frame in range(view.n_frames) if frame not in images and view.in_file(frame) is not None)
+        first = next(missing, None)
+        if first is not None:
+            n = 1 + sum(1 for _ in missing)
+            sentences.append(f"{view.path}: {n} of {view.n_frames} images are missing, the first is frame {first}")
     return sentences
 
 

@@ -120,7 +120,7 @@ def backward(
     places = learn_hidden_places(recording.rig, grid, run, people.states) if settings.hidden_places else None
     first_bodies = make_bodies(people.states.bodies, method.limits)
     pass_ = _Pass(recording, tracks, settings, options, run, capture, people.states, first_bodies, places)
-    records = open_journal(run.journal, with_angles(run.key))
+    records = open_journal(run.journal, with_angles(run.key), run.on_problem)
     if records:
         bodies = make_bodies({int(person): body for person, body in records[0]["bodies"].items()}, method.limits)
     else:

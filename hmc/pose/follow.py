@@ -188,7 +188,7 @@ def follow(
     task, persons = PoseTask(method, capture, options.seed, options.height_m), persons_of(recording, tracks)
     states = dict.fromkeys(persons, PersonState())
     done: list[DecidedFrames] = []
-    for decided in kept_decided(run.journal, run.key, task):
+    for decided in kept_decided(run.journal, run.key, task, run.on_problem):
         done.append(replace(decided, tracked=None))
         states[decided.person] = resumed(task, states[decided.person], decided)
     left = {number: person.frames[person.frames > states[number].done_to] for number, person in persons.items()}

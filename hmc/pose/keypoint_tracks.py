@@ -52,7 +52,7 @@ def tracks_of_keypoints(recording: Recording, source: KeypointSource, run: RunOp
     """
     run = run or RunOptions()
     room = None if recording.room_is_estimated else recording.room
-    records = open_journal(run.journal, run.key)
+    records = open_journal(run.journal, run.key, run.on_problem)
     first, end = recording.start + len(records), recording.start + recording.n_frames
     frames: Iterable = range(first, end)
     for frame in run.progress(frames, end - first) if run.progress and first < end else frames:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import logging
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,12 +12,16 @@ import numpy as np
 
 from hmc.body.joints import DOF_NAMES
 from hmc.body.proportions import make_body
+from hmc.errors import InputError
+from hmc.io.door import read_arrays
 from hmc.io.files import atomic_write
 from hmc.io.journal import append_journal, open_journal
 from hmc.pose.method import StepInfo, Tracked, begin_tracking
 from hmc.pose.person import DecidedFrames, PoseTask
 
 __all__ = ["from_record", "keep_decided", "kept_decided", "to_record", "with_angles"]
+
+_logger = logging.getLogger("hmc")
 
 #: Before the names of the memory's arrays in a file.
 _MEMORY = "memory_"
@@ -45,7 +50,9 @@ def with_angles(key: str) -> str:
     return f"{key}\n{' '.join(DOF_NAMES)}"
 
 
-def kept_decided(journal: str | Path | None, key: str, task: PoseTask) -> Iterator[DecidedFrames]:
+def kept_decided(
+    journal: str | Path | None, key: str, task: PoseTask, on_problem: Callable[[str], None] = _logger.warning
+) -> Iterator[DecidedFrames]:
     """The rows that a stopped run left, in order; the last ones of each person with what the method goes on from.
 
     Parameters
@@ -54,14 +61,21 @@ def kept_decided(journal: str | Path | None, key: str, task: PoseTask) -> Iterat
         As for `hmc.io.journal.open_journal`.
     task : PoseTask
         As they were kept with.
+    on_problem : callable
+        Called with one line where the journal is damaged, or what the method goes on from does not fit it: then it is begun anew.
     """
-    records = open_journal(journal, with_angles(key))
+    records = open_journal(journal, with_angles(key), on_problem)
     last = {record["person"]: k for k, record in enumerate(records)}
+    memories = {k: _kept_memory(journal, person, records[k]) for person, k in last.items()} if journal is not None else {}
+    if any(memory is None for memory in memories.values()) and journal is not None:
+        on_problem(f"{journal}: what the method remembers of a person is damaged or of another frame; poses are begun anew")
+        Path(journal).unlink()
+        records, last = open_journal(journal, with_angles(key), on_problem), {}
     for k, record in enumerate(records):
         decided = from_record(record, task)
         if last[record["person"]] == k and decided.body is not None and journal is not None:
             subject = task.method.equip(decided.body, task.capture)
-            memory = _kept_memory(journal, record["person"], record["frames"][-1])
+            memory = memories[k] or {}
             pose, velocity = np.array(record["pose"], float), np.array(record["velocity"], float)
             decided = replace(decided, tracked=begin_tracking(subject, pose, velocity, memory))
         yield decided
@@ -82,6 +96,8 @@ def to_record(decided: DecidedFrames) -> dict[str, Any]:
     if any(info.details for info in infos):
         record["details"] = [dict(info.details) for info in infos]
     if decided.tracked is not None and decided.body is not None:
+        if decided.tracked.memory:
+            record["remembers"] = sorted(decided.tracked.memory)
         record |= {"pose": decided.tracked.state, "velocity": decided.tracked.velocity, "body": decided.body.dimensions}
     return record
 
@@ -115,13 +131,14 @@ def _keep_memory(journal: str | Path, decided: DecidedFrames, before: int) -> No
         np.savez(out, frame=decided.frames[-1], **arrays)
 
 
-def _kept_memory(journal: str | Path, person: int, frame: int) -> dict[str, np.ndarray]:
-    """The memory kept for this frame; empty where there was none."""
-    for file in _memory_files(journal, person):
-        if _frame_of(file) == frame:
-            with np.load(file, allow_pickle=False) as data:
-                return {name.removeprefix(_MEMORY): data[name] for name in data.files if name.startswith(_MEMORY)}
-    return {}
+def _kept_memory(journal: str | Path, person: int, record: dict[str, Any]) -> dict[str, np.ndarray] | None:
+    """The memory that belongs to a record; empty where there was none, None where it is lost."""
+    names = record.get("remembers", [])
+    for file in _memory_files(journal, person) if names else ():
+        kept = _arrays_of(file)
+        if _frame_in(kept) == record["frames"][-1] and {f"{_MEMORY}{name}" for name in names} == kept.keys() - {"frame"}:
+            return {name: kept[f"{_MEMORY}{name}"] for name in names}
+    return None if names else {}
 
 
 def _memory_files(journal: str | Path, person: int) -> list[Path]:
@@ -130,8 +147,18 @@ def _memory_files(journal: str | Path, person: int) -> list[Path]:
 
 
 def _frame_of(file: Path) -> int | None:
-    """Frame of a file of a memory, None where there is no file."""
-    if not file.exists():
-        return None
-    with np.load(file, allow_pickle=False) as data:
-        return int(data["frame"])
+    """Frame of a file of a memory, None where there is no such file."""
+    return _frame_in(_arrays_of(file))
+
+
+def _arrays_of(file: Path) -> dict[str, np.ndarray]:
+    """The arrays of a file of a memory; none where it is damaged."""
+    try:
+        return read_arrays(file) if file.exists() else {}
+    except InputError:
+        return {}
+
+
+def _frame_in(kept: dict[str, np.ndarray]) -> int | None:
+    frame = kept.get("frame")
+    return int(frame) if frame is not None and frame.ndim == 0 and frame.dtype.kind in "iu" else None

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from hmc.errors import InputError
+from hmc.io.door import read_text_file
 from hmc.synthetic.motions import Motion, lift_clavicle
 from hmc.synthetic.skeleton import BONE_NAMES, Skeleton, joint_positions, limb_orientations, unit
 
@@ -58,7 +59,7 @@ def read_bvh(path: str | Path) -> Bvh:
     path = Path(path)
     if not path.is_file():
         raise InputError(f"{path}: no such motion file")
-    head, found, tail = path.read_text(errors="replace").partition("MOTION")
+    head, found, tail = read_text_file(path, guess=True).partition("MOTION")
     tokens = head.split()
     if not found or not tokens or tokens[0].upper() != "HIERARCHY":
         raise InputError(f"{path}: not a BVH file; it has no HIERARCHY and MOTION")

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import difflib
-import tomllib
 from dataclasses import MISSING, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, get_args, get_origin, get_type_hints
 
 from hmc.errors import InputError
+from hmc.io.door import read_toml_file
 from hmc.io.shipped import shipped_folder
 from hmc.synthetic.clothes import PATTERNS
 from hmc.synthetic.physique import girth_of
@@ -263,11 +263,7 @@ def load_recipe(source: str | Path) -> Recipe:
             else f"shipped recipes are {', '.join(shipped_recipes()) or 'missing from this installation'}"
         )
         raise InputError(f"recipe {str(source)!r} is neither a file nor a shipped recipe; {hint}")
-    try:
-        content = tomllib.loads(path.read_text())
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: not a TOML file: {error}") from None
-    recipe = recipe_from(content, str(path))
+    recipe = recipe_from(read_toml_file(path), str(path))
     # Motion files are named relative to the recipe.
     actors = tuple(replace(a, bvh=str(path.parent / a.bvh)) if a.bvh and not Path(a.bvh).is_absolute() else a for a in recipe.actors)
     return replace(recipe, actors=actors)

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from hmc.errors import InputError
+from hmc.io.door import read_text_file
 from hmc.io.files import atomic_write
 from hmc.tracking.features import FEATURES
 
@@ -137,13 +138,16 @@ def read_tree(path: str | Path) -> PersonTree:
     """
     path = Path(path)
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = read_text_file(path)
     except FileNotFoundError:
         raise InputError(f"{path}: there is no such file; train a tree: python -m hmc.tracking.train_person_tree") from None
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read as a person tree ({error})") from None
     numbered = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip() and not line.startswith("#")]
-    rows = list(csv.reader(io.StringIO("\n".join(line for _, line in numbered))))
+    try:
+        rows = list(csv.reader(io.StringIO("\n".join(line for _, line in numbered))))
+    except csv.Error as error:
+        raise InputError(f"{path}: cannot be read as a person tree ({error})") from None
     if not rows or tuple(rows[0]) != COLUMNS:
         raise InputError(f"{path}: holds no person tree; its first line must be {','.join(COLUMNS)}")
     nodes = []

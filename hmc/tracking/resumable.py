@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import astuple, dataclass, field, replace
-from pathlib import Path
 from time import perf_counter, thread_time
 from typing import Any
 
@@ -76,7 +75,7 @@ def track_recording(
     """
     tracker, run = tracker or make_tracker(), run or RunOptions()
     grid = person_grid(recording, voxel_size_m)
-    done = _resumed(run.journal, run.key, recording)
+    done = _resumed(run, recording)
     state, rows, problems = done.state, list(done.rows), list(done.problems)
 
     def note(line: str) -> None:
@@ -202,10 +201,10 @@ class CompletedFrames:
     account: Account = field(default_factory=Account)
 
 
-def _resumed(journal: str | Path | None, key: str, recording: Recording) -> CompletedFrames:
+def _resumed(run: RunOptions, recording: Recording) -> CompletedFrames:
     """What the journal says is done."""
     done = CompletedFrames(recording.start, init(recording.fps, recording.persons))
-    for record in open_journal(journal, key):
+    for record in open_journal(run.journal, run.key, run.on_problem):
         new = from_plain(CompletedFrames, record)
         done = replace(new, rows=done.rows + new.rows, problems=done.problems + new.problems)
     return done

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import difflib
 import fnmatch
-import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,6 +14,7 @@ from typing import Any
 
 from hmc.errors import InputError
 from hmc.io.calibration import find_calibration
+from hmc.io.door import read_toml_file
 from hmc.io.places import CAMERA, RecordingPlaces
 from hmc.io.settings import check_settings
 
@@ -95,14 +95,9 @@ def read_session(path: str | Path) -> Session:
     """
     path = Path(path)
     path = path / "session.toml" if path.is_dir() else path
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file; a session is a TOML file that names the trials (docs/sessions.md)") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: not a TOML file ({error}); mend it") from None
+    if not path.exists():
+        raise InputError(f"{path}: no such file; a session is a TOML file that names the trials (docs/sessions.md)")
+    table = read_toml_file(path)
     reading = _Reading(path, [])
     session = reading.session(table)
     if reading.faults:

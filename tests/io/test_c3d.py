@@ -64,7 +64,7 @@ def test_what_is_cut_off_is_told(tmp_path, length):
 
 
 def test_other_wrong_files(tmp_path):
-    with pytest.raises(InputError, match="cannot read it"):
+    with pytest.raises(InputError, match="cannot be read"):
         read_c3d(tmp_path / "none.c3d")
     write_c3d(tmp_path / "inch.c3d", ["a"], np.ones((2, 1, 3)), 120.0, units="inch")
     with pytest.raises(InputError, match="units 'inch'"):

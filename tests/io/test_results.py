@@ -163,10 +163,10 @@ def test_state_vectors_come_back_exactly(tmp_path):
 
 def test_pose_files_never_run_code(tmp_path):
     np.savez(tmp_path / "pose.npz", frames=np.array([print], dtype=object))
-    with pytest.raises(InputError, match="not a pose file"):
+    with pytest.raises(InputError, match=r"not a (pose file|file of arrays)"):
         read_pose(tmp_path / "pose.npz")
     (tmp_path / "pickle.npz").write_bytes(pickle.dumps({"frames": 1}))
-    with pytest.raises(InputError, match="not a pose file"):
+    with pytest.raises(InputError, match=r"not a (pose file|file of arrays)"):
         read_pose(tmp_path / "pickle.npz")
 
 
@@ -179,7 +179,7 @@ def test_damaged_pose_files_are_refused(tmp_path, damage):
     path.write_bytes(damage(path.read_bytes()))
     with pytest.raises(InputError, match=r"pose\.npz"):
         read_pose(path)
-    with pytest.raises(InputError, match="cannot read"):
+    with pytest.raises(InputError, match="cannot be read"):
         read_pose(tmp_path / "none.npz")
 
 
@@ -267,5 +267,5 @@ def test_a_journal_survives_a_run_that_dies_while_it_writes(tmp_path):
     append_journal(path, {"frame": 2})
     assert [record["frame"] for record in read_journal(path)] == [0, 1, 2]
     path.write_text("not json\n" + path.read_text())
-    with pytest.raises(InputError, match="line 1: damaged"):
-        read_journal(path)
+    told: list[str] = []
+    assert read_journal(path, told.append) == [] and "damaged in line 1" in told[0]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ import numpy as np
 
 from hmc.errors import InputError
 from hmc.experiments.engine.experiment import Cell, Experiment
+from hmc.io.door import read_json_file
 from hmc.io.files import atomic_write
 
 __all__ = ["cell_key", "cell_path", "cell_rng", "cell_text", "digest", "read_cell", "write_text"]
@@ -79,12 +81,14 @@ def read_cell(path: Path) -> Cell | None:
     InputError
         When the file is damaged.
     """
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-        return Cell(content["parameters"], content["results"], content.get("made", {}))
-    except FileNotFoundError:
+    if not os.path.lexists(path):
         return None
-    except (ValueError, KeyError, TypeError, OSError) as error:
+    try:
+        content = read_json_file(path)
+        return Cell(content["parameters"], content["results"], content.get("made", {}))
+    except InputError as error:
+        raise InputError(f"{error}; delete the file to compute it again") from None
+    except (KeyError, TypeError) as error:
         raise InputError(f"{path}: not a cell of an experiment ({error}); delete the file to compute it again") from error
 
 

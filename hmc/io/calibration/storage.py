@@ -1,17 +1,25 @@
-"""OpenCV's FileStorage files (YAML, XML, JSON) as plain dictionaries, lists, numbers, texts and arrays."""
+"""OpenCV's FileStorage files (YAML, XML, JSON) as plain dictionaries, lists, numbers, texts and arrays.
+
+They are read here and not by OpenCV, which ends the process on some broken ones.
+"""
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
-import cv2
 import numpy as np
 
 from hmc.errors import InputError
 from hmc.io.calibration.text import as_numbers, read_json, read_text
+from hmc.io.calibration.yaml import read_word, read_yaml
+from hmc.io.door import read_xml_file
 
 __all__ = ["read_storage"]
+
+_WORDS = re.compile(r'"[^"]*+"|[^\s"]++')
 
 
 def read_storage(path: Path) -> dict[str, Any]:
@@ -26,33 +34,42 @@ def read_storage(path: Path) -> dict[str, Any]:
         values = _plain(read_json(path))
     else:
         text = read_text(path).lstrip()
-        if "<!DOCTYPE" in text or "<!ENTITY" in text:
-            raise InputError(f"{path}: not an OpenCV YAML or XML file (a document type or entities are declared)")
-        if not text.startswith(("%YAML", "<")):
-            text = f"%YAML:1.0\n---\n{text}"
         try:
-            storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
-            values = _value(storage.root())
-            storage.release()
-        except (cv2.error, SystemError, UnicodeError, RecursionError, MemoryError) as error:
-            reason = (str(error).strip().splitlines() or ["?"])[-1]
-            raise InputError(f"{path}: not an OpenCV YAML or XML file ({reason})") from None
+            values = _element(read_xml_file(path, "an OpenCV XML file")) if text.startswith("<") else _matrices(read_yaml(text))
+        except ValueError as error:
+            raise error if isinstance(error, InputError) else InputError(f"{path}: not an OpenCV YAML or XML file ({error})") from None
     if not isinstance(values, dict):
         raise InputError(f"{path}: holds no named values; an OpenCV file has camera_matrix and so on")
     return values
 
 
-def _value(node: cv2.FileNode) -> Any:
-    if node.isMap():
-        # Matrices too are put together here: OpenCV's own way from a damaged one leads out of the memory.
-        values = {name: _value(node.getNode(name)) for name in node.keys()}
-        sizes = values.get("sizes", [values.get("rows"), values.get("cols")])
-        return _shaped(values["data"], sizes) if "data" in values and not {"rows", "sizes"}.isdisjoint(values) else values
-    if node.isSeq():
-        return [_value(node.at(i)) for i in range(node.size())]
-    if node.isString():
-        return node.string()
-    return node.real() if node.isInt() or node.isReal() else None
+def _matrices(value: Any) -> Any:
+    """Values of YAML with tables of rows, cols and data made arrays."""
+    if isinstance(value, list):
+        return [_matrices(one) for one in value]
+    if not isinstance(value, dict):
+        return value
+    return _matrix({name: _matrices(one) for name, one in value.items()})
+
+
+def _matrix(values: dict[str, Any]) -> Any:
+    sizes = values.get("sizes", [values.get("rows"), values.get("cols")])
+    return _shaped(values["data"], sizes) if "data" in values and not {"rows", "sizes"}.isdisjoint(values) else values
+
+
+def _element(node: ElementTree.Element) -> Any:
+    """The value of an XML element: a table or list of those in it, else its words."""
+    if len(node):
+        if all(child.tag == "_" for child in node):
+            return [_element(child) for child in node]
+        return _matrix({child.tag: _element(child) for child in node})
+    words = _WORDS.findall(node.text or "")
+    if not words:
+        return None
+    if node.get("type_id") in ("str", "string"):
+        return (node.text or "").strip().strip('"')
+    found = [read_word(word) for word in words]
+    return found if len(found) > 1 else found[0]
 
 
 def _plain(value: Any) -> Any:

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import codecs
-import json
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
 
-from hmc.errors import InputError
+from hmc.io.door import read_json_file, read_text_file, read_xml_file
 
 __all__ = ["as_numbers", "listed", "read_json", "read_text", "read_xml"]
+
+SETTINGS_MB = "HMC_MAX_SETTINGS_MB"
 
 
 def read_text(path: Path) -> str:
@@ -23,25 +23,7 @@ def read_text(path: Path) -> str:
     InputError
         When the file cannot be read.
     """
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
-    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        return data.decode("utf-16", errors="replace")
-    if data[1:2] == b"\0":
-        return data.decode("utf-16-le", errors="replace")
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return data.decode("latin-1")
-
-
-class _NoDoctype(ElementTree.TreeBuilder):
-    """Builds a tree, but of no document that declares entities: they can make a small file fill the memory."""
-
-    def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
-        raise ValueError("a document type or entities are declared, which no calibration needs")
+    return read_text_file(path, SETTINGS_MB, guess=True)
 
 
 def read_xml(path: Path, what: str) -> ElementTree.Element:
@@ -52,12 +34,7 @@ def read_xml(path: Path, what: str) -> ElementTree.Element:
     InputError
         When it is no XML; the line says that it is not `what`.
     """
-    parser = ElementTree.XMLParser(target=_NoDoctype())
-    try:
-        parser.feed(read_text(path).strip())
-        return parser.close()
-    except (ElementTree.ParseError, ValueError, RecursionError) as error:
-        raise InputError(f"{path}: not {what} ({error})") from None
+    return read_xml_file(path, what)
 
 
 def read_json(path: Path) -> Any:
@@ -68,10 +45,7 @@ def read_json(path: Path) -> Any:
     InputError
         When it is no JSON.
     """
-    try:
-        return json.loads(read_text(path))
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{path}: not a JSON file ({error}); mend or remove it") from None
+    return read_json_file(path, SETTINGS_MB, guess=True)
 
 
 def as_numbers(value: Any) -> np.ndarray | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -13,7 +12,8 @@ from hmc.camera.model import Camera
 from hmc.errors import InputError
 from hmc.io.calibration.caliscope import caliscope_tables
 from hmc.io.calibration.entry import CalibrationEntry, natural_key
-from hmc.io.calibration.text import as_numbers, listed, read_text
+from hmc.io.calibration.text import as_numbers, listed
+from hmc.io.door import read_toml_file
 
 __all__ = ["read_toml", "write_calibration"]
 
@@ -39,10 +39,7 @@ def read_toml(path: Path) -> list[CalibrationEntry]:
     InputError
         When the file is no TOML, keys are missing or not numbers, or a camera is a fisheye camera.
     """
-    try:
-        tables = caliscope_tables(tomllib.loads(read_text(path)))
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{path}: not a TOML file ({error}); mend or remove it") from None
+    tables = caliscope_tables(read_toml_file(path, guess=True))
     cameras = {
         label: table
         for label, table in sorted(tables.items(), key=lambda item: natural_key(item[0]))

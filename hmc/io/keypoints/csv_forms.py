@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from hmc.errors import InputError
+from hmc.io.door import check_file, open_text
 from hmc.io.keypoints.json_forms import MAX_TABLE_BYTES, last_number
 from hmc.io.keypoints.layouts import KEYPOINTS, keypoint_named, places
 from hmc.io.keypoints.people import RawPeople, as_people
@@ -53,11 +54,11 @@ def read_csv_table(path: Path) -> dict[int, RawPeople]:
         When it cannot be read, is no such table, or a cell is not what it must be; with the line.
     """
     try:
-        if (size := path.stat().st_size) > MAX_TABLE_BYTES:
+        if (size := check_file(path)) > MAX_TABLE_BYTES:
             raise InputError(
                 f"{path}: {size / 2**20:.0f} MB, more than the {MAX_TABLE_BYTES // 2**20} MB that are read; write JSON, a frame a file"
             )
-        with open(path, encoding="utf-8-sig", newline="") as file:
+        with open_text(path) as file:
             reader = csv.reader(file)
             rows = ((reader.line_num, row) for row in reader if row)
             header = [name.strip() for name in next(rows, (0, [""]))[1]]

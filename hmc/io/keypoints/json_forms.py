@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from hmc.errors import InputError
+from hmc.io.door import check_file, read_json_file
 from hmc.io.keypoints.layouts import keypoint_named, places
 from hmc.io.keypoints.people import NOBODY, RawPeople, as_people
 
@@ -88,17 +89,10 @@ def read_json_table(path: Path) -> tuple[dict[int, RawPeople], int]:
 
 
 def _load(path: Path, limit: int) -> Any:
-    try:
-        size = path.stat().st_size
-        if size > limit:
-            raise InputError(f"{path}: {size / 2**20:.0f} MB, more than the {limit // 2**20} MB that are read; write one file a frame")
-        return json.loads(path.read_text(encoding="utf-8-sig"))
-    except InputError:
-        raise
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
-    except (ValueError, RecursionError) as error:  # not UTF-8, no JSON, a number of thousands of digits, brackets without end
-        raise InputError(f"{path}: no JSON file ({str(error)[:80]}); run the detector again, or remove it") from None
+    size = check_file(path)
+    if size > limit:
+        raise InputError(f"{path}: {size / 2**20:.0f} MB, more than the {limit // 2**20} MB that are read; write one file a frame")
+    return read_json_file(path)
 
 
 def _frames(document: Any) -> Iterator[tuple[int, Any]]:
