@@ -21,7 +21,6 @@ from hmc.cli.common import (
     output_path,
     positive_float,
     print_problems,
-    progress,
     recording_source,
     selected_workers,
     was_finished,
@@ -31,6 +30,7 @@ from hmc.cli.common import (
 from hmc.cli.kept import MASKS, add_silhouette_options, given_silhouettes, leave_silhouettes, silhouettes_source, take_silhouettes
 from hmc.cli.option_tables import add_like_option, repeated_preset, told_options
 from hmc.cli.pose_markers import MARKERS_JOURNAL, add_marker_options, read_markers
+from hmc.cli.run_bar import FIRST_POSE, FITTING, FOLLOWING, LEARNING, SECOND_PASS, TRACKING, VIEWS, RunBar
 from hmc.cli.track import JOURNAL, add_tracker_options, selected_frontend, selected_tracker
 from hmc.pose.registry import BUILT_IN, INITS, METHODS, pose_method
 
@@ -207,39 +207,39 @@ def _run(args: argparse.Namespace, held: ExitStack) -> int:
 
     problems: list[str] = [*recording.problems]
 
-    def kept(journal: str, what: str) -> RunOptions:
+    stages = [TRACKING] * (given is None) + [FIRST_POSE, FOLLOWING] + [FITTING, SECOND_PASS] * (method.back is not None) + [VIEWS]
+    bar = RunBar(stages, recording.n_frames, recording.persons or 1, args.quiet)
+
+    def kept(journal: str, stage: str, first: str | None = None) -> RunOptions:
         """The run of a stage; the tracker leaves its silhouettes for the poses."""
         masks = args.out / MASKS if hulls else None
         return RunOptions(
-            frontend,
-            args.out / journal,
-            masks,
-            key,
-            problems.append,
-            lambda steps, total: progress(steps, total, what, args.quiet),
-            selected_workers(args),
+            frontend, args.out / journal, masks, key, problems.append, bar.stage(stage, first), selected_workers(args), bar.phase
         )
 
     take_silhouettes(silhouettes, recording, args.out / MASKS, key, problems.append)
     tracks = given
     if given is None and hulls:
-        tracks = track_recording(recording, args.track_voxel, tracker, args.seed, kept(JOURNAL, "track"))
+        tracks = track_recording(
+            recording, args.track_voxel, tracker, args.seed, kept(JOURNAL, TRACKING, None if silhouettes else LEARNING)
+        )
     elif given is None and method.needs_tracks:
-        tracks = tracks_of_keypoints(recording, source_of_keypoints, kept(JOURNAL, "track"))
+        tracks = tracks_of_keypoints(recording, source_of_keypoints, kept(JOURNAL, TRACKING))
+    bar.people = 1 if tracks is None else len(set(tracks.persons.tolist()))
     detections = None if markers is None else markers.table(args, key, problems)
     cues = (
         None if tracks is None or source_of_keypoints is None else learn_scatter(recording.rig, tracks, source_of_keypoints, recording.fps)
     )
     options = FollowOptions(args.voxel, args.seed, height, detections, keypoints=cues)
-    people = follow(recording, tracks, method, options, kept(POSE_JOURNAL, "pose"))
+    people = follow(recording, tracks, method, options, kept(POSE_JOURNAL, FOLLOWING))
     if markers is not None:
         markers.refuse_nothing(people)
     if tracks is not None:
-        people = backward(recording, tracks, method, people, options, kept(BACK_JOURNAL, "back"))
+        people = backward(recording, tracks, method, people, options, kept(BACK_JOURNAL, SECOND_PASS))
     if args.smooth:
         people = smooth_people(people, method.limits, recording.fps, args.smooth)
     if hulls:
-        people = with_clear_views(people, recording, kept(POSE_JOURNAL, "views"))
+        people = with_clear_views(people, recording, kept(POSE_JOURNAL, VIEWS))
     elif tracks is not None and cues is not None:
         people = with_keypoint_views(people, recording, tracks, cues)
     problems += people.notes

@@ -22,7 +22,6 @@ from hmc.cli.common import (
     output_path,
     positive_float,
     print_problems,
-    progress,
     recording_source,
     selected_workers,
     was_finished,
@@ -31,6 +30,7 @@ from hmc.cli.common import (
 )
 from hmc.cli.kept import MASKS, add_silhouette_options, given_silhouettes, leave_silhouettes, silhouettes_source, take_silhouettes
 from hmc.cli.option_tables import add_like_option, told_options
+from hmc.cli.run_bar import LEARNING, TRACKING, RunBar
 
 if TYPE_CHECKING:
     from hmc.io.recording import Recording
@@ -182,7 +182,7 @@ def _run(args: argparse.Namespace, held: ExitStack) -> int:
         args.out / MASKS if args.cues == CUES[0] else None,
         key=key,
         on_problem=problems.append,
-        progress=lambda steps, total: progress(steps, total, "track", args.quiet),
+        progress=RunBar([TRACKING], recording.n_frames, quiet=args.quiet).stage(TRACKING, LEARNING if args.cues == CUES[0] else None),
         workers=selected_workers(args),
     )
     take_silhouettes(silhouettes, work.recording, args.out / MASKS, key, problems.append)

@@ -115,6 +115,7 @@ def backward(
     first, end = int(people.frames[fitted].min()), int(people.frames[fitted].max()) + 1
     if run.masks is None or kept_frames(run.masks, run.key, range(first, end)) is None:
         return replace(people, notes=(*people.notes, "silhouettes were not kept on disk: poses are those of one pass, forward in time"))
+    run.say("fitting bodies")
     capture = Capture(recording.fps, options.voxel_size_m, recording.room, recording.rig, workers=run.workers)
     grid = person_grid(recording, options.voxel_size_m)
     places = learn_hidden_places(recording.rig, grid, run, people.states) if settings.hidden_places else None

@@ -26,7 +26,7 @@ from hmc.io.results import PoseStates, PoseTable, TrackTable, write_joints, writ
 from hmc.landmarks import FOOT_POINTS, LANDMARKS, landmark_index
 from hmc.pose.keypoint_cues import KeypointCues, with_keypoints
 from hmc.pose.method import Capture, PoseMethod
-from hmc.pose.person import DecidedFrames, PersonState, PersonTrack, PoseTask, person_step, resumed
+from hmc.pose.person import DecidedFrames, PersonState, PersonTrack, PoseTask, person_step, resumed, starts_with
 from hmc.pose.records import keep_decided, kept_decided
 from hmc.pose.views.markers import marker_views, seen_in_frame
 from hmc.pose.views.person_view import IMAGES_FOR, PersonView, check_needs, views_of
@@ -199,7 +199,12 @@ def follow(
             if view.frame <= before:
                 continue
             view = replace(view, velocity=persons[number].velocity(view.frame))
+            starts = starts_with(task, persons[number], states[number], view.frame)
+            if starts:
+                run.say("first pose")
             states[number], new = person_step(task, persons[number], states[number], view)
+            if starts:
+                run.say("following")
             for decided in new:
                 keep_decided(run.journal, decided, before)
                 done.append(replace(decided, tracked=None))  # memories are not kept for long

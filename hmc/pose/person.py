@@ -19,7 +19,7 @@ from hmc.pose.method import Alternatives, Capture, PoseMethod, StepInfo, Subject
 from hmc.pose.starts.window import walk
 from hmc.pose.views.person_view import PersonView
 
-__all__ = ["DecidedFrames", "PersonState", "PersonTrack", "PoseTask", "end_person", "person_step", "resumed"]
+__all__ = ["DecidedFrames", "PersonState", "PersonTrack", "PoseTask", "end_person", "person_step", "resumed", "starts_with"]
 
 NO_START = "nothing to start from"
 
@@ -167,8 +167,9 @@ def person_step(task: PoseTask, person: PersonTrack, state: PersonState, view: P
     """
     is_last = person.ended and view.frame == int(person.frames[-1])
     if state.tracked is None:
+        starts = starts_with(task, person, state, view.frame)
         state = replace(state, watched=(*state.watched, view))
-        if len(state.watched) < task.window and not is_last:
+        if not starts:
             return state, []
         started = _start(task, person, state)
         if started is None:
@@ -186,6 +187,12 @@ def person_step(task: PoseTask, person: PersonTrack, state: PersonState, view: P
             stepped = task.method.recover(rng, state.tracked, stepped, view)
         state = replace(state, tracked=stepped[0], followed=(*state.followed, _followed(task, rng, *stepped, view)))
     return _decide(task, person, state, is_last)
+
+
+def starts_with(task: PoseTask, person: PersonTrack, state: PersonState, frame: int) -> bool:
+    """Whether this frame of a person ends the time for which they are watched: the first pose is found then, which takes long."""
+    is_last = person.ended and frame == int(person.frames[-1])
+    return state.tracked is None and (len(state.watched) + 1 >= task.window or is_last)
 
 
 def end_person(task: PoseTask, person: PersonTrack, state: PersonState) -> list[DecidedFrames]:

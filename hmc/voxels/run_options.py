@@ -32,6 +32,8 @@ class RunOptions:
         ``progress(steps, total)`` passes the frames on and may show how far they are.
     workers : int
         Processes over which the work is spread, where they may be forked (`hmc.processes`). The result does not depend on it.
+    on_phase : callable, optional
+        Called with what is done from now on, where that takes longer than a frame: "first pose", "following", "fitting bodies".
     """
 
     frontend: FrontendSettings | None = None
@@ -41,3 +43,9 @@ class RunOptions:
     on_problem: Callable[[str], None] = field(default=logging.getLogger("hmc").warning)
     progress: Callable[[Iterable, int], Iterable] | None = None
     workers: int = 1
+    on_phase: Callable[[str], None] | None = None
+
+    def say(self, phase: str) -> None:
+        """Tell what is done from now on."""
+        if self.on_phase is not None:
+            self.on_phase(phase)

@@ -1,0 +1,94 @@
+"""The time that a run says is left, against that which it then takes, by a clock of the test's own."""
+
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hmc.cli.run_bar import FIRST_POSE, FITTING, FOLLOWING, LEARNING, SECOND_PASS, TRACKING, VIEWS, RunBar
+
+STAGES = [TRACKING, FIRST_POSE, FOLLOWING, FITTING, SECOND_PASS, VIEWS]
+
+
+class Clock:
+    def __init__(self):
+        self.now = 100.0
+
+    def __call__(self):
+        return self.now
+
+
+def run(costs, frames=100, people=1, learning=20.0, quiet=True):
+    """A run whose stages take so many seconds a frame, or a person's halt: what it said after every frame, and when it ended."""
+    clock, said = Clock(), []
+    bar = RunBar(STAGES, frames, people, quiet, clock)
+
+    def look(name):
+        said.append((name, clock.now - 100, bar.left_s()))
+
+    def learnt():
+        clock.now += learning
+        yield from range(frames)
+
+    for _ in bar.stage(TRACKING, LEARNING)(learnt(), frames):
+        clock.now += costs[TRACKING]
+        look(TRACKING)
+    for frame in bar.stage(FOLLOWING)(range(frames), frames):
+        if frame == 30:
+            for _ in range(people):
+                bar.phase(FIRST_POSE)
+                look(FIRST_POSE)
+                clock.now += costs[FIRST_POSE]
+                bar.phase(FOLLOWING)
+        clock.now += costs[FOLLOWING] * people
+        look(FOLLOWING)
+    bar.phase(FITTING)
+    look(FITTING)
+    clock.now += costs[FITTING] * people
+    for name in (SECOND_PASS, VIEWS):
+        for _ in bar.stage(name)(range(frames), frames):
+            clock.now += costs[name] * people
+            look(name)
+    return said, clock.now - 100
+
+
+USUAL = {TRACKING: 1.0, FIRST_POSE: 92.0, FOLLOWING: 0.7, FITTING: 72.0, SECOND_PASS: 0.63, VIEWS: 0.1}
+
+
+@settings(max_examples=30, deadline=None)
+@given(speed=st.floats(0.01, 20), people=st.integers(1, 4), frames=st.integers(40, 300))
+def test_of_a_run_like_others_the_time_left_is_right_at_any_speed(speed, people, frames):
+    said, total = run({name: speed * cost for name, cost in USUAL.items()}, frames, people, 5 * speed)
+    told = [(gone, left) for _, gone, left in said if left is not None]
+    assert len(told) > 3 * frames
+    for gone, left in told:
+        assert gone + left == pytest.approx(total, rel=0.03, abs=3 * speed)
+
+
+@settings(max_examples=30, deadline=None)
+@given(unlike=st.lists(st.floats(0.5, 2), min_size=6, max_size=6))
+def test_of_an_unusual_one_it_is_within_a_factor_and_right_at_last(unlike):
+    costs = {name: cost * factor for (name, cost), factor in zip(USUAL.items(), unlike, strict=True)}
+    said, total = run(costs)
+    for name, gone, left in said:
+        if left is not None and name not in (SECOND_PASS, VIEWS):
+            assert (total - gone) / 4.01 - 3 <= left <= 4.01 * (total - gone) + 3
+    middle = [(gone, left) for name, gone, left in said if name == SECOND_PASS][50:]
+    rest = np.array([total - gone for gone, _ in middle])
+    assert np.abs(np.array([left for _, left in middle]) - rest).max() < 0.1 * 100 * 4  # the views are yet to come
+
+
+def test_nothing_is_said_before_anything_is_measured_and_nothing_is_left_at_the_end():
+    said, total = run(USUAL)
+    assert said[0][2] is None and said[-1][1] == total
+    assert said[-1][2] < 1
+
+
+def test_the_bar_names_what_is_done(capsys):
+    run({name: cost / 100 for name, cost in USUAL.items()}, quiet=False)
+    shown = capsys.readouterr().err
+    for name in (LEARNING, TRACKING, FIRST_POSE, FOLLOWING, SECOND_PASS, VIEWS):
+        assert re.search(rf"{name}: +\d+%\|.*\| \d+/100 frames, \d+:\d\d gone", shown), name
+    assert re.search(r"fitting bodies, \d+:\d\d gone, about \d+:\d\d left of all", shown)
