@@ -100,7 +100,7 @@ def test_one_camera_nobody_and_a_broken_file(clip):
     assert told(clip) == []
     path.write_text("{")
     (warning,) = [f for f in inspect_recording(clip).findings if "keypoints" in f.sentence]
-    assert warning.severity == "warning" and "no JSON file" in warning.sentence
+    assert warning.severity == "warning" and "not a JSON file" in warning.sentence
 
 
 def test_the_command_prints_the_table(clip, tmp_path, capsys):

@@ -231,8 +231,8 @@ def test_of_other_cameras(recording_folder):
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("{", "no JSON file"),
-        ("[" * 100_000, "no JSON file"),
+        ("{", "not a JSON file"),
+        ("[" * 100_000, "not a JSON file"),
         ("7", "a list of people was expected"),
         ('{"a": 1}', "no people in it"),
         (openpose(person(24)), "24 points a person; known are lists of 17"),
