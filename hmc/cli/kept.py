@@ -19,7 +19,7 @@ def add_silhouette_options(parser: argparse.ArgumentParser) -> None:
         "--silhouettes",
         action=argparse.BooleanOptionalAction,
         default=True,
-        help="keep the silhouettes in DIR/silhouettes (default; 1 to 2 kB a frame and camera), or leave them out",
+        help="keep the silhouettes in DIR/silhouettes (default; 1 to 10 kB a frame and camera), or leave them out",
     )
     parser.add_argument(
         "--silhouettes-from",
