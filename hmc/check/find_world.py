@@ -6,6 +6,7 @@ own axis, floor or usual unit is as near as that, it is taken as it is: whoever 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -70,7 +71,7 @@ class FoundWorld:
     as_it_was: bool
 
 
-def find_world(rig: Rig, ground: Ground | None, points: GroundPoints | None, known: Known) -> FoundWorld:
+def find_world(rig: Rig, ground: Ground | None, points: GroundPoints | None, known: Known, hidden: Sequence[str] = ()) -> FoundWorld:
     """Up, floor and scale.
 
     Parameters
@@ -82,6 +83,8 @@ def find_world(rig: Rig, ground: Ground | None, points: GroundPoints | None, kno
     points : GroundPoints or None
         What points on the floor say; before people.
     known : Known
+    hidden : sequence of str
+        Cameras that show people further down than hulls reach (`hmc.check.hidden`): hulls tell neither the floor nor a stature then.
 
     Returns
     -------
@@ -100,7 +103,7 @@ def find_world(rig: Rig, ground: Ground | None, points: GroundPoints | None, kno
             "nobody is seen to stand, so nothing tells where up and the floor are; give points of the floor (--points) or a board that "
             "lies on it (--board)"
         )
-    scale, scale_line = _scale(rig, ground, points, known)
+    scale, scale_line = _scale(rig, ground, points, known, hidden)
     up, floor = shown.up, shown.floor
     if isinstance(shown, Ground):
         doubt_deg, how = shown.up_deg, f"up and the floor by {shown.standing} hulls of people who stand, and the cameras' mounting"
@@ -121,6 +124,8 @@ def find_world(rig: Rig, ground: Ground | None, points: GroundPoints | None, kno
         )
         middle = floor * up if ground is None else ground.middle + (floor - ground.middle @ up) * up
         world = World(_turned(up), middle, scale)
+    if hidden and ground is not None and points is None:
+        found = f"{found}; but {_cut_off(hidden)}, so the floor is lower: give points of it (--points)"
     lines = (*lines, found, scale_line)
     return FoundWorld(world, lines, bool(meant and scale == 1 and name == "z"))
 
@@ -133,7 +138,11 @@ def _turned(up: np.ndarray) -> np.ndarray:
     return np.stack([x, np.cross(up, x), up])
 
 
-def _scale(rig: Rig, ground: Ground | None, points: GroundPoints | None, known: Known) -> tuple[float, str]:
+def _cut_off(hidden: Sequence[str]) -> str:
+    return f"{', '.join(hidden)} show people further down than hulls reach (something hides their legs from other cameras)"
+
+
+def _scale(rig: Rig, ground: Ground | None, points: GroundPoints | None, known: Known, hidden: Sequence[str]) -> tuple[float, str]:
     """Metres a unit, and how it is known."""
     people = "" if ground is None else f"; people come out {{:.2f}} m tall ({ground.standing} hulls)"
 
@@ -152,6 +161,11 @@ def _scale(rig: Rig, ground: Ground | None, points: GroundPoints | None, known: 
         return told(points.unit_m, f"by the board's squares: {points.unit_m:.6g} m a unit")
     if ground is None:
         raise InputError("nothing tells the scale; give --unit METRES (a unit of the calibration), or --distance CAMERA,CAMERA,METRES")
+    if hidden and (known.height_m is not None or not STATURES_M[0] <= ground.stature <= STATURES_M[1]):
+        raise InputError(
+            f"people's hulls are {ground.stature:.3g} units tall, but {_cut_off(hidden)}, so a stature tells no scale; give --unit METRES "
+            "(1 where the calibration is in metres) or --distance CAMERA,CAMERA,METRES, and --points for the floor"
+        )
     if known.height_m is not None:
         exact = known.height_m / ground.stature
         for unit, name in USUAL_UNITS.items():

@@ -56,11 +56,14 @@ class Figure:
         The long axis, of length 1 and either direction.
     elongation : float
         How many times as long as thick it is.
+    moment : int
+        Which of the moments it is of.
     """
 
     points: np.ndarray
     axis: np.ndarray
     elongation: float
+    moment: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,9 +118,9 @@ def find_figures(rig: Rig, moments: Sequence[Masks]) -> list[Figure]:
     free_rig = in_world(rig, free)
     room = np.array([[-REACH] * 3, [REACH] * 3])
     figures: list[Figure] = []
-    for masks in moments:
+    for moment, masks in enumerate(moments):
         if sum(mask is not None and mask.any() for mask in masks) >= 3:
-            figures += [_figure(free.old_points(part)) for part in _parts(fine_hull(free_rig, masks, room).strict)]
+            figures += [_figure(free.old_points(part), moment) for part in _parts(fine_hull(free_rig, masks, room).strict)]
     return figures
 
 
@@ -135,9 +138,9 @@ def _parts(points: np.ndarray) -> list[np.ndarray]:
     return [points[labels == k] for k in order if counts[k] >= max(LEAST_POINTS, LEAST_SHARE * counts.max())]
 
 
-def _figure(points: np.ndarray) -> Figure:
+def _figure(points: np.ndarray, moment: int) -> Figure:
     values, vectors = np.linalg.eigh(np.cov(points.T))
-    return Figure(points, vectors[:, 2], float(np.sqrt(values[2] / max(values[1], 1e-12))))
+    return Figure(points, vectors[:, 2], float(np.sqrt(values[2] / max(values[1], 1e-12))), moment)
 
 
 def find_ground(rig: Rig, figures: Sequence[Figure]) -> Ground | None:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from hmc.check.moments import Masks
+from hmc.check.silhouettes import covered_shares
 from hmc.check.upright import Figure, find_figures, find_ground, level_share
 from hmc.io.recording import Recording
 
@@ -18,6 +19,8 @@ TILTED_DEG = 25.0
 STATURES_M = (0.6, 2.4)
 #: Share of a figure that must be within the room, a little widened, metres.
 INSIDE, AROUND_M = 0.3, 0.3
+#: Cameras of one moment have this much of their silhouettes explained by the others' hull, at least, on the median.
+IN_TIME = 0.6
 
 
 def world_findings(recording: Recording, masks: Sequence[Masks]) -> list[str]:
@@ -47,10 +50,13 @@ def world_findings(recording: Recording, masks: Sequence[Masks]) -> list[str]:
         if tilt_deg > TILTED_DEG and (tilt_deg > 180 - TILTED_DEG or level_share(rig, ground.up) > level_share(rig, np.array([0.0, 0, 1]))):
             return [f"people stand {tilt_deg:.0f} degrees from the calibration's z axis, which should point up; {cure}"]
         if not STATURES_M[0] <= ground.stature <= STATURES_M[1]:
-            return [
-                f"people come out {ground.stature:.3g} m tall; the calibration is in other units than metres; {cure} (if cameras "
-                f"may be out of time, first: hmc sync {recording.path})"
-            ]
+            said = f"people come out {ground.stature:.3g} m tall"
+            covered = covered_shares(recording, shown)
+            if np.isfinite(covered).any() and np.nanmedian(covered) < IN_TIME:
+                return [
+                    f"{said}, and little of what cameras see fits together: are they out of time (hmc sync {recording.path})? Else {cure}"
+                ]
+            return [f"{said}; the calibration is in other units than metres; {cure}"]
     if not any(_inside(one, room) >= INSIDE for one in figures):
         where = ", ".join(f"{value:.1f}" for value in np.median(np.concatenate([one.points for one in figures]), axis=0))
         limits = " to ".join(f"({', '.join(f'{value:.1f}' for value in end)})" for end in room)

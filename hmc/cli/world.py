@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from hmc.cli.common import output_path, positive_float
+from hmc.cli.common import add_session_option, given_places, output_path, positive_float
 
 __all__ = ["add_parser", "run"]
 
@@ -23,6 +23,7 @@ def add_parser(subparsers) -> None:
         "and the floor at z = 0, as calibration.toml; what was there is kept. Nothing is written where it is so already.",
     )
     parser.add_argument("recording", type=Path, help="folder of the recording")
+    add_session_option(parser)
     parser.add_argument(
         "--unit",
         type=positive_float,
@@ -72,14 +73,16 @@ def run(args: argparse.Namespace) -> int:
     from hmc.camera.world import in_world
     from hmc.check.find_world import Known, find_world
     from hmc.check.given_points import board_points, read_points
+    from hmc.check.hidden import hidden_below
     from hmc.check.moments import moments
     from hmc.check.upright import find_figures, find_ground
     from hmc.check.world_picture import save_world_picture
     from hmc.errors import InputError
-    from hmc.io.new_world import write_new_world
+    from hmc.io.new_world import write_new_world, write_session_world
     from hmc.io.recording import background_frames, iterate_frames, open_recording
 
-    recording = open_recording(args.recording, any_world=True)
+    places = given_places(args)
+    recording = open_recording(places, any_world=True)
     rig = recording.rig
     if args.distance is not None:
         rig.select(args.distance[:2])
@@ -90,12 +93,14 @@ def run(args: argparse.Namespace) -> int:
         points = read_points(args.points, rig)
     elif args.board is not None:
         points = board_points(rig, images, args.board, args.square)
-    figures = find_figures(rig, moments(recording, MOMENTS))
+    masks = moments(recording, MOMENTS)
+    figures = find_figures(rig, masks)
     ground = find_ground(rig, figures)
+    hidden = () if ground is None else hidden_below(rig, figures, masks, ground.up)
     heights = recording.subject_height_m
     known = Known(args.unit, args.distance, args.height or (heights[0] if len(heights) == 1 else None))
     try:
-        found = find_world(rig, ground, points, known)
+        found = find_world(rig, ground, points, known, hidden)
     except InputError as error:
         raise InputError(f"{args.recording}: {error}") from None
     for line in found.lines:
@@ -109,7 +114,12 @@ def run(args: argparse.Namespace) -> int:
     elif args.dry_run:
         print(f"{name}: nothing is written (--dry-run)")
     else:
-        for line in write_new_world(args.recording, in_world(rig, found.world)):
+        new = in_world(rig, found.world)
+        if places.calibration is not None and places.calibration_place == places.calibration:
+            written = write_session_world(args.session, new, places.settings)
+        else:
+            written = write_new_world(args.recording, new)
+        for line in written:
             print(line)
         if (args.recording / "truth").is_dir():
             print(f"{args.recording / 'truth'} is still in the old world")

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from hmc.camera.model import Rig
 from hmc.io.calibration import write_calibration
 from hmc.io.door import read_text_file
 
-__all__ = ["keep_before", "write_new_world"]
+__all__ = ["keep_before", "write_new_world", "write_session_world"]
 
 #: Of recording.toml: what is said in the old world's terms.
 OLD_TERMS = ("room", "units", "up")
@@ -46,6 +48,32 @@ def write_new_world(path: Path, rig: Rig) -> list[str]:
             settings.write_text(new, encoding="utf-8")
             lines.append(f"{settings}: {', '.join(f'`{key}`' for key in taken)} of the old world taken out; kept what was there: {kept}")
     return lines
+
+
+def write_session_world(session: Path, rig: Rig, settings: Mapping[str, Any]) -> list[str]:
+    """Write the calibration of a session's trials beside its file, which is its user's to change.
+
+    Parameters
+    ----------
+    session : Path
+        ``session.toml``.
+    rig : Rig
+        Of all of its cameras, metres, z up.
+    settings : mapping
+        What the session says of its recordings.
+
+    Returns
+    -------
+    list of str
+        What was written, and what to change in the session's file.
+    """
+    folder = session if session.is_dir() else session.parent
+    target = folder / "calibration_world.toml"
+    lines = [f"kept what was there: {keep_before(target)}"] if target.exists() else []
+    write_calibration(target, rig)
+    old = [key for key in OLD_TERMS if key in settings]
+    also = f", and take {', '.join(f'`{key}`' for key in old)} of the old world out of its [recording]" if old else ""
+    return [f"written: {target}", *lines, f'now say calibration = "{target.name}" in the session\'s file{also}: it holds for all trials']
 
 
 def keep_before(file: Path) -> Path:

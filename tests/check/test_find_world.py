@@ -16,6 +16,7 @@ from hmc.camera.world import World, in_world
 from hmc.check import check_recording
 from hmc.check.find_world import Known, find_world
 from hmc.check.given_points import board_points, read_points
+from hmc.check.hidden import hidden_below, shown_below
 from hmc.check.upright import find_figures, find_ground
 from hmc.cli import main
 from hmc.errors import InputError
@@ -62,6 +63,45 @@ def test_cameras_upside_down_and_on_their_sides_do_not_turn_the_world(ring, mome
     rig = Rig(tuple(turned))
     masks = [[post(camera, 0.7 * np.cos(a), 0.7 * np.sin(a)) for camera in rig] for a in np.linspace(0, 5, 6)]
     assert tilt_deg(find_ground(rig, find_figures(rig, masks)).up, [0, 0, 1]) < 2.5
+
+
+def test_legs_that_furniture_hides_are_noticed(ring, moments):
+    """Two of five cameras see nothing below the thighs: hulls end there, and a stature must not tell the scale."""
+    cut = []
+    for masks in moments:
+        cut.append([mask.copy() for mask in masks])
+        for mask in cut[-1][:2]:
+            rows = np.flatnonzero(mask.any(axis=1))
+            mask[(rows[0] + 3 * rows[-1]) // 4 :] = False
+    figures = find_figures(ring, cut)
+    ground = find_ground(ring, figures)
+    assert ground.floor > 0.25
+    assert hidden_below(ring, figures, cut, ground.up) == ring.names[2:]
+    whole = find_figures(ring, moments)
+    assert np.abs(shown_below(ring, whole, moments, find_ground(ring, whole).up)).max() < 0.05
+    with pytest.raises(InputError, match="tells no scale"):
+        find_world(ring, ground, None, Known(height_m=HEIGHT_M), ring.names[2:])
+    told = find_world(ring, ground, None, Known(unit_m=1.0), ring.names[2:])
+    assert "so the floor is lower" in " ".join(told.lines)
+
+
+def test_a_session_gets_a_calibration_beside_its_file(ring, moments, tmp_path, capsys):
+    lab = tmp_path / "lab"
+    turned = in_world(ring, WORLDS["y up, millimetres"])
+    draw_recording(lab / "trials" / "walk", ring, walk(12), shape=post)
+    (lab / "trials" / "walk" / "calibration.toml").unlink()
+    (lab / "trials" / "walk" / "recording.toml").unlink()
+    write_calibration(lab / "calibration.toml", turned)
+    text = 'calibration = "calibration.toml"\ntrials = "trials/*"\n[recording]\nunits = "cm"\n'
+    (lab / "session.toml").write_text(text)
+    words = ["world", str(lab / "trials" / "walk"), "--session", str(lab / "session.toml"), "--out", str(tmp_path / "a.png")]
+    assert main(words) == 0
+    said = capsys.readouterr().out
+    assert 'calibration = "calibration_world.toml"' in said and "`units`" in said
+    assert (lab / "session.toml").read_text() == text and not (lab / "trials" / "walk" / "calibration.toml").exists()
+    found = read_calibration(lab / "calibration_world.toml")
+    apart = [np.linalg.norm(rig[0].centre - rig[2].centre) for rig in (found, ring)]
+    assert apart[0] == pytest.approx(apart[1], rel=1e-3)
 
 
 def test_nothing_is_found_of_noise(ring):
