@@ -165,10 +165,10 @@ def _feet(args: argparse.Namespace, persons) -> dict[str, float]:
     from hmc.landmarks import FOOT_POINTS
     from hmc.metrics.scores.feet import feet_errors
 
-    files = (args.directory / "feet.csv", Path(args.recording or "") / "truth" / "feet.csv")
-    if args.recording is None or args.truth is not None or not all(file.is_file() for file in files):
+    found, true = args.directory / "feet.csv", Path(args.recording or "") / "truth" / "feet.csv"
+    if args.recording is None or args.truth is not None or not found.is_file() or not true.is_file():
         return {}
-    return feet_errors(*(read_joints(file, FOOT_POINTS) for file in files), persons)
+    return feet_errors(read_joints(found, FOOT_POINTS), read_joints(true, FOOT_POINTS), persons)
 
 
 def _in_images(args: argparse.Namespace, estimated, true_poses, truth_images: Path | None, selected):

@@ -53,7 +53,7 @@ def finished(tmp_path_factory):
 
 
 def test_a_run_leaves_its_four_files_and_its_silhouettes_and_nothing_else(finished):
-    assert sorted(path.name for path in finished.iterdir()) == ["joints.csv", "pose.npz", "run.toml", "silhouettes", "tracks.csv"]
+    assert sorted(path.name for path in finished.iterdir()) == ["feet.csv", "joints.csv", "pose.npz", "run.toml", "silhouettes", "tracks.csv"]
     assert len(list((finished / "silhouettes").rglob("*.png"))) == 5 * 7
     joints, tracks, states, run = (
         read_joints(finished / "joints.csv"),
@@ -102,7 +102,7 @@ def test_another_run_takes_kept_silhouettes_and_comes_to_the_same_bytes(finished
     monkeypatch.setattr(frontend, "stream_masks", None)  # nothing is segmented
     more = "--frames", "5", "--voxel", "0.05", "--silhouettes-from", str(finished), "--out", str(tmp_path / "again")
     assert pose(tmp_path, *more, "--no-silhouettes") == 0
-    assert sorted(path.name for path in (tmp_path / "again").iterdir()) == ["joints.csv", "pose.npz", "run.toml", "tracks.csv"]
+    assert sorted(path.name for path in (tmp_path / "again").iterdir()) == ["feet.csv", "joints.csv", "pose.npz", "run.toml", "tracks.csv"]
     for name in ("joints.csv", "tracks.csv"):
         assert (tmp_path / "again" / name).read_bytes() == (finished / name).read_bytes()
     assert pose(tmp_path, *more, "--no-silhouettes") == 0
@@ -150,6 +150,7 @@ def test_what_a_method_tells_of_each_frame_stands_beside_the_poses(tmp_path, mon
         monkeypatch.setattr(command, "pose_method", registry.pose_method)
     assert pose(tmp_path, "--method", "pso", "--frames", "5", "--voxel", "0.04", "--height", "recording") == 0
     assert {path.name for path in tmp_path.iterdir()} == {
+        "feet.csv",
         "fits.csv",
         "joints.csv",
         "pose.npz",
@@ -202,7 +203,7 @@ def test_a_stopped_run_goes_on_and_ends_as_if_it_had_not_been(tmp_path, monkeypa
         assert (tmp_path / "cut" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
     one, other = (read_pose(tmp_path / folder / "pose.npz") for folder in ("cut", "whole"))
     assert_array_equal(one.states, other.states)
-    assert sorted(path.name for path in (tmp_path / "cut").iterdir()) == ["joints.csv", "pose.npz", "run.toml", "silhouettes", "tracks.csv"]
+    assert sorted(path.name for path in (tmp_path / "cut").iterdir()) == ["feet.csv", "joints.csv", "pose.npz", "run.toml", "silhouettes", "tracks.csv"]
     assert pictures(tmp_path / "cut") == pictures(tmp_path / "whole")
 
 

@@ -50,7 +50,7 @@ def table(tmp_path_factory):
 def test_from_a_table_of_detections(table, tmp_path, capsys):
     arguments = ("--detections", table, "--markers", "joints", "--frames", 5)
     assert pose(TINY, tmp_path / "out", *arguments) == 0
-    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["joints.csv", "pose.npz", "run.toml", "tracks.csv"]
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["feet.csv", "joints.csv", "pose.npz", "run.toml", "tracks.csv"]
     joints, truth = read_joints(tmp_path / "out" / "joints.csv"), read_joints(TINY / "truth" / "joints.csv")
     assert np.linalg.norm(joints.positions - truth.positions[:5], axis=-1).mean() < 0.03
     assert len(read_pose(tmp_path / "out" / "pose.npz").states) == 5

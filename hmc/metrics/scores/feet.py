@@ -33,7 +33,7 @@ def feet_errors(estimate: PoseTable, truth: PoseTable, persons: Sequence[PersonE
         found, true = estimate.where(np.isin(estimate.persons, person.estimated_as)), truth.of(person.person)
         _, a, b = np.intersect1d(found.frames, true.frames, return_indices=True)
         apart.append(np.linalg.norm(found.positions[a] - true.positions[b], axis=2))
-    errors, scores = np.concatenate(apart), {}
+    errors, scores = np.concatenate(apart), dict[str, float]()
     for kind in ("heel", "toe"):
         own = errors[:, [name.endswith(kind) for name in FOOT_POINTS]]
         known = own[np.isfinite(own)]
