@@ -6,7 +6,7 @@
 >>> people.positions.shape  # rows, landmarks, x y z in metres
 (8, 15, 3)
 
-These names will stay: `open_recording`, `sample`, `check`, `silhouettes`, `hulls`, `track`, `views`, `pose`, `evaluate`, `view`;
+These names will stay: `open_recording`, `sample`, `check`, `silhouettes`, `hulls`, `track`, `views`, `pose`, `evaluate`, `view`, `export`;
 `recording_of` for images in memory, `Session` and `live` for images as they come; the records `Recording`, `Rig`, `Camera`, `TrackTable`,
 `PoseTable`, `PosedPeople`; `METHODS` and `TRACKERS`, `pose_method`, `PoseMethod`, `register_method` and `register_tracker` to add to them;
 and `InputError`.
@@ -34,6 +34,7 @@ _WHERE = {
     "TRACKERS": "hmc.tracking.trackers",
     "TrackTable": "hmc.io.results",
     "evaluate": "hmc.api",
+    "export": "hmc.api",
     "hulls": "hmc.api",
     "live": "hmc.session.newest",
     "open_recording": "hmc.io.recording",

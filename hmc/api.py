@@ -24,12 +24,13 @@ if TYPE_CHECKING:
     from hmc.io.keypoints import KeypointSource
     from hmc.metrics.mot import MotScores
     from hmc.metrics.scores.poses import PoseEvaluation
+    from hmc.motion.gaps import Fill
     from hmc.pose.follow import PosedPeople
     from hmc.pose.method import PoseMethod
     from hmc.pose.views.person_view import PersonView
     from hmc.tracking.trackers import Tracker
 
-__all__ = ["check", "evaluate", "hulls", "pose", "silhouettes", "track", "view", "views"]
+__all__ = ["check", "evaluate", "export", "hulls", "pose", "silhouettes", "track", "view", "views"]
 
 #: Sides of a voxel, metres: for poses and hulls, for tracks, and in pictures.
 POSE_VOXEL_M, TRACK_VOXEL_M = 0.03, 0.05
@@ -278,7 +279,7 @@ def pose(
             else learn_scatter(recording.rig, tracks, keypoints, recording.fps)
         )
         options = FollowOptions(POSE_VOXEL_M, seed, height, detections, keypoints=cues)
-        people = follow(recording, tracks, method, options, run)
+        people = replace(follow(recording, tracks, method, options, run), fps=recording.fps)
         run = replace(run, progress=None)
         if tracks is not None:
             people = backward(recording, tracks, method, people, options, run)
@@ -355,6 +356,57 @@ def view(found: PosedPeople | TrackTable, recording: Recording, out: str | Path,
 
     result = Result(tracks=found) if isinstance(found, TrackTable) else with_bodies(Result(found.poses), found.states)
     write_view(out, recording, result, frames)
+
+
+def export(
+    found: PosedPeople | str | Path,
+    out: str | Path,
+    fps: float | None = None,
+    person: int | None = None,
+    fill: Fill = "none",
+    max_gap_s: float | None = None,
+) -> list[Path]:
+    """Write poses in a format of other programs, by the suffix: TRC, C3D, BVH, OpenSim's MOT with its model, GLB, CSV, Parquet.
+
+    Parameters
+    ----------
+    found : PosedPeople or path
+        Poses, or the folder of a result.
+    out : path
+        Such as ``"walk.trc"``; where the format holds one person and there are several, one file a person.
+    fps : float, optional
+        Frames a second; by default those of the recording.
+    person : int, optional
+        This one alone.
+    fill : {"none", "linear", "spline"}
+        What is done about gaps; formats without any are filled in any case.
+    max_gap_s : float, optional
+        Longer gaps stay, seconds.
+
+    Returns
+    -------
+    list of Path
+        The files.
+
+    Raises
+    ------
+    InputError
+        When the frames a second are not known, there is no such format, it needs angles that there are not, or a package is missing.
+
+    Examples
+    --------
+    >>> import hmc, tempfile
+    >>> people = hmc.pose(hmc.open_recording("data/synthetic/tiny", frames=8))
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     [path.name for path in hmc.export(people, f"{folder}/walk.mot")]
+    ['walk.mot', 'walk.osim']
+    """
+    from hmc.motion.export import export_trajectories
+    from hmc.motion.gaps import fill_trajectory
+    from hmc.motion.trajectory import chosen, read_trajectories
+
+    people = read_trajectories(found, fps, person) if isinstance(found, str | Path) else chosen(found.trajectories(fps), person, "export")
+    return list(export_trajectories([fill_trajectory(one, fill, max_gap_s) for one in people], out).paths)
 
 
 def _in_images(keypoints: KeypointSource, recording: Recording) -> KeypointSource:

@@ -18,7 +18,7 @@ from hmc.errors import InputError
 
 __all__ = ["command_parser", "main", "make_parser", "repeated"]
 
-COMMANDS = ("check", "world", "sync", "synth", "track", "pose", "evaluate", "view", "run", "experiments", "cite", "completion")
+COMMANDS = ("check", "world", "sync", "synth", "track", "pose", "evaluate", "view", "export", "run", "experiments", "cite", "completion")
 
 EXIT_WORKER = 1
 EXIT_INPUT = 2

@@ -3,9 +3,10 @@
 Source: the C3D file format specification (c3d.org). Integer and floating-point files of all three processor types are read; analogue
 channels are passed over.
 
-The package `c3d` (0.6.0) would be the obvious reader. It refuses the file in tests/test_c3d.py that another program wrote, with a single
-analogue channel: its group ANALOG has a scalar where it asserts an array. Files without POINT:DATA_START, POINT:DESCRIPTIONS or analogue
-channels, which the format allows, it reads with warnings; and it takes more than ten times as long. So this one stays.
+Files are written through `ezc3d` (`hmc.io.export.c3d`), and would be read through it, but that a file cut off within its parameters makes
+it run on without an end (1.7.2; tests/io/test_c3d.py has such files), and that it is no dependency. The package `c3d` (0.6.0) refuses the
+file in tests/io/test_c3d.py that another program wrote, with a single analogue channel: its group ANALOG has a scalar where it asserts an
+array. So this reader stays, and tests hold it against ezc3d's files.
 """
 
 from __future__ import annotations

@@ -24,6 +24,7 @@ from hmc.io.masks import MaskStep, keep_masks, kept_frames
 from hmc.io.recording import Recording, for_voxels
 from hmc.io.results import PoseStates, PoseTable, TrackTable, write_joints, write_pose
 from hmc.landmarks import FOOT_POINTS, LANDMARKS, landmark_index
+from hmc.pose.finished import FinishedPeople
 from hmc.pose.keypoint_cues import KeypointCues, with_keypoints
 from hmc.pose.method import Capture, PoseMethod
 from hmc.pose.person import DecidedFrames, PersonState, PersonTrack, PoseTask, person_step, resumed, starts_with
@@ -42,7 +43,7 @@ __all__ = ["FollowOptions", "PosedPeople", "follow", "for_method", "known_landma
 
 
 @dataclass(frozen=True)
-class PosedPeople:
+class PosedPeople(FinishedPeople):
     """The poses of all persons.
 
     Parameters
@@ -59,6 +60,8 @@ class PosedPeople:
         What the method tells of each row beside that; empty for most.
     status : tuple of str
         ``"fitted"``, or why there is no pose, of each row.
+    fps : float or None
+        Frames a second of the recording, where they are known.
     """
 
     poses: PoseTable
@@ -67,6 +70,7 @@ class PosedPeople:
     notes: tuple[str, ...]
     details: tuple[Mapping[str, object], ...] = ()
     status: tuple[str, ...] = ()
+    fps: float | None = None
 
     @property
     def frames(self) -> np.ndarray:

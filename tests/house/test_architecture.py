@@ -22,6 +22,7 @@ IO = CAMERA | {"io"}
 VOXELS = IO | {"processes", "voxels"}
 TRACKING = VOXELS | {"search", "tracking"}
 BODY = CAMERA | {"search", "body"}
+MOTION = BODY | IO | {"metrics", "motion"}
 VIEWS = TRACKING | BODY | {"pose.spectral", "pose.views"}
 OBJECTIVES = VIEWS | {"pose.objectives"}
 METHOD = OBJECTIVES | {"pose.method"}
@@ -29,13 +30,14 @@ STEPS = METHOD | {"pose.steps"}
 STARTS = STEPS | {"pose.starts"}
 PERSON = STARTS | {"pose.legs", "pose.person"}
 MIXTURES = STEPS | {"pose.legs", "pose.mixtures"}
-FOLLOWING = PERSON | {"pose.records", "pose.follow", "pose.keypoint_cues", "pose.keypoint_sides"}
+FINISHED = MOTION | {"view"}
+FOLLOWING = PERSON | FINISHED | {"pose.finished", "pose.records", "pose.follow", "pose.keypoint_cues", "pose.keypoint_sides"}
 METHODS = STARTS | MIXTURES | {"pose.recovery", "pose.methods"}
 POSE = METHODS | FOLLOWING | {"pose.backward", "pose.clear_views", "pose.keypoint_tracks", "pose.occluders", "pose.registry"}
 POSE |= {"pose.keypoint_views", "pose.smoothing"}
 METRICS = IO | {"metrics"}
 VIEW = VOXELS | {"body", "view"}
-EVERYTHING = POSE | METRICS | VIEW | {"check", "synthetic", "plugins"}
+EVERYTHING = POSE | METRICS | VIEW | {"motion", "check", "synthetic", "plugins"}
 MAY_IMPORT = {
     "errors": set(),
     "landmarks": {"errors"},
@@ -45,6 +47,7 @@ MAY_IMPORT = {
     "voxels": VOXELS,
     "tracking": TRACKING | {"plugins"},
     "body": BODY,
+    "motion": MOTION,
     "pose.views": VIEWS,
     "pose.spectral": TRACKING | {"pose.spectral"},
     "pose.objectives": OBJECTIVES,
@@ -55,6 +58,7 @@ MAY_IMPORT = {
     "pose.recovery": STARTS,
     "pose.person": PERSON,
     "pose.records": PERSON | {"pose.records"},
+    "pose.finished": FINISHED,
     "pose.follow": FOLLOWING,
     "pose.keypoint_cues": OBJECTIVES | {"pose.keypoint_sides"},
     "pose.keypoint_sides": VIEWS,

@@ -1,0 +1,158 @@
+"""Smoothing as a step on a finished result: landmarks, and then the angles whose landmarks these are, so that bones keep their lengths.
+
+Each landmark is smoothed in each stretch in which it is known; nothing is smoothed over a gap. Sources: Winter (2009), section 3.4.4.2, for
+the Butterworth filter run forwards and backwards; Savitzky and Golay (1964) for the polynomial.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from hmc.body.inverse import fit_landmarks
+from hmc.body.kinematics import landmarks
+from hmc.errors import InputError
+from hmc.motion.trajectory import Trajectory
+
+__all__ = ["Smoothing", "butterworth", "local_polynomial", "smooth_trajectory", "stretches"]
+
+#: Degree of the polynomial: what turns round within the window is not cut off.
+DEGREE = 3
+#: Order of one run of the filter; it is run forwards and backwards, which makes the order twice this.
+ORDER = 2
+#: Twice run, the filter halves power at a lower frequency than once: the cutoff is raised so that it does at the one that was asked for.
+_TWICE = (np.sqrt(2) - 1) ** (1 / (2 * ORDER))
+#: Steps of inverse kinematics from the pose as it was, which is near.
+_STEPS = 12
+
+
+@dataclass(frozen=True)
+class Smoothing:
+    """How a trajectory is smoothed.
+
+    Parameters
+    ----------
+    kind : {"butterworth", "polynomial"}
+    cutoff_hz : float
+        Of the Butterworth filter: the frequency of which half of the power is left. 6 Hz is usual for walking.
+    window_s : float
+        Of the polynomial of third degree: the time over which it is fitted around each frame, seconds.
+
+    Raises
+    ------
+    InputError
+        When there is no such kind, or a number is not above 0.
+    """
+
+    kind: Literal["butterworth", "polynomial"] = "butterworth"
+    cutoff_hz: float = 6.0
+    window_s: float = 0.4
+
+    def __post_init__(self) -> None:
+        if self.kind not in ("butterworth", "polynomial"):
+            raise InputError(f"no smoothing {self.kind!r}; there are butterworth and polynomial")
+        if not (self.cutoff_hz > 0 and self.window_s > 0):
+            raise InputError("smoothing: cutoff and window must be above 0")
+
+
+def butterworth(values: np.ndarray, fps: float, cutoff_hz: float) -> np.ndarray:
+    """A low-pass without delay: a Butterworth filter of second order, forwards and backwards.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n, ...)
+        One stretch without gaps.
+    fps : float
+    cutoff_hz : float
+
+    Returns
+    -------
+    ndarray, shape (n, ...)
+        As it was where the stretch is too short for the filter's ends (10 rows or fewer).
+
+    Raises
+    ------
+    InputError
+        When the frame rate is too low for the cutoff.
+    """
+    from scipy.signal import butter, filtfilt
+
+    raised = cutoff_hz / _TWICE
+    if raised >= fps / 2:
+        raise InputError(f"a cutoff of {cutoff_hz:g} Hz needs more than {2 * raised:.1f} frames a second, and there are {fps:g}")
+    numerator, denominator = butter(ORDER, raised, fs=fps)
+    if len(values) <= 3 * (ORDER + 1) + 1:
+        return np.array(values, float)
+    return filtfilt(numerator, denominator, values, axis=0)
+
+
+def local_polynomial(values: np.ndarray, fps: float, window_s: float) -> np.ndarray:
+    """A polynomial of third degree fitted around each row.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n, ...)
+        One stretch without gaps.
+    fps : float
+    window_s : float
+
+    Returns
+    -------
+    ndarray, shape (n, ...)
+        As it was where the stretch is shorter than the window, or the window has fewer than five rows.
+    """
+    from scipy.signal import savgol_filter
+
+    window = 2 * round(window_s * fps / 2) + 1
+    return np.array(values, float) if window < DEGREE + 2 or len(values) < window else savgol_filter(values, window, DEGREE, axis=0)
+
+
+def stretches(known: np.ndarray) -> list[np.ndarray]:
+    """Rows of each stretch of known ones.
+
+    Parameters
+    ----------
+    known : ndarray of bool, shape (n,)
+    """
+    rows = np.flatnonzero(known)
+    return [part for part in np.split(rows, np.flatnonzero(np.diff(rows) != 1) + 1) if len(part)]
+
+
+def smooth_trajectory(one: Trajectory, how: Smoothing) -> Trajectory:
+    """A trajectory made smooth.
+
+    Parameters
+    ----------
+    one : Trajectory
+    how : Smoothing
+
+    Returns
+    -------
+    Trajectory
+        Gaps are where they were. With states, these are the nearest to the smoothed landmarks, and the landmarks are theirs.
+
+    Raises
+    ------
+    InputError
+        When the frame rate is too low for the cutoff.
+    """
+    positions = one.positions.copy()
+    for k in range(positions.shape[1]):
+        for rows in stretches(np.isfinite(positions[:, k]).all(axis=1)):
+            whole = positions[rows, k]
+            smooth = (
+                butterworth(whole, one.fps, how.cutoff_hz) if how.kind == "butterworth" else local_polynomial(whole, one.fps, how.window_s)
+            )
+            positions[rows, k] = smooth
+    if one.states is None or one.body is None:
+        return replace(one, positions=positions)
+    states = one.states.copy()
+    changed = np.flatnonzero((np.nan_to_num(positions) != np.nan_to_num(one.positions)).any(axis=(1, 2)))
+    for row in changed:
+        known = np.isfinite(states[row])
+        states[row, known] = fit_landmarks(one.body, positions[row], np.where(known, states[row], 0.0), _STEPS)[0][known]
+    placed = landmarks(one.body, np.nan_to_num(states[changed]))
+    positions[changed] = np.where(np.isfinite(positions[changed]), placed, np.nan)
+    return replace(one, positions=positions, states=states)

@@ -1,0 +1,161 @@
+"""A finished result as one trajectory a person, without a missing row: from their first frame to their last."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hmc.body.joints import DOF_NAMES, N_DOF, JointLimits, default_limits
+from hmc.body.model import BodyModel
+from hmc.body.proportions import make_body
+from hmc.errors import InputError
+from hmc.io.results import PoseStates, PoseTable, read_joints, read_pose, read_run
+
+__all__ = ["Trajectory", "read_trajectories", "trajectories"]
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """A person over time.
+
+    Parameters
+    ----------
+    person : int
+    fps : float
+        Frames a second.
+    frames : ndarray of int, shape (n,)
+        Consecutive frame numbers of the recording, in which frame 0 is at 0 s.
+    positions : ndarray, shape (n, 15, 3)
+        Landmarks, world, metres; NaN in gaps.
+    views : ndarray, shape (n, 15), optional
+        Cameras that show each landmark clear; NaN where not known.
+    states : ndarray, shape (n, 33), optional
+        Metres and radians, in the order of `hmc.body.joints.DOF_NAMES`; NaN in gaps.
+    body : BodyModel, optional
+        Whose states they are.
+    """
+
+    person: int
+    fps: float
+    frames: np.ndarray
+    positions: np.ndarray
+    views: np.ndarray | None = None
+    states: np.ndarray | None = None
+    body: BodyModel | None = None
+
+    @property
+    def times_s(self) -> np.ndarray:
+        """When each frame was taken, shape (n,)."""
+        return self.frames / self.fps
+
+
+def trajectories(poses: PoseTable, states: PoseStates | None, fps: float) -> list[Trajectory]:
+    """The trajectories of all persons who were ever fitted, by number.
+
+    Parameters
+    ----------
+    poses : PoseTable
+    states : PoseStates or None
+        None: of a result without angles.
+    fps : float
+        Frames a second.
+    """
+    found = []
+    for person in np.unique(poses.persons).tolist():
+        own = poses.of(person)
+        fitted = np.isfinite(own.positions).any(axis=(1, 2))
+        if not fitted.any():
+            continue
+        first, last = int(own.frames[fitted].min()), int(own.frames[fitted].max())
+        own = own.where(fitted)
+        frames, rows = np.arange(first, last + 1), own.frames - first
+        positions = _spread(own.positions, rows, len(frames))
+        views = None if own.views is None else _spread(own.views, rows, len(frames))
+        one = Trajectory(person, fps, frames, positions, views)
+        if states is not None and person in states.bodies:
+            of_person = np.flatnonzero(states.persons == person)
+            kept = of_person[np.isin(states.frames[of_person], own.frames)]
+            whole = _spread(_known_dofs(states)[kept], states.frames[kept] - first, len(frames))
+            body = make_body({name: float(value) for name, value in states.bodies[person].items()}, _wide_limits(whole))
+            one = replace(one, states=whole, body=body)
+        found.append(one)
+    return found
+
+
+def read_trajectories(folder: str | Path, fps: float | None = None, person: int | None = None) -> list[Trajectory]:
+    """The trajectories of a result's folder.
+
+    Parameters
+    ----------
+    folder : path
+        With ``joints.csv``; ``pose.npz`` where the method has angles; ``run.toml``.
+    fps : float, optional
+        Frames a second; by default those of ``run.toml``.
+    person : int, optional
+        This one alone.
+
+    Raises
+    ------
+    InputError
+        When there is no such result, nobody in it, or its frames a second are not known.
+    """
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise InputError(f"{folder}: no such folder; a result is the folder that `hmc pose` wrote")
+    if not (folder / "joints.csv").is_file():
+        raise InputError(f"{folder}: no joints.csv; make poses first (hmc pose)")
+    states = read_pose(folder / "pose.npz") if (folder / "pose.npz").is_file() else None
+    found = trajectories(read_joints(folder / "joints.csv"), states, fps or _fps_of(folder))
+    return chosen(found, person, str(folder))
+
+
+def chosen(found: list[Trajectory], person: int | None, source: str) -> list[Trajectory]:
+    """All of the trajectories, or one person's.
+
+    Raises
+    ------
+    InputError
+        When there is nobody.
+    """
+    if not found:
+        raise InputError(f"{source}: nobody has a pose in it")
+    if person is None:
+        return found
+    if all(one.person != person for one in found):
+        raise InputError(f"{source}: no person {person}; there are {', '.join(str(one.person) for one in found)}")
+    return [one for one in found if one.person == person]
+
+
+def _fps_of(folder: Path) -> float:
+    run: Mapping[str, Any] = read_run(folder / "run.toml") if (folder / "run.toml").is_file() else {}
+    fps = run.get("parameters", {}).get("fps")
+    if not isinstance(fps, int | float) or not fps > 0:
+        raise InputError(f"{folder}: its run.toml does not say how many frames a second; give --fps")
+    return float(fps)
+
+
+def _spread(values: np.ndarray, rows: np.ndarray, n: int) -> np.ndarray:
+    out = np.full((n, *values.shape[1:]), np.nan)
+    out[rows] = values
+    return out
+
+
+def _known_dofs(states: PoseStates) -> np.ndarray:
+    """States in the order of today's degrees of freedom; those that an older result lacks are 0, as they were held."""
+    places = {name: place for place, name in enumerate(states.dof_names)}
+    out = np.zeros((len(states.states), N_DOF))
+    for k, name in enumerate(DOF_NAMES):
+        if name in places:
+            out[:, k] = states.states[:, places[name]]
+    return out
+
+
+def _wide_limits(states: np.ndarray) -> JointLimits:
+    """Those of the default body, and wider where a pose was: a paper's body may turn where ours does not."""
+    usual = default_limits()
+    low, high = (np.where(np.isfinite(states), states, bound) for bound in (np.inf, -np.inf))
+    return JointLimits(np.minimum(usual.low, low.min(axis=0)), np.maximum(usual.high, high.max(axis=0)))

@@ -1,0 +1,199 @@
+"""Files for other programs, opened by other people's readers: the landmarks in them are those of the result."""
+
+import importlib.util
+import json
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import hmc
+from hmc.body.joints import DOF_NAMES, N_DOF, dof_index
+from hmc.body.kinematics import landmarks
+from hmc.body.model import neutral_state
+from hmc.body.proportions import default_body
+from hmc.cli import main
+from hmc.cli.export import FORMATS as SAID
+from hmc.errors import InputError
+from hmc.io.c3d import read_c3d
+from hmc.io.results import PoseStates, PoseTable, write_joints, write_pose
+from hmc.landmarks import LANDMARKS
+from hmc.motion.export import FORMATS, export_trajectories
+from hmc.motion.gaps import fill_trajectory
+from hmc.motion.trajectory import read_trajectories, trajectories
+from hmc.pose.follow import PosedPeople
+from hmc.synthetic.bvh import bvh_positions, read_bvh
+
+SCRIPT = Path(__file__).resolve().parents[2] / "docs" / "exports_elsewhere.py"
+_spec = importlib.util.spec_from_file_location("exports_elsewhere", SCRIPT)
+elsewhere = importlib.util.module_from_spec(_spec)
+sys.modules["exports_elsewhere"] = elsewhere
+_spec.loader.exec_module(elsewhere)
+
+
+def moving(n=12, persons=(0,), first=5):
+    """Somebody who turns every joint, and the room around them; each person a little otherwise."""
+    rng = np.random.default_rng(3)
+    body = default_body(1.71)
+    tables = []
+    for person in persons:
+        ends = neutral_state("down") + np.where(np.arange(N_DOF) < 6, 1.0, 0.25) * rng.normal(size=(2, N_DOF))
+        states = np.linspace(*np.clip(ends, body.limits.low, body.limits.high), n)
+        tables.append((np.arange(first, first + n), np.full(n, person), states))
+    frames, numbers, states = (np.concatenate(parts) for parts in zip(*tables, strict=True))
+    table = PoseTable(frames, numbers, landmarks(body, states))
+    kept = PoseStates(frames, numbers, states, DOF_NAMES, dict.fromkeys(persons, body.dimensions))
+    return PosedPeople(table, kept, np.zeros(len(frames)), (), fps=50.0)
+
+
+def with_gap(people, rows):
+    positions = people.positions.copy()
+    positions[rows] = np.nan
+    return replace(people, poses=replace(people.poses, positions=positions))
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+@pytest.mark.parametrize("kind,package,read", elsewhere.READERS, ids=lambda value: value if isinstance(value, str) else "")
+def test_landmarks_elsewhere_are_ours(tmp_path, kind, package, read):
+    pytest.importorskip(package)
+    (one,) = moving().trajectories()
+    export_trajectories([one], tmp_path / f"walk.{kind}")
+    found = read(tmp_path / f"walk.{kind}")
+    assert found.shape == one.positions.shape
+    assert elsewhere.largest_difference_m(found, one) < 1e-5
+
+
+def test_every_format_is_said_and_tried():
+    assert tuple(FORMATS) == SAID
+    assert set(SAID) == {kind for kind, _, _ in elsewhere.READERS}
+
+
+@pytest.mark.parametrize("kind", ["trc", "c3d", "csv", "parquet"])
+def test_a_gap_is_one_elsewhere(tmp_path, kind):
+    people = with_gap(moving(), [4, 5])
+    hmc.export(people, tmp_path / f"walk.{kind}")
+    readers = [(package, read) for one, package, read in elsewhere.READERS if one == kind]
+    for package, read in readers:
+        if importlib.util.find_spec(package) is not None:
+            empty = np.isnan(read(tmp_path / f"walk.{kind}")).all(axis=(1, 2))
+            assert np.flatnonzero(empty).tolist() == [4, 5], package
+
+
+def test_times_are_those_of_the_recording(tmp_path):
+    people = moving(first=25)
+    for kind in ("trc", "mot", "csv"):
+        hmc.export(people, tmp_path / f"walk.{kind}")
+    rows = (tmp_path / "walk.trc").read_text().splitlines()[6:]
+    assert rows[0].split("\t")[:2] == ["26", "0.500000"] and rows[-1].split("\t")[1] == f"{36 / 50:.6f}"
+    assert (tmp_path / "walk.mot").read_text().split("endheader\n")[1].splitlines()[1].startswith("0.50000000\t")
+    assert (tmp_path / "walk.csv").read_text().splitlines()[1].startswith("25,0.500000,0,")
+
+
+def test_our_own_reader_of_c3d_agrees(tmp_path):
+    pytest.importorskip("ezc3d")
+    people = with_gap(moving(persons=(0, 3)), [2])
+    hmc.export(people, tmp_path / "two.c3d")
+    data = read_c3d(tmp_path / "two.c3d")
+    assert data.rate == 50 and len(data.labels) == 30
+    first, second = people.trajectories()
+    assert np.allclose(data.positions, np.hstack([first.positions, second.positions]), atol=1e-6, equal_nan=True)
+
+
+def test_our_own_reader_of_bvh_agrees(tmp_path):
+    (one,) = moving().trajectories()
+    export_trajectories([one], tmp_path / "walk.bvh")
+    file = read_bvh(tmp_path / "walk.bvh")
+    points = bvh_positions(file)[0][:, [file.names.index(name) for name in LANDMARKS]] / 100
+    assert np.allclose(elsewhere.from_z_forward(points), one.positions, atol=1e-6)
+    assert file.frame_time_s == pytest.approx(1 / 50)
+
+
+def test_formats_without_gaps_are_filled_and_say_so(tmp_path):
+    (whole,), (one,) = moving().trajectories(), with_gap(moving(), [4, 5]).trajectories()
+    written = export_trajectories([one], tmp_path / "walk.bvh")
+    assert "2 of 12 frames" in written.notes[0]
+    file = read_bvh(tmp_path / "walk.bvh")
+    points = bvh_positions(file)[0][:, [file.names.index(name) for name in LANDMARKS]] / 100
+    # Every angle of these people moves straight, so what is put between is what was there.
+    assert np.allclose(elsewhere.from_z_forward(points), whole.positions, atol=1e-6)
+
+
+def test_gaps_are_filled_up_to_a_length():
+    (one,) = with_gap(moving(n=20), [3, 4, 10, 11, 12]).trajectories()
+    filled = fill_trajectory(one, "spline", max_gap_s=2 / 50)
+    assert np.flatnonzero(np.isnan(filled.positions).any(axis=(1, 2))).tolist() == [10, 11, 12]
+    (whole,) = moving(n=20).trajectories()
+    assert np.abs(filled.positions[3:5] - whole.positions[3:5]).max() < 0.01
+    assert np.isfinite(fill_trajectory(one, "linear").positions).all()
+
+
+def test_half_a_turn_is_followed_through():
+    people = moving(n=9)
+    yaw = dof_index("root_rz")[0]
+    states = people.states.states.copy()
+    states[:, yaw] = np.radians([170, 174, 178, 0, 0, -170, -166, -162, -158])
+    people = replace(people, states=replace(people.states, states=states))
+    (one,) = with_gap(people, [3, 4]).trajectories()
+    assert np.allclose(np.degrees(fill_trajectory(one, "linear").states[3:5, yaw]), [182, 186])
+
+
+def test_a_glb_is_as_the_specification_has_it(tmp_path):
+    hmc.export(moving(persons=(0, 1)), tmp_path / "two.glb")
+    content = (tmp_path / "two.glb").read_bytes()
+    assert content[:4] == b"glTF" and int.from_bytes(content[8:12], "little") == len(content)
+    length = int.from_bytes(content[12:16], "little")
+    text = json.loads(content[20 : 20 + length])
+    assert len(text["scenes"][0]["nodes"]) == 2 and length % 4 == 0
+    assert text["buffers"][0]["byteLength"] <= int.from_bytes(content[20 + length : 24 + length], "little")
+    assert all(view["byteOffset"] % 4 == 0 for view in text["bufferViews"])
+
+
+def test_triangles_of_the_flesh_look_outwards():
+    from hmc.motion.body_tree import flesh_meshes
+
+    for mesh in flesh_meshes(default_body(1.8)).values():
+        a, b, c = (mesh.vertices[mesh.triangles[:, k]] for k in range(3))
+        faces, normals = np.cross(b - a, c - a), mesh.normals[mesh.triangles].sum(axis=1)
+        assert ((faces * normals).sum(axis=1) > 0).all()
+
+
+def test_command_line(tmp_path, capsys):
+    people = moving(persons=(0, 1))
+    people.save(tmp_path / "result")
+    assert main(["export", str(tmp_path / "result"), "--to", "trc"]) == 2
+    assert "give --fps" in capsys.readouterr().err
+    assert main(["export", str(tmp_path / "result"), "--to", "trc", "--fps", "50", "--person", "7"]) == 2
+    assert "there are 0, 1" in capsys.readouterr().err
+    (tmp_path / "result" / "run.toml").write_text("[parameters]\nfps = 50.0\n")
+    assert main(["export", str(tmp_path / "result"), "--to", "mot", "--smooth", "butterworth"]) == 0
+    names = [f"motion_person_{k}.{suffix}" for k in (0, 1) for suffix in ("mot", "osim")]
+    assert all((tmp_path / "result" / name).is_file() for name in names)
+    (tmp_path / "result" / "pose.npz").unlink()
+    assert main(["export", str(tmp_path / "result"), "--to", "bvh"]) == 2
+    assert "needs the body's angles" in capsys.readouterr().err
+    assert main(["export", str(tmp_path / "result"), "--to", "csv"]) == 0
+    assert main(["export", str(tmp_path / "none"), "--to", "csv"]) == 2
+
+
+def test_wrong_input(tmp_path):
+    with pytest.raises(InputError, match="no format of that suffix"):
+        hmc.export(moving(), tmp_path / "walk.fbx")
+    with pytest.raises(InputError, match="give fps"):
+        hmc.export(replace(moving(), fps=None), tmp_path / "walk.trc")
+
+
+@pytest.mark.parametrize("package,kind", [("ezc3d", "c3d"), ("pyarrow", "parquet")])
+def test_a_missing_package_is_named(tmp_path, monkeypatch, package, kind):
+    monkeypatch.setitem(sys.modules, package, None)
+    with pytest.raises(InputError, match=rf"needs {package}.*`biomech`"):
+        hmc.export(moving(), tmp_path / f"walk.{kind}")
+
+
+def test_a_result_on_disk_is_the_same(tmp_path):
+    people = moving()
+    write_joints(tmp_path / "joints.csv", people.poses)
+    write_pose(tmp_path / "pose.npz", people.states)
+    (read,), (kept,) = read_trajectories(tmp_path, fps=50), trajectories(people.poses, people.states, 50)
+    assert np.allclose(read.positions, kept.positions, atol=1e-6) and (read.states == kept.states).all()

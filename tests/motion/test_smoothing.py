@@ -1,0 +1,71 @@
+"""Smoothing of finished results: SciPy's own transfer function, closed forms, gaps."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import butter, sosfiltfilt
+
+from hmc.body.kinematics import landmarks
+from hmc.errors import InputError
+from hmc.motion.smoothing import Smoothing, butterworth, local_polynomial, smooth_trajectory, stretches
+from hmc.motion.trajectory import Trajectory
+
+
+def test_half_of_the_power_is_left_at_the_cutoff():
+    t = np.arange(2000) / 100
+    wave = np.sin(2 * np.pi * 6 * t)
+    smooth = butterworth(wave[:, None], 100, 6.0)[:, 0]
+    middle = slice(500, 1500)
+    assert np.mean(smooth[middle] ** 2) / np.mean(wave[middle] ** 2) == pytest.approx(0.5, abs=0.01)
+    # Without delay: no part of it is out of step.
+    assert abs(np.mean(smooth[middle] * np.cos(2 * np.pi * 6 * t[middle]))) < 1e-3
+
+
+def test_the_filter_is_that_of_scipy_in_another_form():
+    values = np.random.default_rng(0).normal(size=(300, 3))
+    raised = 5.0 / (np.sqrt(2) - 1) ** 0.25
+    other = sosfiltfilt(butter(2, raised, fs=60, output="sos"), values, axis=0, padlen=9)
+    assert np.allclose(butterworth(values, 60, 5.0), other)
+
+
+def test_a_parabola_stays():
+    t = np.linspace(-1, 1, 41)
+    values = np.stack([t**2, 1 - t**3], axis=1)
+    assert np.allclose(local_polynomial(values, 30, 0.4), values)
+
+
+def test_nothing_is_smoothed_over_a_gap():
+    rng = np.random.default_rng(1)
+    positions = rng.normal(size=(80, 15, 3))
+    positions[30:33, 4] = np.nan
+    one = Trajectory(0, 30.0, np.arange(80), positions)
+    smooth = smooth_trajectory(one, Smoothing("butterworth", 4.0)).positions
+    assert (np.isnan(smooth) == np.isnan(positions)).all()
+    alone = smooth_trajectory(replace(one, frames=np.arange(30), positions=positions[:30]), Smoothing("butterworth", 4.0)).positions
+    assert np.allclose(smooth[:30, 4], alone[:, 4]) and not np.allclose(smooth[:30, 3], alone[:, 3])
+    assert [part.tolist() for part in stretches(np.array([1, 1, 0, 1], bool))] == [[0, 1], [3]]
+
+
+def test_bones_keep_their_lengths_and_jitter_goes():
+    from test_exports import moving
+
+    people = moving(n=60)
+    (still,) = people.trajectories()
+    states = still.states + 0.02 * np.random.default_rng(2).normal(size=still.states.shape)
+    shaken = replace(
+        people, poses=replace(people.poses, positions=landmarks(still.body, states)), states=replace(people.states, states=states)
+    )
+    smooth = shaken.smoothed("butterworth", cutoff_hz=3.0)
+    errors = [np.linalg.norm(one.positions - people.positions, axis=-1).mean() for one in (shaken, smooth)]
+    assert errors[1] < 0.6 * errors[0]
+    assert np.allclose(landmarks(still.body, smooth.states.states), smooth.positions, atol=1e-9)
+
+
+def test_wrong_input():
+    with pytest.raises(InputError, match="needs more than"):
+        butterworth(np.zeros((50, 3)), 15, 6.0)
+    with pytest.raises(InputError, match="there are butterworth and polynomial"):
+        Smoothing("mean")
+    with pytest.raises(InputError, match="above 0"):
+        Smoothing("polynomial", window_s=0.0)
