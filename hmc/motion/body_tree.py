@@ -41,7 +41,8 @@ def flesh_meshes(body: BodyModel) -> dict[int, Mesh]:
     """
     cones = body.cones
     return {
-        int(place): _joined([_cone_mesh(cones, k) for k in np.flatnonzero(cones.segment == place)]) for place in np.unique(cones.segment)
+        int(place): _joined([_cone_mesh(cones, int(k)) for k in np.flatnonzero(cones.segment == place)])
+        for place in np.unique(cones.segment)
     }
 
 

@@ -64,7 +64,7 @@ def test_bones_keep_their_lengths_and_jitter_goes():
 
 def test_wrong_input():
     with pytest.raises(InputError, match="needs more than"):
-        butterworth(np.zeros((50, 3)), 15, 6.0)
+        butterworth(np.zeros((50, 3)), 12, 6.0)
     with pytest.raises(InputError, match="there are butterworth and polynomial"):
         Smoothing("mean")
     with pytest.raises(InputError, match="above 0"):
