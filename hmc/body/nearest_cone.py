@@ -6,7 +6,7 @@ a hand's breadth, and so are points that some cone holds anyway.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -42,6 +42,8 @@ class Candidates:
         Of each pair's cone, as from `hmc.body.cones.cone_shapes`.
     ends : ndarray, shape (2, n_cones, 3)
         Of the cones' axes when the pairs were chosen, world, metres.
+    cones : Cones
+        Of which the shapes are.
     """
 
     points: np.ndarray
@@ -54,6 +56,7 @@ class Candidates:
     at: np.ndarray
     shapes: tuple[np.ndarray, np.ndarray, np.ndarray]
     ends: np.ndarray
+    cones: Cones
 
 
 def candidates(cones: Cones, maps: ConeMaps, points: np.ndarray, reach_m: float, before: Candidates | None = None) -> Candidates:
@@ -68,18 +71,24 @@ def candidates(cones: Cones, maps: ConeMaps, points: np.ndarray, reach_m: float,
     reach_m : float
         Cones farther from a point than this do not matter, metres.
     before : Candidates, optional
-        Of another pose and the same points: they are returned where they are still good.
+        Of another pose and the same points: they are returned where they are still good. It may be another body's, if that is hardly
+        thicker or thinner.
     """
     ends = np.stack([maps.start[:, :, 0], maps.start[:, :, 0] + maps.axis[:, :, 0] * cones.lengths[:, None]])
     if before is not None and ((ends - before.ends) ** 2).sum(axis=2).max() < SLACK_M**2:
-        return before
+        return before if before.cones is cones else replace(before, shapes=_shapes(cones, before.cone), cones=cones)
     places, directions = places_and_directions(points)
     near, held = cones_near(cones, maps, places, reach_m, directions, SLACK_M)
     point, cone = np.nonzero((near & ~held).T)
     at = cone * (3 * len(places)) + point + (np.arange(3) * len(places))[:, None]
-    length, radii, slope = (values[cone] for values in cone_shapes(cones))
     first = np.flatnonzero(np.diff(point, prepend=-1))
-    return Candidates(points, held, reach_m, cone, point, first, np.diff(first, append=len(point)), at, (length, radii, slope), ends)
+    counts = np.diff(first, append=len(point))
+    return Candidates(points, held, reach_m, cone, point, first, counts, at, _shapes(cones, cone), ends, cones)
+
+
+def _shapes(cones: Cones, cone: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    length, first, slope = (values[cone] for values in cone_shapes(cones))
+    return length, first, slope
 
 
 @dataclass(frozen=True)

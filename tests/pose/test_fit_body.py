@@ -8,7 +8,7 @@ from acted import act
 from numpy.testing import assert_allclose
 from posed import COST, body_of, mean_error, true_state
 
-from hmc.body.dimensions import FitBodySettings
+from hmc.body.dimensions import FITTED, FitBodySettings, reshaped
 from hmc.body.flesh import surface_coordinates
 from hmc.body.joints import N_DOF
 from hmc.body.kinematics import landmarks
@@ -117,3 +117,17 @@ def test_one_frame_is_enough_to_run(walking):
     fitted, poses, info = fit_body(objectives[:1], states[:1], surface_coordinates(body, 150), FitBodySettings())
     assert poses.shape == (1, N_DOF) and np.isfinite(poses).all()
     assert 1.4 < fitted.height_m < 2.2 and info.cost_after <= info.cost_before
+
+
+def test_pairs_chosen_for_another_body_give_the_same_distances():
+    acted = act("gesture", frames=1)
+    body, points = body_of(1.78)
+    state = true_state(body, acted, 0)
+    here = Symmetric(body, points, acted.targets[0], acted.targets[0].surface[::4], COST)
+    near = here.linearise(state).near
+    for unit in np.eye(len(FITTED)):
+        other = reshaped(body, 0.02 * unit)
+        there = here.of_body(other, body_points(other, surface_coordinates(other, 100)))
+        found, fresh = there.linearise(state, near), there.linearise(state)
+        assert_allclose(np.minimum(found.nearest.distance, COST.cap_m), np.minimum(fresh.nearest.distance, COST.cap_m), atol=1e-9)
+        assert_allclose(found.residuals, fresh.residuals, atol=1e-9)

@@ -69,8 +69,8 @@ def test_derivatives_are_exact_for_cylinders(scene, pose):
     body = with_cylinders(body)
     points = BodyPoints(points.surface, axis_points(body))
     state = poses(scene)[pose]
-    _, jacobian = residual_rows(Symmetric(body, points, target, hull, COST), state)
-    measured, smooth = smooth_derivatives(lambda s: residual_rows(Symmetric(body, points, target, hull, COST), s)[0], state)
+    _, jacobian = residual_rows(Symmetric(body, points, target, hull, COST).linearise(state))
+    measured, smooth = smooth_derivatives(lambda s: residual_rows(Symmetric(body, points, target, hull, COST).linearise(s))[0], state)
     for name, rows in groups(points, hull).items():
         assert smooth[rows].mean() > 0.95
         fine = np.flatnonzero(smooth)
@@ -87,8 +87,8 @@ def test_derivatives_for_flesh_point_the_right_way(scene, pose):
     """Elliptic and tapered cones may be treated as round and straight: descent needs the direction."""
     body, points, target, hull, _ = scene
     state = poses(scene)[pose]
-    _, jacobian = residual_rows(Symmetric(body, points, target, hull, COST), state)
-    measured, smooth = smooth_derivatives(lambda s: residual_rows(Symmetric(body, points, target, hull, COST), s)[0], state)
+    _, jacobian = residual_rows(Symmetric(body, points, target, hull, COST).linearise(state))
+    measured, smooth = smooth_derivatives(lambda s: residual_rows(Symmetric(body, points, target, hull, COST).linearise(s))[0], state)
     for name, rows in groups(points, hull).items():
         fine = smooth[rows] & (np.linalg.norm(measured[rows], axis=1) > 1e-9)
         a, b = jacobian[rows][fine], measured[rows][fine]
@@ -105,7 +105,7 @@ def test_residuals_square_to_the_cost(fine_scene, settings):
     body, points, target, hull, true = fine_scene
     objective = Symmetric(body, points, target, hull, settings)
     for state in (true, *poses(fine_scene)):
-        residuals, _ = residual_rows(objective, state)
+        residuals, _ = residual_rows(objective.linearise(state))
         assert residuals @ residuals == pytest.approx(objective.cost(state[None])[0], rel=0.05)
         assert_allclose(objective.linearise(state).residuals, residuals, atol=1e-5)
 
@@ -114,7 +114,7 @@ def test_nothing_pulls_beyond_the_cap(scene):
     body, points, target, hull, true = scene
     far = true.copy()
     far[2] += 50.0
-    residuals, jacobian = residual_rows(Symmetric(body, points, target, hull, COST), far)
+    residuals, jacobian = residual_rows(Symmetric(body, points, target, hull, COST).linearise(far))
     both = slice(0, len(points.surface.points) + len(hull))
     assert not jacobian[both].any()
     assert residuals[both] @ residuals[both] == pytest.approx((1 + COST.uncovered_weight) * COST.cap_m**2, rel=1e-6)
@@ -130,7 +130,7 @@ def test_the_cost_never_rises_and_limits_hold(scene, seed):
         assert np.all((state >= body.limits.low) & (state <= body.limits.high))
         assert info.cost_after <= info.cost_before and info.cost_after <= last
         assert info.evaluations >= 1
-        residuals, _ = residual_rows(Symmetric(body, points, target, hull, COST), state)
+        residuals, _ = residual_rows(Symmetric(body, points, target, hull, COST).linearise(state))
         assert residuals @ residuals <= info.cost_after + 1e-12  # the rest is the hold on the start
         last = info.cost_after
 

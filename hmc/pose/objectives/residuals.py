@@ -21,7 +21,7 @@ from hmc.body.kinematics import dof_masks, joint_twists
 from hmc.body.nearest_cone import Candidates, Nearest, candidates, nearest_cones, towards
 from hmc.body.penetration import penetration_rows
 from hmc.body.prior import POSTURE, posture_spread
-from hmc.pose.objectives.objective import Misfit, Objective
+from hmc.pose.objectives.objective import Linearisation, Misfit
 from hmc.pose.views.hull_target import distance_gradient
 
 if TYPE_CHECKING:
@@ -183,13 +183,12 @@ def _pulls(found: Distances) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate([*rows, len(found.residuals) - N_DOF + np.arange(N_DOF)]), jacobian
 
 
-def residual_rows(objective: Objective, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """An objective at one state as weighted residuals, and how all of them change with the state.
+def residual_rows(found: Linearisation) -> tuple[np.ndarray, np.ndarray]:
+    """Weighted residuals at one state, and how all of them change with it.
 
     Parameters
     ----------
-    objective : Objective
-    state : ndarray, shape (37,)
+    found : Linearisation
 
     Returns
     -------
@@ -198,7 +197,6 @@ def residual_rows(objective: Objective, state: np.ndarray) -> tuple[np.ndarray, 
     jacobian : ndarray, shape (n_residuals, 37)
         Zero where a distance is zero or beyond the cap.
     """
-    found = objective.linearise(state)
     pulled, rows = found.pulls()
     jacobian = np.zeros((len(found.residuals), N_DOF))
     jacobian[pulled] = rows

@@ -99,28 +99,31 @@ def fit_body(
         return [one.of_body(other, samples) for one in objectives]
 
     def rows(shape, states):
+        """Residuals of each frame, how they change with the pose and with the dimensions, and what speeds up others near them."""
         step = 0.01
         here, beside = with_shape(shape), [with_shape(shape + step * unit) for unit in np.eye(len(shape))]
-        out = []
+        out, near = [], []
         for k, state in enumerate(states):
-            residual, jacobian = residual_rows(here[k], state)
-            by_shape = [other[k].linearise(state).residuals for other in beside]
+            found = here[k].linearise(state)
+            residual, jacobian = residual_rows(found)
+            by_shape = [other[k].linearise(state, found.near).residuals for other in beside]
             out.append((residual, jacobian, (np.array(by_shape).T - residual[:, None]) / step))
-        return out
+            near.append(found.near)
+        return out, near
 
-    def costs(shape, states):
-        data = [one.linearise(state).residuals for one, state in zip(with_shape(shape), states, strict=True)]
+    def costs(shape, states, near):
+        data = [one.linearise(state, there).residuals for one, state, there in zip(with_shape(shape), states, near, strict=True)]
         fit = sum(float(r @ r) for r in data)
         total = fit + float((prior.hold * (states - prior.anchors) ** 2).sum()) + len(states) * float(prior.precision @ shape**2)
         return total, fit / len(states)
 
-    total, before = costs(shape, states)
+    total, before = costs(shape, states, [None] * len(states))
     after, damping = before, 1e-2
     for _ in range(settings.iterations):
-        frames = rows(shape, states)
+        frames, near = rows(shape, states)
         for _ in range(4):
             trial_shape, trial_states = _gauss_newton(frames, shape, states, prior, damping, body.limits)
-            trial_total, trial_fit = costs(trial_shape, trial_states)
+            trial_total, trial_fit = costs(trial_shape, trial_states, near)
             if trial_total < total:
                 break
             damping *= 8
