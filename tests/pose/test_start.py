@@ -90,13 +90,24 @@ def test_every_frame_of_the_window_has_a_state_within_the_limits(walker):
 def test_candidates_that_fall_behind_are_given_up_and_the_winner_is_the_same():
     acted = act("walk", frames=12)
     views = views_of_act(acted)
-    settings = replace(QUICK, trial_s=0.07, follow_s=0.2)
+    settings = replace(QUICK, trials_s=(0.07,), follow_s=0.2, same_m=0.0)
     few, all_of_them = (
         start_person(rng_of(1), LEAN, views, capture_of(acted), settings=replace(settings, behind=behind)).started for behind in (1.0, 1e6)
     )
     assert len(few.costs) == 1 < len(all_of_them.costs)
     assert_array_equal(few.state, all_of_them.state)
     assert few.costs[0] == all_of_them.costs[0]
+
+
+def test_of_candidates_on_the_same_way_the_cheapest_alone_goes_on():
+    acted = act("walk", frames=12)
+    views = views_of_act(acted)
+    settings = replace(QUICK, trials_s=(0.07,), follow_s=0.2, behind=1e6)
+    each, one = (
+        start_person(rng_of(1), LEAN, views, capture_of(acted), settings=replace(settings, same_m=same)).started for same in (0.0, 10.0)
+    )
+    assert len(one.costs) == 1 < len(each.costs)
+    assert one.costs[0] in each.costs
 
 
 def test_the_same_seed_gives_the_same_start():

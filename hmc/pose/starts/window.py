@@ -67,10 +67,13 @@ class StartSettings:
         Frames of the window from which candidates are taken.
     candidates : int
         Candidates followed.
-    trial_s, follow_s : float
-        How long each is followed, to both sides, seconds: all for a trial, and then those whose cost is not ...
+    trials_s, follow_s : tuple of float, float
+        How long each is followed, to both sides, seconds: all for a first trial, longer those that are left after it, and to the end those
+        that are left after the last. Left are those whose cost is not ...
     behind : float
-        ... more than so many times the least.
+        ... more than so many times the least, ...
+    same_m : float
+        ... and of those that have come to the same pose at both ends (no landmark farther apart than this, metres) the cheapest.
     walk_speed_m_s : float
         Above this speed of the track, a body is taken to face where it goes.
     walk_penalty : float
@@ -81,9 +84,10 @@ class StartSettings:
 
     anchors: int = 3
     candidates: int = 5
-    trial_s: float = 0.13
+    trials_s: tuple[float, ...] = (0.07, 0.13)
     follow_s: float = 0.4
     behind: float = 1.25
+    same_m: float = 0.04
     walk_speed_m_s: float = 0.5
     walk_penalty: float = 2.0
     body_frames: int = 12
@@ -350,15 +354,14 @@ def _best_hypothesis(subject: Subject, window: _Window, preset: PosePreset, sett
 def _followed(subject, window, preset, settings, anchor, chosen) -> tuple[list[float], list[_Path]]:
     """Every candidate over the frames around that in which they were found: its mean cost, and its poses.
 
-    First all for a short while, and then those that are not far behind by then; the others cost infinitely much.
+    First all for a short while, and then those that are not far behind by then and go their own way; the others cost infinitely much.
     """
     frame_rng, step = window.frame_rng, quick_step(preset)
     paths: list[_Path] = [{} for _ in chosen]
-    scores = np.zeros(len(chosen))
-    for follow_s in (settings.trial_s, settings.follow_s):
+    scores, left = np.zeros(len(chosen)), list(range(len(chosen)))
+    for follow_s in (*settings.trials_s, settings.follow_s):
         reach = max(2, round(follow_s * window.capture.fps))
         first, last = max(0, anchor - reach), min(len(window.views), anchor + reach + 1)
-        left = np.flatnonzero(~(scores > settings.behind * scores.min())).tolist()
 
         def follow(k: int, part: range) -> list[tuple[Tracked, StepInfo]]:
             begin, views = part[0], window.views[part[0] : part[-1] + 1]
@@ -374,7 +377,21 @@ def _followed(subject, window, preset, settings, anchor, chosen) -> tuple[list[f
             headings = np.array([one.state[3] for one, _ in path])
             scores[k] = np.nanmean(followed * walk_factor(headings, window.velocities[first:last], settings))
             paths[k] = dict(enumerate(path, first))
+        left = _going_on(subject.body, scores, paths, settings)
     return scores.tolist(), paths
+
+
+def _going_on(body: BodyModel, scores: np.ndarray, paths: Sequence[_Path], settings: StartSettings) -> list[int]:
+    """Which candidates are not far behind, the cheapest alone of those that are on the same way."""
+    near = np.flatnonzero(~(scores > settings.behind * scores.min()))
+    going: list[int] = []
+    ends: list[np.ndarray] = []
+    for k in near[np.argsort(scores[near], kind="stable")].tolist():
+        here = landmarks(body, np.stack([paths[k][frame][0].state for frame in (min(paths[k]), max(paths[k]))]))
+        if all(np.linalg.norm(here - there, axis=-1).max() > settings.same_m for there in ends):
+            going.append(k)
+            ends.append(here)
+    return sorted(going)
 
 
 def search_all(rng: np.random.Generator, objective: Objective, state: np.ndarray, settings: PolishSettings) -> tuple[np.ndarray, float]:
