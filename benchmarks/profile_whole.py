@@ -36,7 +36,7 @@ STAGES = {
     "following": (("hmc.pose.person", "person_step"),),
     "what furniture hides": (("hmc.pose.occluders", "learn_hidden_places"),),
     "bodies of the whole run": (("hmc.pose.backward", "_bodies"),),
-    "second pass": (("hmc.pose.backward", "_both"),),
+    "second pass": (("hmc.pose.backward", "_own"), ("hmc.pose.backward", "_back")),
     "clear views": (("hmc.pose.clear_views", "with_clear_views"),),
 }
 REST = "all else, with imports"

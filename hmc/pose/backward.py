@@ -16,9 +16,10 @@ The second and the third go on where they were when a run was stopped; the other
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import TypeVar
 
 import numpy as np
 
@@ -51,6 +52,8 @@ from hmc.voxels.hulls import stream_hulls
 from hmc.voxels.run_options import RunOptions
 
 __all__ = ["backward", "with_own_rays"]
+
+T = TypeVar("T")
 
 #: Of the random numbers of a frame: those of the backward pass.
 BACKWARD = 3
@@ -153,11 +156,16 @@ class _Pass:
     places: HiddenPlaces | None
 
     def views(self, frames: Sequence[int]) -> Iterator[tuple[int, dict[int, PersonView]]]:
-        """What some frames show of all people, in any order, by what the first pass tells of the scene and of the others' poses."""
-        shared_tables(person_grid(self.recording, self.options.voxel_size_m), self.recording.rig)  # once, for all processes
-        return each_ahead(self._views, frames, self.run.workers)
+        """What some frames show of all people, made ahead."""
+        return self.each(self.views_of, frames)
 
-    def _views(self, frames: Sequence[int]) -> Iterator[tuple[int, dict[int, PersonView]]]:
+    def each(self, make: Callable[[Sequence[int]], Iterator[T]], frames: Sequence[int]) -> Iterator[T]:
+        """What is made of each of some frames, made ahead by processes."""
+        shared_tables(person_grid(self.recording, self.options.voxel_size_m), self.recording.rig)  # once, for all processes
+        return each_ahead(make, frames, self.run.workers)
+
+    def views_of(self, frames: Sequence[int]) -> Iterator[tuple[int, dict[int, PersonView]]]:
+        """What some frames show of all people, in any order, by what the first pass tells of the scene and of the others' poses."""
         grid = person_grid(self.recording, self.options.voxel_size_m)
         masks = kept_frames(self.run.masks or "", self.run.key, frames)
         for hull in stream_hulls(self.recording, grid, self.run.frontend, masks=masks):
@@ -218,13 +226,14 @@ def _bodies(pass_: _Pass, people: PosedPeople, fitted: np.ndarray) -> dict[int, 
     poses: dict[int, dict[int, tuple[Objective, np.ndarray]]] = {number: {} for number in persons}
     # By the hulls alone: where a detector's keypoints lie on this body is not known yet.
     hulls_alone = replace(pass_, options=replace(pass_.options, keypoints=None))
-    for frame, views in hulls_alone.views(sorted(set().union(*wanted.values()))):
-        for number, person in persons.items():
-            view = views[number] if frame in wanted[number] and number in views else None
-            if view is not None and shows_enough(view.target):
-                k = person.row_of[frame]
-                objective = fine_objective(pass_.rng(number, frame), person.subject, view, settings.polish)
-                poses[number][k] = objective, refine(objective, person.own[k], settings.polish.refine)[0]
+    in_wanted = {
+        number: replace(person, row_of={frame: k for frame, k in person.row_of.items() if frame in wanted[number]})
+        for number, person in persons.items()
+    }
+    for frame, refined in _each_refined(hulls_alone, in_wanted, sorted(set().union(*wanted.values()))):
+        for number, (view, own) in refined.items():
+            objective = fine_objective(pass_.rng(number, frame), persons[number].subject, view, settings.polish)
+            poses[number][persons[number].row_of[frame]] = objective, own
     for number, person in persons.items():
         picks, held_out = ([k for k in part if k in poses[number]] for part in chosen[number])
         bodies[number] = own_body(
@@ -255,30 +264,52 @@ def _put(person: _Person, frame: int, own: np.ndarray, back: np.ndarray, costs: 
 
 def _sweep(pass_: _Pass, persons: Mapping[int, _Person], first: int, end: int) -> None:
     """Follow everybody back from before frame `end`; what is found goes into the persons' tables and the journal."""
-    steps = pass_.views(range(end - 1, first - 1, -1))
-    for frame, views in pass_.run.progress(steps, end - first) if pass_.run.progress else steps:
+    steps = _each_refined(pass_, persons, range(end - 1, first - 1, -1))
+    for frame, refined in pass_.run.progress(steps, end - first) if pass_.run.progress else steps:
         rows = []
-        for number, person in persons.items():
-            k = person.row_of.get(frame)
-            view = views.get(number)
-            if k is None or view is None or view.target is None or not shows_enough(view.target):
-                continue
+        for number, (view, own) in refined.items():
+            person, k = persons[number], persons[number].row_of[frame]
             after = person.back[k + 1] if k + 1 < len(person.rows) else person.own[k]
-            found = _both(pass_.rng(number, frame), person.subject, person.own[k], after, view, pass_.settings.polish)
-            _put(person, frame, *found)
-            rows.append((number, *found))
+            back, costs = _back(pass_.rng(number, frame), person.subject, own, after, view, pass_.settings.polish)
+            _put(person, frame, own, back, costs)
+            rows.append((number, own, back, costs))
         if pass_.run.journal is not None:
             append_journal(pass_.run.journal, {"frame": frame, "rows": rows})
 
 
-def _both(
+def _each_refined(
+    pass_: _Pass, persons: Mapping[int, _Person], frames: Sequence[int]
+) -> Iterator[tuple[int, dict[int, tuple[PersonView, np.ndarray]]]]:
+    """What some frames show of those people of whom it is enough, with their first pose, refined: all that needs no other frame."""
+
+    def refined(some: Sequence[int]) -> Iterator[tuple[int, dict[int, tuple[PersonView, np.ndarray]]]]:
+        for frame, views in pass_.views_of(some):
+            shown = {number: view for number, view in views.items() if number in persons and frame in persons[number].row_of}
+            yield (
+                frame,
+                {
+                    number: (view, _own(pass_.rng(number, frame), persons[number], view, pass_.settings.polish))
+                    for number, view in shown.items()
+                    if shows_enough(view.target)
+                },
+            )
+
+    return pass_.each(refined, frames)
+
+
+def _own(rng: np.random.Generator, person: _Person, view: PersonView, settings: PolishSettings) -> np.ndarray:
+    """A frame's first pose, refined."""
+    objective = fine_objective(rng, person.subject, view, settings)
+    return refine(objective, person.own[person.row_of[view.frame]], settings.refine)[0]
+
+
+def _back(
     rng: np.random.Generator, subject: Subject, own: np.ndarray, after: np.ndarray, view: PersonView, settings: PolishSettings
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A frame's first pose, refined; the better of that and the next frame's, with lost limbs looked for; and what their mixtures cost."""
+) -> tuple[np.ndarray, np.ndarray]:
+    """The better of a frame's first pose, refined, and the next frame's, with lost limbs looked for; and what their mixtures cost."""
     objective = fine_objective(rng, subject, view, settings)
-    refined, _ = refine(objective, own, settings.refine)
-    back, _, _ = polish(rng, objective, [refined, after, *keypoint_pose(subject.body, view.keypoints, refined)], after, settings)
-    return refined, back, objective.cost(mixed_poses(refined, back))
+    back, _, _ = polish(rng, objective, [own, after, *keypoint_pose(subject.body, view.keypoints, own)], after, settings)
+    return back, objective.cost(mixed_poses(own, back))
 
 
 def _joined(people: PosedPeople, persons: Mapping[int, _Person], fps: float, settings: BackwardSettings) -> PosedPeople:
