@@ -207,10 +207,9 @@ def _shown_by(camera: Camera, mask: np.ndarray, people: list[_Flesh], placed: li
     seen &= known
     side, (n_rows, n_columns) = cell_grid(camera, points[known], CELL_M)
     cell = row // side * n_columns + column // side
-    chains_in, people_in = (
-        np.bincount(np.unique(key[seen] * n_rows * n_columns + cell[seen]) % (n_rows * n_columns), minlength=n_rows * n_columns)[cell]
-        for key in (person * _N_CHAINS + chain, person)
-    )
+    there = np.zeros((len(people), _N_CHAINS, n_rows * n_columns), bool)
+    there[person[seen], chain[seen], cell[seen]] = True
+    chains_in, people_in = there.sum(axis=(0, 1))[cell], there.any(axis=1).sum(axis=0)[cell]
     clear = seen & mask[row, column] & np.where(chain > 0, chains_in == 1, people_in == 1)
     shown = [own.of_landmark[clear[person == k]].sum(axis=0) > CLEAR_SHARE * own.of_landmark.sum(axis=0) for k, own in enumerate(people)]
     cells = np.zeros((n_rows, n_columns), np.uint8)
