@@ -18,11 +18,12 @@ from itertools import chain, islice
 import cv2
 import numpy as np
 
+from hmc.camera.image_signs import is_dark
 from hmc.camera.noise import blur_for, blurred, is_grey, noise_floor
 from hmc.camera.silhouettes import GapRules, cut_halo, evidence, fill_gaps, filled_for_darkness, in_planes
 from hmc.errors import InputError
 
-__all__ = ["BackgroundModel", "SegmentationSettings", "light_gain", "segment", "segment_views", "train_background"]
+__all__ = ["BackgroundModel", "SegmentationSettings", "empty_image", "light_gain", "segment", "segment_views", "train_background"]
 
 #: Gaussians a pixel. OpenCV's five take 100 bytes a pixel and camera; an indoor scene needs no more than three (Stauffer and
 #: Grimson 1999 take three to five).
@@ -251,9 +252,9 @@ def segment(
     Returns
     -------
     mask : ndarray of bool, shape (height, width), or None
-        ``None`` where there is no image, and where more than `max_foreground` of it changed at once: the camera does not vote in this
-        frame, and the background is learnt anew around where people were last. An image that as a whole is brighter or darker by one
-        factor (automatic exposure, flicker) is brought back first.
+        ``None`` where there is no image or a dark one, and where more than `max_foreground` of it changed at once: the camera does not vote
+        in this frame, and, but for dark ones, the background is learnt anew around where people were last. An image that as a whole is
+        brighter or darker by one factor (automatic exposure, flicker) is brought back first.
     model : BackgroundModel
 
     Raises
@@ -268,6 +269,9 @@ def segment(
         raise InputError(
             f"the image is {image.shape[1]} x {image.shape[0]} pixels, the background {model.mean.shape[1]} x {model.mean.shape[0]}"
         )
+    few = slice(None, None, GAIN_STEP), slice(None, None, GAIN_STEP)
+    if is_dark(image[few], model.mean[few][..., 0]):  # nothing is learnt of it
+        return None, model
     image = blurred(image, model.blur)
     if model.grey and is_grey(image):
         settings = replace(settings, shadow_factor=settings.grey_shadow_factor, gap_shadow_factor=settings.grey_gap_shadow_factor)
@@ -295,6 +299,11 @@ def segment(
         _learn(after, image, _hidden(people, answer, settings), rate, settings)
         after = replace(after, changes=after.changes + 1)
     return mask, after
+
+
+def empty_image(model: BackgroundModel) -> np.ndarray:
+    """The empty scene as an image, BGR, uint8, (h, w, 3)."""
+    return _as_image(model.mean)
 
 
 def segment_views(

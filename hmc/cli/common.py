@@ -6,7 +6,10 @@ import argparse
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
+
+if TYPE_CHECKING:
+    from hmc.io.camera_faults import CameraFault
 
 __all__ = [
     "add_image_option",
@@ -15,6 +18,7 @@ __all__ = [
     "add_session_option",
     "add_workers_option",
     "camera_names",
+    "cameras_table",
     "file_digest",
     "gather_problems",
     "given_places",
@@ -163,6 +167,13 @@ def gather_problems(problems: Iterable[str]) -> list[str]:
         name, colon, words = problem.partition(": ")
         said.setdefault((colon, words if colon else problem), []).append(name)
     return [", ".join(names) + colon + words if colon else words for (colon, words), names in said.items()]
+
+
+def cameras_table(faults: Sequence[CameraFault]) -> dict[str, Any]:
+    """The table ``cameras`` of ``run.toml``: when which camera did not fit; nothing where all did."""
+    from hmc.io.camera_faults import as_table
+
+    return {"cameras": as_table(dict.fromkeys(faults))} if faults else {}
 
 
 def print_problems(problems: Iterable[str]) -> None:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import argparse
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from hmc.cli.common import (
     add_image_option,
     add_plugin_option,
     add_selection_options,
     add_workers_option,
+    cameras_table,
     gather_problems,
     image_parameters,
     load_given_plugins,
@@ -33,6 +34,9 @@ from hmc.cli.pose_markers import MARKERS_JOURNAL, add_marker_options, read_marke
 from hmc.cli.run_bar import FIRST_POSE, FITTING, FOLLOWING, LEARNING, SECOND_PASS, TRACKING, VIEWS, RunBar
 from hmc.cli.track import JOURNAL, add_tracker_options, selected_frontend, selected_tracker
 from hmc.pose.registry import BUILT_IN, INITS, METHODS, pose_method
+
+if TYPE_CHECKING:
+    from hmc.io.camera_faults import CameraFault
 
 __all__ = ["add_parser", "run"]
 
@@ -206,6 +210,7 @@ def _run(args: argparse.Namespace, held: ExitStack) -> int:
         return 0
 
     problems: list[str] = [*recording.problems]
+    faults: list[CameraFault] = []
 
     stages = [TRACKING] * (given is None) + [FIRST_POSE, FOLLOWING] + [FITTING, SECOND_PASS] * (method.back is not None) + [VIEWS]
     bar = RunBar(stages, recording.n_frames, recording.persons or 1, args.quiet)
@@ -214,7 +219,15 @@ def _run(args: argparse.Namespace, held: ExitStack) -> int:
         """The run of a stage; the tracker leaves its silhouettes for the poses."""
         masks = args.out / MASKS if hulls else None
         return RunOptions(
-            frontend, args.out / journal, masks, key, problems.append, bar.stage(stage, first), selected_workers(args), bar.phase
+            frontend,
+            args.out / journal,
+            masks,
+            key,
+            problems.append,
+            bar.stage(stage, first),
+            selected_workers(args),
+            bar.phase,
+            faults.append,
         )
 
     take_silhouettes(silhouettes, recording, args.out / MASKS, key, problems.append)
@@ -250,7 +263,7 @@ def _run(args: argparse.Namespace, held: ExitStack) -> int:
     if any(people.details):
         write_fits(args.out / "fits.csv", people.frames.tolist(), people.persons.tolist(), people.status, people.details)
     note_changes(recording, source, problems)
-    said = {"options": told_options(args), "problems": gather_problems(problems)}
+    said = {"options": told_options(args), "problems": gather_problems(problems), **cameras_table(faults)}
     said["written"] = written_digests([paths[result] for result in RESULTS[:3]])
     write_run(paths["run.toml"], name, parameters, args.seed, **source, **said)
     for name in (JOURNAL, POSE_JOURNAL, BACK_JOURNAL, MARKERS_JOURNAL, MASKS):

@@ -13,6 +13,7 @@ from hmc.cli.common import (
     add_plugin_option,
     add_selection_options,
     add_workers_option,
+    cameras_table,
     gather_problems,
     image_parameters,
     load_given_plugins,
@@ -33,6 +34,7 @@ from hmc.cli.option_tables import add_like_option, told_options
 from hmc.cli.run_bar import LEARNING, TRACKING, RunBar
 
 if TYPE_CHECKING:
+    from hmc.io.camera_faults import CameraFault
     from hmc.io.recording import Recording
     from hmc.io.results import TrackTable
     from hmc.tracking.resumable import Timing
@@ -48,7 +50,7 @@ VOXEL_M = 0.04
 CUES = ("silhouettes", "keypoints")
 #: Options of which keypoints alone make no use, with what they are where nothing is said.
 OF_SILHOUETTES = {
-    "tracker": None, "color": None, "particles": None, "track_preset": "default", "complete": True, "cut_shadows": True, "voxel": None,
+    "tracker": None, "color": None, "particles": None, "track_preset": "default", "complete": True, "cut_shadows": True, "exclude": True, "voxel": None,
     "full_images": False, "silhouettes": True, "silhouettes_from": None,
 }  # fmt: skip
 
@@ -94,7 +96,7 @@ class _TrackerHelp(str):
 
 
 def add_tracker_options(parser: argparse.ArgumentParser) -> None:
-    """Add ``--tracker``, ``--color``, ``--particles``, ``--track-preset`` and ``--complete``."""
+    """Add ``--tracker``, ``--color``, ``--particles``, ``--track-preset``, ``--complete``, ``--cut-shadows`` and ``--exclude``."""
     parser.add_argument("--tracker", metavar="NAME", help=_TrackerHelp("method; {names}"))
     parser.add_argument(
         "--color", action=argparse.BooleanOptionalAction, default=None, help="use colors (default, where the tracker can), or do not"
@@ -120,13 +122,19 @@ def add_tracker_options(parser: argparse.ArgumentParser) -> None:
         default=True,
         help="cut shadows on the floor, on which the cameras agree, out of the silhouettes (default), or leave them in",
     )
+    parser.add_argument(
+        "--exclude",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="leave a camera out while it is frozen, moved, out of time or does not fit the others (default), or say so and keep it",
+    )
 
 
 def selected_frontend(args: argparse.Namespace):
     """How silhouettes and hulls are made, as the options say."""
     from hmc.voxels.hulls import FrontendSettings
 
-    return FrontendSettings(complete=args.complete, cut_shadows=args.cut_shadows)
+    return FrontendSettings(complete=args.complete, cut_shadows=args.cut_shadows, exclude=args.exclude)
 
 
 def selected_tracker(args: argparse.Namespace):
@@ -176,6 +184,7 @@ def _run(args: argparse.Namespace, held: ExitStack) -> int:
 
     problems: list[str] = [*recording.problems]
     timings: list[Timing] = []
+    faults: list[CameraFault] = []
     run = RunOptions(
         selected_frontend(args),
         journal,
@@ -184,6 +193,7 @@ def _run(args: argparse.Namespace, held: ExitStack) -> int:
         on_problem=problems.append,
         progress=RunBar([TRACKING], recording.n_frames, quiet=args.quiet).stage(TRACKING, LEARNING if args.cues == CUES[0] else None),
         workers=selected_workers(args),
+        on_fault=faults.append,
     )
     take_silhouettes(silhouettes, work.recording, args.out / MASKS, key, problems.append)
     table = work.track(run, timings.append)
@@ -192,7 +202,8 @@ def _run(args: argparse.Namespace, held: ExitStack) -> int:
     write_tracks(tracks_path, table)
     speed = {name: value for timing in timings for name, value in _speed(timing, recording.fps).items()}
     note_changes(recording, source, problems)
-    said = {"options": told_options(args), "problems": gather_problems(problems), "speed": speed, "written": written_digests([tracks_path])}
+    said = {"options": told_options(args), "problems": gather_problems(problems), "speed": speed, **cameras_table(faults)}
+    said["written"] = written_digests([tracks_path])
     write_run(run_path, work.method, parameters, args.seed, **source, **said)
     for path in (journal, args.out / MASKS):
         path.unlink(missing_ok=True)

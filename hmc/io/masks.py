@@ -11,12 +11,14 @@ import struct
 import zlib
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
+
+from hmc.io.camera_faults import CameraFault
 
 __all__ = ["MaskStep", "Report", "keep_masks", "kept_frames", "kept_masks"]
 
@@ -45,12 +47,15 @@ class MaskStep:
         None where the camera tells nothing in this frame.
     doubtful : tuple of ndarray of bool, shape (h, w), or None; one a camera
         Where people may be besides; None in a frame in which little was lost, and for silhouettes from disk.
+    faults : tuple of CameraFault or None; one a camera
+        What is wrong with a camera in this frame; empty where nobody looked.
     """
 
     index: int
     images: tuple[np.ndarray | None, ...]
     masks: tuple[np.ndarray | None, ...]
     doubtful: tuple[np.ndarray | None, ...]
+    faults: tuple[CameraFault | None, ...] = field(default=(), kw_only=True)
 
     @property
     def usable(self) -> bool:

@@ -19,6 +19,7 @@ from hmc.body.kinematics import landmark_masks, landmarks
 from hmc.body.model import BodyModel
 from hmc.body.proportions import make_bodies
 from hmc.errors import InputError
+from hmc.io.camera_faults import Faults, sentence
 from hmc.io.detections import DetectionTable
 from hmc.io.masks import MaskStep, keep_masks, kept_frames
 from hmc.io.recording import Recording, for_voxels
@@ -255,7 +256,14 @@ def _new_hulls(recording: Recording, grid: VoxelGrid, run: RunOptions, first: in
     stream = stream_hulls(
         recording, grid, run.frontend, first=first, warm_up=WARM_UP_FRAMES, on_problem=run.on_problem, workers=run.workers
     )
-    return stream if run.masks is None else keep_masks(run.masks, run.key, first, stream, run.on_problem)
+    steps = stream if run.masks is None else keep_masks(run.masks, run.key, first, stream, run.on_problem)
+    faults = Faults()
+    for step in steps:
+        faults = faults.plus(step.index, step.faults)
+        yield step
+    for fault in faults.all:
+        run.on_problem(sentence(fault, recording.start + recording.n_frames))
+        run.on_fault(fault)
 
 
 def _with_markers(views: dict[int, PersonView], recording: Recording, method: PoseMethod, options: FollowOptions) -> dict[int, PersonView]:

@@ -15,6 +15,7 @@ from time import perf_counter, thread_time
 from typing import Any
 
 from hmc.errors import InputError
+from hmc.io.camera_faults import Faults, sentence
 from hmc.io.journal import append_journal, open_journal
 from hmc.io.masks import MaskStep, keep_masks, kept_masks
 from hmc.io.recording import Recording, iterate_frames
@@ -94,7 +95,7 @@ def track_recording(
     if run.masks is not None and kept is None:
         stream = keep_masks(run.masks, run.key, first, stream, note)
     hulls: Iterable[HullStep] = stream if done.next_frame < end else ()
-    timing, account, before = done.timing, done.account, perf_counter()
+    timing, account, faults, before = done.timing, done.account, done.faults, perf_counter()
     for hull in run.progress(hulls, end - done.next_frame) if run.progress else hulls:
         observation = observe_step(recording, grid, hull, images=tracker.color)
         begun = thread_time()
@@ -105,14 +106,18 @@ def track_recording(
         before = now
         rows += info.rows
         account = account.plus(account_of(observation, info))
+        faults = faults.plus(hull.index, hull.faults)
         n_frames = hull.index + 1 - recording.start
         if run.journal is not None and (n_frames % CHECKPOINT_FRAMES == 0 or n_frames == recording.n_frames):
-            now_done = CompletedFrames(hull.index + 1, state, tuple(rows), tuple(problems), timing, account)
+            now_done = CompletedFrames(hull.index + 1, state, tuple(rows), tuple(problems), timing, account, faults)
             append_journal(run.journal, _record(now_done, since=done))
             done, before = now_done, perf_counter()
     rows += finish(state, recording.n_frames, tracker.following)
     if on_timing is not None:
         on_timing(timing)
+    for fault in faults.all:
+        run.on_problem(sentence(fault, end))
+        run.on_fault(fault)
     table = table_of(rows, recording.fps, reidentified=state.reidentified)
     for line in remarks(account, table, recording.fps, recording.persons):
         run.on_problem(line)
@@ -199,6 +204,7 @@ class CompletedFrames:
     problems: tuple[str, ...] = ()
     timing: Timing = field(default_factory=Timing)
     account: Account = field(default_factory=Account)
+    faults: Faults = field(default_factory=Faults)
 
 
 def _resumed(run: RunOptions, recording: Recording) -> CompletedFrames:

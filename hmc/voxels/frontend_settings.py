@@ -38,6 +38,8 @@ class FrontendSettings:
         Cameras that must see a voxel (`hmc.voxels.carving.carve`).
     threads : int
         Threads over which cameras are spread; 0: as many as there are processors. The result does not depend on it.
+    exclude : bool
+        Whether silhouettes of a camera are left out while it does not fit the others (`hmc.voxels.watch`); else it is only told.
     """
 
     segmentation: SegmentationSettings = field(default_factory=SegmentationSettings)
@@ -51,6 +53,7 @@ class FrontendSettings:
     outside: str = "ignore"
     min_views: int | None = None
     threads: int = 0
+    exclude: bool = True
 
     def __post_init__(self) -> None:
         if self.source not in SOURCES:

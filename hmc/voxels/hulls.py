@@ -21,21 +21,26 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hmc.camera.segmentation import BackgroundModel
+from hmc.camera.segmentation import BackgroundModel, empty_image
 from hmc.errors import InputError
 from hmc.io.masks import MaskStep, Report
-from hmc.io.recording import Recording
+from hmc.io.recording import Recording, background_frames
 from hmc.voxels.background_initialisation import UnseenPlaces, learn_from_people, with_unseen_places
 from hmc.voxels.carving import CarvingTables, carve_levels, shared_tables
 from hmc.voxels.completion import CompletionTables, complete_masks, doubtful_hull, make_completion_tables
 from hmc.voxels.floor_shadows import cut_filled_shadows, cut_floor_shadows
 from hmc.voxels.frontend_settings import FrontendSettings
 from hmc.voxels.grid import VoxelGrid
+from hmc.voxels.held import frames_to_hold, held_steps, without_faulty
 from hmc.voxels.looks import Look, look_at
+from hmc.voxels.watch import begin_watch, make_watch, watch_step
 
 __all__ = ["FrontendSettings", "HullStep", "carve_step", "settle", "stream_hulls", "stream_masks"]
 
 logger = logging.getLogger("hmc")
+
+#: Images of the empty scene by which it is told whether a camera has moved.
+SCENE_IMAGES = 5
 
 
 @dataclass(frozen=True)
@@ -134,25 +139,44 @@ def stream_masks(
     names = recording.rig.names
     decided_together = (settings.complete or settings.cut_shadows) and any(scene.known)
     tables = make_completion_tables(recording.room, recording.rig) if decided_together else None
-    changed: dict[int, int] = {}  # camera whose whole image changed -> the frame in which that began
-    with ThreadPoolExecutor(settings.threads or os.cpu_count() or 1) as pool:
-        for look in look_at(recording, scene.models, scene.background, settings, start, last, workers, pool):
-            for line in look.lines:
-                report(line)
-            for c, (image, mask) in enumerate(zip(look.images, look.masks, strict=True)):
-                gone = scene.known[c] and image is not None and mask is None
-                if gone:
-                    changed.setdefault(c, look.index)
-                elif c in changed:
-                    report(_say_changed(names[c], changed.pop(c), look.index - 1))
-            if look.index >= first:
-                masks = look.masks
+    watch = make_watch(recording.rig, recording.room, recording.fps, _scene_images(recording, scene), settings.exclude)
+
+    def steps() -> Iterator[MaskStep]:
+        changed: dict[int, int] = {}  # camera whose whole image changed -> the frame in which that began
+        state, index = begin_watch(watch), start
+        with ThreadPoolExecutor(settings.threads or os.cpu_count() or 1) as pool:
+            for look in look_at(recording, scene.models, scene.background, settings, start, last, workers, pool):
+                for line in look.lines:
+                    report(line)
+                masks, index = look.masks, look.index
                 if scene.places is not None:
                     masks = with_unseen_places(scene.places, look.images, masks, pool)
-                masks, doubtful = settle(tables, replace(look, masks=masks), settings)
-                yield MaskStep(look.index, look.images, masks, doubtful)
-        for c, began in changed.items():
-            report(_say_changed(names[c], began, look.index))
+                state = watch_step(watch, state, index, look.images, masks)
+                for c, (image, mask) in enumerate(zip(look.images, look.masks, strict=True)):
+                    gone = scene.known[c] and image is not None and mask is None and not state.cameras[c].dark
+                    if gone:
+                        changed.setdefault(c, index)
+                    elif c in changed:
+                        report(_say_changed(names[c], changed.pop(c), index - 1))
+                if index >= first:
+                    counting = without_faulty(masks, state.faults)
+                    yield MaskStep(index, look.images, *settle(tables, replace(look, masks=counting), settings), faults=state.faults)
+            for c, began in changed.items():
+                report(_say_changed(names[c], began, index))
+
+    yield from held_steps(steps(), frames_to_hold(recording.rig, recording.fps))
+
+
+def _scene_images(recording: Recording, scene: _EmptyScene) -> list[list[np.ndarray]]:
+    """A few images of the empty scene of each camera; none where it is not known."""
+    return [
+        list(background_frames(recording, c, SCENE_IMAGES))
+        if c in scene.background
+        else [empty_image(scene.models[c])]
+        if c in scene.models
+        else []
+        for c in range(len(recording.rig))
+    ]
 
 
 @dataclass(frozen=True)
@@ -216,7 +240,8 @@ def carve_step(tables: CarvingTables, step: MaskStep, settings: FrontendSettings
     step : MaskStep
     settings : FrontendSettings
     """
-    return HullStep(step.index, step.images, step.masks, step.doubtful, *_hulls(tables, step, settings))
+    hulls = _hulls(tables, step, settings)
+    return HullStep(step.index, step.images, step.masks, step.doubtful, *hulls, faults=step.faults)
 
 
 def _hulls(tables: CarvingTables, step: MaskStep, settings: FrontendSettings) -> tuple[np.ndarray, ...]:

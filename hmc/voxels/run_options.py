@@ -7,9 +7,14 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from hmc.io.camera_faults import CameraFault
 from hmc.voxels.hulls import FrontendSettings
 
 __all__ = ["RunOptions"]
+
+
+def _unheard(fault: CameraFault) -> None:
+    """Nobody asked for the cameras' faults as values; `on_problem` says them."""
 
 
 @dataclass(frozen=True)
@@ -34,6 +39,8 @@ class RunOptions:
         Processes over which the work is spread, where they may be forked (`hmc.processes`). The result does not depend on it.
     on_phase : callable, optional
         Called with what is done from now on, where that takes longer than a frame: "first pose", "following", "fitting bodies".
+    on_fault : callable
+        Called at the end with each time in which a camera did not fit the others.
     """
 
     frontend: FrontendSettings | None = None
@@ -44,6 +51,7 @@ class RunOptions:
     progress: Callable[[Iterable, int], Iterable] | None = None
     workers: int = 1
     on_phase: Callable[[str], None] | None = None
+    on_fault: Callable[[CameraFault], None] = field(default=_unheard)
 
     def say(self, phase: str) -> None:
         """Tell what is done from now on."""
