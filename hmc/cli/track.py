@@ -50,8 +50,8 @@ VOXEL_M = 0.04
 CUES = ("silhouettes", "keypoints")
 #: Options of which keypoints alone make no use, with what they are where nothing is said.
 OF_SILHOUETTES = {
-    "tracker": None, "color": None, "particles": None, "track_preset": "default", "complete": True, "cut_shadows": True, "exclude": True, "voxel": None,
-    "full_images": False, "silhouettes": True, "silhouettes_from": None,
+    "tracker": None, "color": None, "particles": None, "track_preset": "default", "complete": True, "cut_shadows": True, "exclude": True,
+    "voxel": None, "full_images": False, "silhouettes": True, "silhouettes_from": None,
 }  # fmt: skip
 
 

@@ -175,7 +175,8 @@ class _Pass:
             if not self.settings.own_rays:
                 yield hull.index, views
                 continue
-            rows = np.flatnonzero((self.states.frames == hull.index) & np.isfinite(self.states.states).all(axis=1))
+            rows = np.flatnonzero(self.states.frames == hull.index)
+            rows = rows[np.isfinite(self.states.states[rows]).all(axis=1)]
             poses = {
                 person: (self.bodies[person], self.states.states[row])
                 for person, row in zip(self.states.persons[rows].tolist(), rows, strict=True)

@@ -293,7 +293,7 @@ def _out_of_time(
     `now` is the first bad frame and what the camera misses.
     """
     since, missed = now
-    by_frame, reach = dict(memory), max(1, 2 * len(memory) // 3)
+    by_frame, reach = dict(memory), len(memory) - 1
     newest = memory[-1][0]
     found: list[tuple[float, int]] = []
     for shift in (*range(-reach, 0), *range(1, reach + 1)):
