@@ -53,7 +53,14 @@ def finished(tmp_path_factory):
 
 
 def test_a_run_leaves_its_four_files_and_its_silhouettes_and_nothing_else(finished):
-    assert sorted(path.name for path in finished.iterdir()) == ["feet.csv", "joints.csv", "pose.npz", "run.toml", "silhouettes", "tracks.csv"]
+    assert sorted(path.name for path in finished.iterdir()) == [
+        "feet.csv",
+        "joints.csv",
+        "pose.npz",
+        "run.toml",
+        "silhouettes",
+        "tracks.csv",
+    ]
     assert len(list((finished / "silhouettes").rglob("*.png"))) == 5 * 7
     joints, tracks, states, run = (
         read_joints(finished / "joints.csv"),
@@ -203,7 +210,14 @@ def test_a_stopped_run_goes_on_and_ends_as_if_it_had_not_been(tmp_path, monkeypa
         assert (tmp_path / "cut" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
     one, other = (read_pose(tmp_path / folder / "pose.npz") for folder in ("cut", "whole"))
     assert_array_equal(one.states, other.states)
-    assert sorted(path.name for path in (tmp_path / "cut").iterdir()) == ["feet.csv", "joints.csv", "pose.npz", "run.toml", "silhouettes", "tracks.csv"]
+    assert sorted(path.name for path in (tmp_path / "cut").iterdir()) == [
+        "feet.csv",
+        "joints.csv",
+        "pose.npz",
+        "run.toml",
+        "silhouettes",
+        "tracks.csv",
+    ]
     assert pictures(tmp_path / "cut") == pictures(tmp_path / "whole")
 
 
