@@ -37,7 +37,7 @@ STAGES = {
     "what furniture hides": (("hmc.pose.occluders", "learn_hidden_places"),),
     "bodies of the whole run": (("hmc.pose.backward", "_bodies"),),
     "second pass": (("hmc.pose.backward", "_own"), ("hmc.pose.backward", "_back")),
-    "clear views": (("hmc.pose.clear_views", "with_clear_views"),),
+    "trust": (("hmc.pose.trust", "with_trust"),),
 }
 REST = "all else, with imports"
 
@@ -78,7 +78,7 @@ def watch(clock: Clock) -> None:
     for names in STAGES.values():
         for module, _ in names:
             importlib.import_module(module)
-    for module in ("hmc.pose.follow", "hmc.pose.backward", "hmc.pose.clear_views", "hmc.tracking.resumable", "hmc.pose.registry"):
+    for module in ("hmc.pose.follow", "hmc.pose.backward", "hmc.pose.trust", "hmc.tracking.resumable", "hmc.pose.registry"):
         importlib.import_module(module)
     for stage, names in STAGES.items():
         for module, name in names:

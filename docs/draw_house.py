@@ -43,11 +43,12 @@ PLACES = {
     "pose.registry": (6, 2),
     "processes": (0, 3), "pose.keypoint_tracks": (2, -1), "pose.keypoint_sides": (3, -1), "pose.keypoint_cues": (4, -1),
     "pose.keypoint_views": (5, -1), "pose.occluders": (3, 0), "pose.clear_views": (5, 0), "pose.mixtures": (6, 3), "pose.backward": (6, 0),
+    "pose.trust": (6, -1),
 }  # fmt: skip
 #: Rooms around the way of a frame, which may use all that they need of it: no arrows.
 AROUND = ("check", "synthetic", "metrics", "view", "pose.smoothing", "api", "session", "trials", "experiments")
 #: Of everybody's use, or too small for a box.
-LEFT_OUT = {"errors", "landmarks", "plugins", "callable_package", "__init__", "__main__", "pose.__init__"}
+LEFT_OUT = {"errors", "landmarks", "plugins", "callable_package", "__init__", "__main__", "pose.__init__", "pose.trust_model"}
 WIDTH, HEIGHT, COLUMN, ROW = 2.2, 0.72, 3.05, 1.0
 INK, GREY, BLUE, FILL = "#1c2430", "#b9c2cf", "#1f5fbf", "#f2f5f9"
 

@@ -231,7 +231,8 @@ def pose(
     -------
     PosedPeople
         `positions`, shape (n, 15, 3), metres; `angles`, radians; `frames`, `persons`; `poses.views`, how many cameras show each landmark
-        clear (`hmc.pose.clear_views`; by keypoints alone: agree on it, `hmc.pose.keypoint_views`); `to_frame()` as a pandas frame.
+        clear (`hmc.pose.clear_views`; by keypoints alone: agree on it, `hmc.pose.keypoint_views`); `poses.trust`, how likely each is within
+        60 mm of the truth (`hmc.pose.trust`; not by keypoints alone), and `poses.doubtful`; `to_frame()` as a pandas frame.
 
     Raises
     ------
@@ -243,16 +244,16 @@ def pose(
     >>> import hmc
     >>> people = hmc.pose(hmc.open_recording("data/synthetic/tiny", frames=8))
     >>> list(people.to_frame().columns)
-    ['frame', 'person', 'joint', 'x', 'y', 'z', 'views']
+    ['frame', 'person', 'joint', 'x', 'y', 'z', 'views', 'trust']
     """
     from hmc.pose.backward import backward
-    from hmc.pose.clear_views import with_clear_views
     from hmc.pose.follow import FollowOptions, follow, for_method
     from hmc.pose.keypoint_cues import learn_scatter
     from hmc.pose.keypoint_tracks import tracks_of_keypoints
     from hmc.pose.keypoint_views import with_keypoint_views
     from hmc.pose.registry import pose_method
     from hmc.pose.smoothing import smooth_people
+    from hmc.pose.trust import with_trust
     from hmc.voxels.run_options import RunOptions
 
     recording, method = _opened(recording), pose_method(method) if isinstance(method, str) else method
@@ -287,7 +288,7 @@ def pose(
             people = smooth_people(people, method.limits, recording.fps, smooth_s)
         if tracks is not None and cues is not None and not method.needs_hulls:
             return with_keypoint_views(people, recording, tracks, cues)
-        return with_clear_views(people, recording, run)
+        return with_trust(people, recording, run)
 
 
 def evaluate(found: PosedPeople | TrackTable, recording: Recording) -> PoseEvaluation | MotScores:

@@ -233,7 +233,7 @@ def print_pose(poses, quiet: bool) -> None:
         f"{summary['person_frames_estimated']} with an estimate ({summary['coverage']:.1%})"
     )
     print_rows(poses.rows, "person", quiet)
-    for name, what in (("shown", "that two cameras or more show clear"), ("guessed", "that fewer do: guesses")):
+    for name, what in (("trusted", "that are trusted"), ("doubtful", "that are doubtful")):
         if name in summary:
             within = ", ".join(f"{value:.3f} within {key[8:-2]} mm" for key, value in summary[name].items() if key.startswith("mmta"))
             print(f"{summary[name]['landmarks']} landmarks {what}: mean {summary[name]['mean_mm']:.1f} mm, {within}")

@@ -148,13 +148,14 @@ def _run(args: argparse.Namespace, held: ExitStack) -> int:
     from hmc.io.lock import only_run
     from hmc.io.results import write_run, write_tracks
     from hmc.pose.backward import backward
-    from hmc.pose.clear_views import with_clear_views
     from hmc.pose.follow import FollowOptions, follow, for_method
     from hmc.pose.keypoint_cues import learn_scatter
     from hmc.pose.keypoint_tracks import tracks_of_keypoints
     from hmc.pose.keypoint_views import with_keypoint_views
     from hmc.pose.smoothing import smooth_people
+    from hmc.pose.trust import with_trust
     from hmc.tracking.resumable import person_grid, track_recording
+    from hmc.trials.quality import trust_summary
     from hmc.voxels.run_options import RunOptions
 
     plugins = load_given_plugins(args)
@@ -252,7 +253,7 @@ def _run(args: argparse.Namespace, held: ExitStack) -> int:
     if args.smooth:
         people = smooth_people(people, method.limits, recording.fps, args.smooth)
     if hulls:
-        people = with_clear_views(people, recording, kept(POSE_JOURNAL, VIEWS))
+        people = with_trust(people, recording, kept(POSE_JOURNAL, VIEWS))
     elif tracks is not None and cues is not None:
         people = with_keypoint_views(people, recording, tracks, cues)
     problems += people.notes
@@ -263,7 +264,9 @@ def _run(args: argparse.Namespace, held: ExitStack) -> int:
     if any(people.details):
         write_fits(args.out / "fits.csv", people.frames.tolist(), people.persons.tolist(), people.status, people.details)
     note_changes(recording, source, problems)
-    said = {"options": told_options(args), "problems": gather_problems(problems), **cameras_table(faults)}
+    trust = trust_summary(people.poses)
+    said = ({"trust": trust} if trust else {}) | {"options": told_options(args), "problems": gather_problems(problems)}
+    said |= cameras_table(faults)
     said["written"] = written_digests([paths[result] for result in RESULTS[:3]])
     write_run(paths["run.toml"], name, parameters, args.seed, **source, **said)
     for name in (JOURNAL, POSE_JOURNAL, BACK_JOURNAL, MARKERS_JOURNAL, MASKS):
@@ -333,9 +336,10 @@ def _pelvis_tracks(people):
 
 def _tell(people, recording, path: Path) -> None:
     """Print the persons that were found."""
-    from hmc.trials.quality import person_lines
+    from hmc.trials.quality import person_lines, trust_line
 
-    print(*person_lines(people.poses, people.states, recording.n_frames), f"wrote {path}", sep="\n")
+    lines = [*person_lines(people.poses, people.states, recording.n_frames), *trust_line(people.poses)]
+    print(*lines, f"wrote {path}", sep="\n")
 
 
 def _height(text: str, recording) -> float | None:

@@ -18,7 +18,7 @@ from hmc.io.door import MAX_FRAME_NUMBER, read_arrays, read_toml_file
 from hmc.io.files import atomic_write, write_toml
 from hmc.io.provenance import code_state, library_versions
 from hmc.io.tables import frame_column, integer_column, read_columns
-from hmc.landmarks import LANDMARKS
+from hmc.landmarks import ENOUGH_VIEWS, LANDMARKS, TRUSTED
 
 __all__ = [
     "PoseStates", "PoseTable", "TrackTable", "read_centroids", "read_joints", "read_pose", "read_run",
@@ -26,8 +26,8 @@ __all__ = [
 ]  # fmt: skip
 
 JOINT_COLUMNS = ("frame", "person", "joint", "x", "y", "z")
-#: Beyond them: how many cameras show a landmark clear.
-VIEWS_COLUMN = "views"
+#: Beyond them: how many cameras show a landmark clear, and how likely it is near the truth.
+VIEWS_COLUMN, TRUST_COLUMN = "views", "trust"
 TRACK_COLUMNS = ("frame", "person", "x", "y", "z")
 HEAD_COLUMNS = ("head_x", "head_y", "head_z")
 
@@ -48,6 +48,8 @@ class PoseTable:
         Cameras that show each landmark clear of all else (`hmc.pose.clear_views`); NaN where it is not known.
     names : tuple of str
         Other points than the fifteen landmarks, as `hmc.landmarks.FOOT_POINTS`.
+    trust : ndarray, shape (n, 15), optional
+        How likely each landmark is within 60 mm of the truth, 0 to 1 (`hmc.pose.trust`); NaN where it is not known.
 
     Raises
     ------
@@ -60,15 +62,29 @@ class PoseTable:
     positions: np.ndarray
     views: np.ndarray | None = None
     names: tuple[str, ...] = LANDMARKS
+    trust: np.ndarray | None = None
 
     def __post_init__(self) -> None:
-        n = len(self.names)
-        _set_rows(self, positions=(n, 3), **({} if self.views is None else {"views": (n,)}))
+        more = {name: (len(self.names),) for name in (VIEWS_COLUMN, TRUST_COLUMN) if getattr(self, name) is not None}
+        _set_rows(self, positions=(len(self.names), 3), **more)
+
+    @property
+    def doubtful(self) -> np.ndarray | None:
+        """Which landmarks are not to be relied on, bool, shape (n, 15): by their trust, or, where that is not known, by too few views.
+
+        Landmarks that are missing are not among them. None where neither is known of any.
+        """
+        if self.trust is None and self.views is None:
+            return None
+        nothing = np.full(self.positions.shape[:2], np.nan)
+        views, trust = (nothing if values is None else values for values in (self.views, self.trust))
+        doubtful = np.where(np.isfinite(trust), trust < TRUSTED, views < ENOUGH_VIEWS)
+        return doubtful & np.isfinite(self.positions).all(axis=2)
 
     def where(self, chosen: np.ndarray) -> PoseTable:
         """The chosen rows: a mask, shape (n,), or row numbers."""
-        views = None if self.views is None else self.views[chosen]
-        return PoseTable(self.frames[chosen], self.persons[chosen], self.positions[chosen], views, self.names)
+        views, trust = (None if values is None else values[chosen] for values in (self.views, self.trust))
+        return PoseTable(self.frames[chosen], self.persons[chosen], self.positions[chosen], views, self.names, trust)
 
     def of(self, person: int) -> PoseTable:
         """The rows of one person."""
@@ -170,7 +186,7 @@ def _set_rows(table: Any, **tails: tuple[int, ...]) -> None:
 
 
 def read_joints(path: str | Path, names: Sequence[str] = LANDMARKS) -> PoseTable:
-    """Read a table `frame, person, joint, x, y, z`; `views` too where there is such a column.
+    """Read a table `frame, person, joint, x, y, z`; `views` and `trust` too where there are such columns.
 
     A landmark without a row, or with an empty or `nan` coordinate, is missing (NaN). Columns beyond these are ignored.
 
@@ -205,24 +221,29 @@ def read_joints(path: str | Path, names: Sequence[str] = LANDMARKS) -> PoseTable
     _refuse_twice(path, cells, lines, "this frame, person and joint")
     positions = np.full((len(keys) * len(names), 3), np.nan)
     positions[cells] = xyz
-    views = None
-    if VIEWS_COLUMN in columns:
-        views = np.full((len(keys), len(names)), np.nan)
-        views.flat[cells] = _numbers(path, VIEWS_COLUMN, columns[VIEWS_COLUMN], lines, "a number of cameras")
-    return PoseTable(keys[:, 0], keys[:, 1], positions.reshape(len(keys), len(names), 3), views, tuple(names))
+    more: dict[str, np.ndarray] = {}
+    for name, what in ((VIEWS_COLUMN, "a number of cameras"), (TRUST_COLUMN, "a number from 0 to 1")):
+        if name in columns:
+            more[name] = np.full((len(keys), len(names)), np.nan)
+            more[name].flat[cells] = _numbers(path, name, columns[name], lines, what)
+    return PoseTable(keys[:, 0], keys[:, 1], positions.reshape(len(keys), len(names), 3), names=tuple(names), **more)
 
 
 def write_joints(path: str | Path, table: PoseTable) -> None:
     """Write a table `frame, person, joint, x, y, z`: metres to six decimals, sorted by frame, then person; missing landmarks as `nan`.
 
-    With a last column `views` where the table has them.
+    With last columns `views` and `trust` (three decimals) where the table has them; empty where they are not known.
     """
     order = np.lexsort([table.persons, table.frames])
+    more = [(name, digits) for name, digits in ((VIEWS_COLUMN, 0), (TRUST_COLUMN, 3)) if getattr(table, name) is not None]
     with atomic_write(path) as file:
-        file.write(",".join((*JOINT_COLUMNS, *(() if table.views is None else (VIEWS_COLUMN,)))) + "\n")
+        file.write(",".join((*JOINT_COLUMNS, *(name for name, _ in more))) + "\n")
         for row in order:
             start = f"{table.frames[row]},{table.persons[row]},"
-            ends = [""] * len(table.names) if table.views is None else [f",{n:.0f}" if n >= 0 else "," for n in table.views[row]]
+            ends = [""] * len(table.names)
+            for name, digits in more:
+                values = getattr(table, name)[row]
+                ends = [f"{end},{value:.{digits}f}" if value >= 0 else f"{end}," for end, value in zip(ends, values, strict=True)]
             file.writelines(
                 f"{start}{name},{x:.6f},{y:.6f},{z:.6f}{end}\n"
                 for name, (x, y, z), end in zip(table.names, table.positions[row], ends, strict=True)

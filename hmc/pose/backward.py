@@ -316,6 +316,7 @@ def _back(
 def _joined(people: PosedPeople, persons: Mapping[int, _Person], fps: float, settings: BackwardSettings) -> PosedPeople:
     """The tables with everybody's path through the poses of both passes."""
     positions, states, costs = people.positions.copy(), people.states.states.copy(), people.costs.copy()
+    apart = np.full(positions.shape[:2], np.nan)
     for person in persons.values():
         frames, body = people.frames[person.rows], person.subject.body
         if settings.best_way:
@@ -326,10 +327,12 @@ def _joined(people: PosedPeople, persons: Mapping[int, _Person], fps: float, set
         told = person.costs.any(axis=1)
         costs[person.rows[told]] = person.costs[np.arange(len(picks)), picks][told]
         positions[person.rows] = landmarks(body, states[person.rows])
+        apart[person.rows[told]] = np.linalg.norm(landmarks(body, person.own[told]) - landmarks(body, person.back[told]), axis=2)
     bodies = {**people.states.bodies, **{number: person.subject.body.dimensions for number, person in persons.items()}}
     return replace(
         people,
         poses=replace(people.poses, positions=positions),
         states=replace(people.states, states=states, bodies=bodies),
         costs=costs,
+        passes_apart=apart,
     )

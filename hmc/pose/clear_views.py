@@ -1,14 +1,14 @@
-"""What silhouettes bear out of finished poses: which limbs are measured and which are guessed, and how much of them no body covers.
+"""What silhouettes bear out of finished poses: which limbs they show and which they contradict, and how much of them no body covers.
 
 A silhouette says where a forearm is when the forearm stands out of it: not when it lies before the trunk, when another person is
 behind it, or when furniture hides it. Two cameras that show it clear locate it; one says where it is not; without any, it is where
-posture and the frames before have put it.
+posture and the frames before have put it. How far a landmark can be trusted for that is for `hmc.pose.trust`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import cv2
@@ -19,11 +19,11 @@ from hmc.body.kinematics import landmarks, segment_transforms
 from hmc.body.limbs import CHAIN_OF_PART, LIMBS
 from hmc.body.model import BodyModel, neutral_state
 from hmc.body.proportions import make_bodies
-from hmc.camera.model import Camera, Rig
+from hmc.camera.model import Camera, Rig, project
 from hmc.io.masks import MaskStep, kept_frames, kept_masks
 from hmc.io.recording import Recording
-from hmc.io.results import PoseStates, PoseTable
-from hmc.landmarks import ENOUGH_VIEWS, LANDMARKS
+from hmc.io.results import PoseStates
+from hmc.landmarks import LANDMARKS
 from hmc.processes import each_ahead
 from hmc.tracking.views import cell_grid
 from hmc.voxels.carving import pixel_of_voxel
@@ -32,14 +32,16 @@ from hmc.voxels.run_options import RunOptions
 if TYPE_CHECKING:
     from hmc.pose.follow import PosedPeople
 
-__all__ = ["BorneOut", "clear_views", "guess_notes", "with_clear_views"]
+__all__ = ["BorneOut", "clear_views", "kept_borne_out", "uncovered_notes"]
 
 #: Flesh of a landmark's limb as near as this to it counts as its own, metres.
 NEAR_M = 0.15
 #: A camera shows a landmark clear when more than this share of its flesh is.
 CLEAR_SHARE = 0.3
-#: A person of whose landmarks more than this share are guesses is told of, and silhouettes of which no body covers more than this share.
-MANY_GUESSES, MUCH_UNCOVERED = 0.05, 0.1
+#: Silhouette that no body covers counts for the landmarks that are as near as this to it, metres.
+BARE_M = 0.2
+#: Silhouettes of which no body covers more than this share are told of.
+MUCH_UNCOVERED = 0.1
 #: Between points of the flesh, and sides of an image's cells at the people's distance, metres.
 SPACING_M, CELL_M = 0.02, 0.03
 
@@ -59,11 +61,18 @@ class BorneOut:
     views : ndarray of int, shape (n, 15)
         Cameras that show each landmark clear; a row for every row of the poses, in the order of `hmc.landmarks.LANDMARKS`. 0 where there is
         no pose or no silhouettes. For trunk and head only other people stand in the way.
+    shown, denied : ndarray, shape (n, 15)
+        Shares of each landmark's flesh that cameras show clear, and that would stand clear but is in no silhouette, summed over cameras.
+    bare_m : ndarray, shape (n, 15)
+        Silhouette within `BARE_M` of each landmark that no body covers: the side of a square of its area, a mean over cameras, metres.
     uncovered : ndarray, shape (n_cameras,)
         Share of each camera's silhouettes that lies beside all bodies; NaN of a camera that has none.
     """
 
     views: np.ndarray
+    shown: np.ndarray
+    denied: np.ndarray
+    bare_m: np.ndarray
     uncovered: np.ndarray
 
 
@@ -97,13 +106,25 @@ def clear_views(rig: Rig, steps: Iterable[MaskStep], states: PoseStates) -> Born
 
 @dataclass(frozen=True)
 class _FrameBorneOut:
-    """Of one frame: its rows of the table, how many cameras show each row's landmarks, and pixels of each camera's silhouette that bodies
-    cover and that there are."""
+    """Of one frame: its rows of the table, fields of `BorneOut` for these, shape (n_rows, 15), and pixels of each camera's silhouette that
+    bodies cover and that there are."""
 
     rows: list[int]
     views: np.ndarray
+    shown: np.ndarray
+    denied: np.ndarray
+    bare_m: np.ndarray
     covered: np.ndarray
     whole: np.ndarray
+
+
+@dataclass(frozen=True)
+class _Placed:
+    """A person in one frame: the surface, its points in the world, and the landmarks, metres."""
+
+    flesh: _Flesh
+    points: np.ndarray
+    landmarks: np.ndarray
 
 
 def _frames_borne_out(rig: Rig, steps: Iterable[MaskStep], states: PoseStates) -> Iterator[_FrameBorneOut]:
@@ -113,73 +134,66 @@ def _frames_borne_out(rig: Rig, steps: Iterable[MaskStep], states: PoseStates) -
     for step in steps:
         rows = np.flatnonzero((states.frames == step.index) & posed).tolist()
         whole = np.array([0 if mask is None else np.count_nonzero(mask) for mask in step.masks])
-        people = [flesh[int(states.persons[row])] for row in rows]
-        placed = []
-        for row, one in zip(rows, people, strict=True):
+        people = []
+        for row in rows:
             # What is not known of a limb is NaN, and so is where its flesh is: it falls on no pixel.
-            transforms = segment_transforms(bodies[int(states.persons[row])], states.states[row])
-            placed.append(place_points(*transforms, one.points, one.segment))
-        views, covered = np.zeros((len(rows), len(LANDMARKS)), int), np.zeros(len(rig))
+            body, own = bodies[int(states.persons[row])], flesh[int(states.persons[row])]
+            points = place_points(*segment_transforms(body, states.states[row]), own.points, own.segment)
+            people.append(_Placed(own, points, landmarks(body, states.states[row])))
+        views = np.zeros((len(rows), len(LANDMARKS)), int)
+        shown, denied, bare_m2 = np.zeros((3, *views.shape))
+        covered = np.zeros(len(rig))
         for k, (camera, mask) in enumerate(zip(rig, step.masks, strict=True)):
             if rows and mask is not None:
-                shown, covered[k] = _shown_by(camera, mask, people, placed)
-                views += shown
-        yield _FrameBorneOut(rows, views, covered, whole)
+                seen = _seen_by(camera, mask, people)
+                views += seen.shown > CLEAR_SHARE
+                shown += seen.shown
+                denied += seen.denied
+                bare_m2 += seen.bare_m2
+                covered[k] = seen.covered
+        n_masks = max(1, sum(mask is not None for mask in step.masks))
+        yield _FrameBorneOut(rows, views, shown, denied, np.sqrt(bare_m2 / n_masks), covered, whole)
 
 
 def _all_of(rig: Rig, frames: Iterable[_FrameBorneOut], states: PoseStates) -> BorneOut:
     views = np.zeros((len(states.frames), len(LANDMARKS)), int)
+    shown, denied, bare_m = np.zeros((3, *views.shape))
     covered, whole = np.zeros((2, len(rig)))
     for frame in frames:
-        views[frame.rows] = frame.views
+        views[frame.rows], shown[frame.rows], denied[frame.rows] = frame.views, frame.shown, frame.denied
+        bare_m[frame.rows] = frame.bare_m
         covered += frame.covered
         whole += frame.whole
-    return BorneOut(views, 1 - covered / np.where(whole > 0, whole, np.nan))
+    return BorneOut(views, shown, denied, bare_m, 1 - covered / np.where(whole > 0, whole, np.nan))
 
 
-def with_clear_views(people: PosedPeople, recording: Recording, run: RunOptions) -> PosedPeople:
-    """Poses with `clear_views` beside their landmarks, and a line on every person of whom much is guessed and on what no body covers.
+def kept_borne_out(people: PosedPeople, recording: Recording, run: RunOptions) -> BorneOut | None:
+    """`clear_views` of finished poses by the silhouettes that their run kept.
 
     Parameters
     ----------
     people : PosedPeople
     recording : Recording
     run : RunOptions
-        With the silhouettes that were kept; where they were not, the poses stay as they are.
+
+    Returns
+    -------
+    BorneOut or None
+        None where silhouettes were not kept.
     """
     first, end = recording.start, recording.start + recording.n_frames
     if run.masks is None or kept_masks(run.masks, run.key, first, end) is None:
-        return people
+        return None
 
     def borne_out(some: Sequence[int]) -> Iterator[_FrameBorneOut]:
         return _frames_borne_out(recording.rig, kept_frames(run.masks or "", run.key, some) or (), people.states)
 
     frames: Iterable[_FrameBorneOut] = each_ahead(borne_out, range(first, end), run.workers)
-    found = _all_of(recording.rig, run.progress(frames, end - first) if run.progress else frames, people.states)
-    poses = replace(people.poses, views=found.views)
-    notes = (*people.notes, *guess_notes(poses), *_uncovered_notes(recording.rig, found.uncovered))
-    return replace(people, poses=poses, notes=notes)
+    return _all_of(recording.rig, run.progress(frames, end - first) if run.progress else frames, people.states)
 
 
-def guess_notes(poses: PoseTable) -> list[str]:
-    """A line on every person of whose landmarks many are guesses: how many, and which most of all."""
-    notes = []
-    for person in np.unique(poses.persons).tolist():
-        own = poses.of(person)
-        there = np.isfinite(own.positions).all(axis=2)
-        guessed = there & (np.zeros(there.shape) if own.views is None else own.views < ENOUGH_VIEWS)
-        if guessed.sum() > MANY_GUESSES * there.sum():
-            counts = guessed.sum(axis=0)
-            most = ", ".join(f"{LANDMARKS[k]} {counts[k]}" for k in np.argsort(-counts, kind="stable")[:4] if counts[k])
-            notes.append(
-                f"person {person}: {guessed.sum() / there.sum():.0%} of the landmarks are guesses, as fewer than two cameras show them "
-                f"clear (`views` in joints.csv); in how many of {len(there)} frames, most of all: {most}"
-            )
-    return notes
-
-
-def _uncovered_notes(rig: Rig, uncovered: np.ndarray) -> list[str]:
-    """A line where much of the silhouettes is covered by no body."""
+def uncovered_notes(rig: Rig, uncovered: np.ndarray) -> list[str]:
+    """A line where much of the silhouettes is covered by no body; `uncovered` is that of `BorneOut`."""
     told = np.isfinite(uncovered)
     if not told.any() or np.mean(uncovered[told]) <= MUCH_UNCOVERED:
         return []
@@ -197,11 +211,21 @@ def _flesh_of(body: BodyModel) -> _Flesh:
     return _Flesh(points, segment, chain, near)
 
 
-def _shown_by(camera: Camera, mask: np.ndarray, people: list[_Flesh], placed: list[np.ndarray]) -> tuple[np.ndarray, int]:
-    """Whether a camera shows each person's landmarks clear, bool, shape (n_people, 15); and how many of the mask's pixels bodies cover."""
-    points = np.concatenate(placed)
-    person = np.repeat(np.arange(len(people)), [len(one) for one in placed])
-    chain = np.concatenate([one.chain for one in people])
+@dataclass(frozen=True)
+class _Seen:
+    """What one camera shows: of each person's landmarks the terms of `BorneOut`, shape (n_people, 15), and how many pixels of the mask
+    bodies cover."""
+
+    shown: np.ndarray
+    denied: np.ndarray
+    bare_m2: np.ndarray
+    covered: int
+
+
+def _seen_by(camera: Camera, mask: np.ndarray, people: Sequence[_Placed]) -> _Seen:
+    points = np.concatenate([one.points for one in people])
+    person = np.repeat(np.arange(len(people)), [len(one.points) for one in people])
+    chain = np.concatenate([one.flesh.chain for one in people])
     known = np.isfinite(points).all(axis=1)
     column, row, seen = pixel_of_voxel(camera, np.where(known[:, None], points, 0.0))
     seen &= known
@@ -210,12 +234,33 @@ def _shown_by(camera: Camera, mask: np.ndarray, people: list[_Flesh], placed: li
     there = np.zeros((len(people), _N_CHAINS, n_rows * n_columns), bool)
     there[person[seen], chain[seen], cell[seen]] = True
     chains_in, people_in = there.sum(axis=(0, 1))[cell], there.any(axis=1).sum(axis=0)[cell]
-    clear = seen & mask[row, column] & np.where(chain > 0, chains_in == 1, people_in == 1)
-    shown = [own.of_landmark[clear[person == k]].sum(axis=0) > CLEAR_SHARE * own.of_landmark.sum(axis=0) for k, own in enumerate(people)]
+    alone = seen & np.where(chain > 0, chains_in == 1, people_in == 1)
+    inside = mask[row, column]
+    shown, denied = (
+        np.array([one.flesh.of_landmark[clear[person == k]].sum(axis=0) for k, one in enumerate(people)])
+        / np.array([np.maximum(one.flesh.of_landmark.sum(axis=0), 1) for one in people])
+        for clear in (alone & inside, alone & ~inside)
+    )
     cells = np.zeros((n_rows, n_columns), np.uint8)
     cells.ravel()[cell[seen]] = 1
     # Outlines are a cell thick: flesh is sampled by points, and clothes are wider than it.
     wide = np.asarray(cv2.dilate(cells, np.ones((3, 3), np.uint8)))
     height, width = mask.shape
     bodies = wide.repeat(side, axis=0).repeat(side, axis=1)[:height, :width]
-    return np.array(shown), int(np.count_nonzero(mask & (bodies > 0)))
+    # Cells of which more than half is silhouette.
+    whole = np.zeros((n_rows * side, n_columns * side), np.uint8)
+    whole[:height, :width] = mask
+    full = 2 * whole.reshape(n_rows, side, n_columns, side).sum(axis=(1, 3)) > side**2
+    bare = (np.argwhere(full & (wide == 0))[:, ::-1] + 0.5) * side
+    bare_m2 = np.array([_bare_near(camera, one.landmarks, bare, side) for one in people])
+    return _Seen(shown, denied, bare_m2, int(np.count_nonzero(mask & (bodies > 0))))
+
+
+def _bare_near(camera: Camera, places: np.ndarray, bare: np.ndarray, side: int) -> np.ndarray:
+    """Area of the cells, whose middles (m, 2) are given, around each landmark (15, 3) at its distance, square metres, shape (15,)."""
+    uv, valid = project(camera, np.nan_to_num(places))
+    valid = valid & np.isfinite(places).all(axis=1)
+    depth = np.nan_to_num(places) @ camera.rotation[2] + camera.translation[2]
+    metres = np.where(valid, depth, 0.0) / camera.matrix[0, 0]
+    apart = np.linalg.norm(bare[None] - np.where(valid[:, None], uv, 0.0)[:, None], axis=2) * metres[:, None]
+    return (apart < BARE_M).sum(axis=1) * (side * metres) ** 2

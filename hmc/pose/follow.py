@@ -63,6 +63,9 @@ class PosedPeople(FinishedPeople):
         ``"fitted"``, or why there is no pose, of each row.
     fps : float or None
         Frames a second of the recording, where they are known.
+    passes_apart : ndarray, shape (n, 15), or None
+        How far apart two passes, forward and backward in time, have each landmark, metres; NaN where a row has one pose only. None of
+        one pass.
     """
 
     poses: PoseTable
@@ -72,6 +75,7 @@ class PosedPeople(FinishedPeople):
     details: tuple[Mapping[str, object], ...] = ()
     status: tuple[str, ...] = ()
     fps: float | None = None
+    passes_apart: np.ndarray | None = None
 
     @property
     def frames(self) -> np.ndarray:
@@ -110,13 +114,17 @@ class PosedPeople(FinishedPeople):
         return PoseTable(self.frames, self.persons, points, views, FOOT_POINTS)
 
     def to_frame(self):
-        """A pandas frame with the columns of ``joints.csv``: frame, person, joint, x, y, z in metres, and views where they are known."""
+        """A pandas frame with the columns of ``joints.csv``: frame, person, joint, x, y, z in metres; views and trust where known."""
         import pandas as pd
 
         rows, joints = self.positions.shape[:2]
         columns = {"frame": np.repeat(self.frames, joints), "person": np.repeat(self.persons, joints), "joint": list(LANDMARKS) * rows}
         columns |= dict(zip("xyz", self.positions.reshape(-1, 3).T, strict=True))
-        return pd.DataFrame(columns if self.poses.views is None else columns | {"views": self.poses.views.ravel().astype(int)})
+        if self.poses.views is not None:
+            columns["views"] = self.poses.views.ravel().astype(int)
+        if self.poses.trust is not None:
+            columns["trust"] = self.poses.trust.ravel()
+        return pd.DataFrame(columns)
 
     def save(self, folder: str | Path) -> None:
         """Write ``joints.csv``, ``feet.csv`` where the body has feet, and ``pose.npz``, as `hmc pose` does."""

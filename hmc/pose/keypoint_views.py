@@ -18,9 +18,9 @@ from hmc.body.proportions import make_bodies
 from hmc.io.recording import Recording
 from hmc.io.results import TrackTable
 from hmc.landmarks import LANDMARKS
-from hmc.pose.clear_views import guess_notes
 from hmc.pose.keypoint_cues import KeypointCues, with_keypoints
 from hmc.pose.objectives.keypoints import BESIDE_M
+from hmc.pose.trust import doubt_notes
 from hmc.pose.views.keypoints import SeenKeypoints
 from hmc.pose.views.line_meeting import MEET
 from hmc.pose.views.person_view import PersonView
@@ -84,4 +84,4 @@ def with_keypoint_views(people: PosedPeople, recording: Recording, tracks: Track
             if seen is not None and np.isfinite(state).all():
                 views[row] = agreeing_cameras(bodies[person], state, seen)
     poses = replace(people.poses, views=views)
-    return replace(people, poses=poses, notes=(*people.notes, *guess_notes(poses)))
+    return replace(people, poses=poses, notes=(*people.notes, *doubt_notes(poses)))

@@ -27,8 +27,8 @@ LINKED = ("joints.csv", "feet.csv", "tracks.csv", "pose.npz", "fits.csv", "run.t
 RIG_PX, RIG_QUALITY = 1500, 82
 _LEGEND = (
     "Cost: what the method minimises, mean over persons and frames; smaller is better, and it compares trials of one method and preset "
-    "only. Clear: share of the landmarks that two cameras or more show clear of all else; the others are guessed from posture and from the "
-    "frames around. Time: that of the run which finished the trial."
+    "only. Trusted: share of the landmarks that are not doubtful (trust in joints.csv; where it is not known, two views or more). Time: "
+    "that of the run which finished the trial."
 )
 _CHIP = {DONE: "good", FAILED: "bad"}
 
@@ -131,7 +131,7 @@ def _row(trial: Trial, out: Path) -> _Row:
 
 
 def _table(rows: Sequence[_Row]) -> str:
-    names = ("trial", "status", "frames", "persons", "problems", "mean cost", "clear", "time")
+    names = ("trial", "status", "frames", "persons", "problems", "mean cost", "trusted", "time")
     lines = [
         f'<table class="trials"><thead><tr>{"".join(_cell(name, name, k > 1, "th") for k, name in enumerate(names))}</tr></thead><tbody>'
     ]
@@ -142,7 +142,7 @@ def _table(rows: Sequence[_Row]) -> str:
         if result is not None:
             values[2], values[3] = str(result.n_frames), str(result.n_persons)
             values[5] = _number(result.mean_cost, "{:.2e}")
-            values[6] = _number(100 * result.clear_share, "{:.0f} %")
+            values[6] = _number(100 * result.sound_share, "{:.0f} %")
         cells = (_cell(value, name, k > 1) for k, (name, value) in enumerate(zip(names, values, strict=True)))
         lines.append(f"<tr>{''.join(cells)}</tr>")
     return "\n".join([*lines, "</tbody></table>"])

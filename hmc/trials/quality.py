@@ -11,10 +11,12 @@ import numpy as np
 
 from hmc.body.proportions import stature
 from hmc.io.results import PoseStates, PoseTable, TrackTable, read_joints, read_pose, read_run, read_tracks
-from hmc.landmarks import ENOUGH_VIEWS
+from hmc.landmarks import LANDMARKS
 
-__all__ = ["TrialResult", "person_lines", "read_trial_result"]
+__all__ = ["TrialResult", "person_lines", "read_trial_result", "trust_line", "trust_summary"]
 
+#: Landmarks that are named as doubtful, at most.
+MOST_NAMED = 3
 #: What `hmc pose` leaves; the last is written last.
 FILES = ("joints.csv", "tracks.csv", "pose.npz", "run.toml")
 
@@ -64,10 +66,10 @@ class TrialResult:
         return float(costs.mean()) if len(costs) else float("nan")
 
     @property
-    def clear_share(self) -> float:
-        """Share of the landmarks that two cameras or more show clear, 0 to 1; NaN where it is not known."""
-        views = np.zeros(0) if self.poses.views is None else self.poses.views[np.isfinite(self.poses.views)]
-        return float((views >= ENOUGH_VIEWS).mean()) if views.size else float("nan")
+    def sound_share(self) -> float:
+        """Share of the landmarks that are not doubtful (`PoseTable.doubtful`), 0 to 1; NaN where it is not known."""
+        summary = trust_summary(self.poses)
+        return 1 - float(summary["doubtful"]) / float(summary["landmarks"]) if summary else float("nan")
 
     @property
     def lines(self) -> list[str]:
@@ -98,3 +100,25 @@ def person_lines(poses: PoseTable, states: PoseStates, n_frames: int) -> list[st
         tall = "no pose" if body is None else f"stature about {stature({name: float(value) for name, value in body.items()}):.2f} m"
         lines.append(f"person {person}: {rows.sum()} frames, from {frames.min()} to {frames.max()}, {tall}")
     return lines or [f"no person in {n_frames} frames"]
+
+
+def trust_summary(poses: PoseTable) -> dict[str, Any]:
+    """How many landmarks there are and are doubtful, and of each person which, for ``run.toml``; empty where it is not known of any."""
+    doubtful, there = poses.doubtful, np.isfinite(poses.positions).all(axis=2)
+    if doubtful is None or not there.any():
+        return {}
+    counts = {str(person): doubtful[poses.persons == person].sum(axis=0) for person in np.unique(poses.persons)}
+    by_person = {person: {LANDMARKS[k]: int(own[k]) for k in np.flatnonzero(own)} for person, own in counts.items() if own.any()}
+    return {"landmarks": int(there.sum()), "doubtful": int(doubtful.sum()), "persons": by_person}
+
+
+def trust_line(poses: PoseTable) -> list[str]:
+    """A line on how many landmarks are doubtful, and which most of all; none where it is not known of any."""
+    summary = trust_summary(poses)
+    if not summary:
+        return []
+    sums = {(person, name): n for person, own in summary["persons"].items() for name, n in own.items()}
+    worst = sorted(sums, key=lambda one: -sums[one])[:MOST_NAMED]
+    share = summary["doubtful"] / summary["landmarks"]
+    named = ", ".join(f"{name} of person {person} in {sums[person, name]} frames" for person, name in worst)
+    return [f"of {summary['landmarks']} landmarks {summary['doubtful']} are doubtful ({share:.1%}){': ' if named else ''}{named}"]

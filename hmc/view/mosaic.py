@@ -21,7 +21,7 @@ from hmc.io.masks import MaskStep
 from hmc.io.recording import Frame, Recording, iterate_frames
 from hmc.io.results import PoseStates, PoseTable, TrackTable, read_joints, read_pose, read_tracks
 from hmc.io.silhouettes import KeptSilhouettes, open_silhouettes
-from hmc.landmarks import ENOUGH_VIEWS, landmark_index
+from hmc.landmarks import landmark_index
 from hmc.view.overlay import LEFT, RIGHT, draw_keypoints, draw_label, draw_outline, draw_paths, draw_sticks, draw_track, person_color
 from hmc.view.scene import BACKGROUND, draw_floor, draw_rig, draw_voxels, from_above, viewpoint
 from hmc.voxels.grid import VoxelGrid
@@ -61,7 +61,7 @@ class Person:
     position: np.ndarray | None = None
     state: np.ndarray | None = None
     body: BodyModel | None = None
-    guessed: np.ndarray | None = None
+    doubtful: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -129,7 +129,7 @@ def people_in(result: Result, frame: int) -> list[Person]:
         {} if table is None else {int(table.persons[row]): row for row in np.flatnonzero(table.frames == frame)}
         for table in (result.poses, result.tracks, result.states)
     )
-    people, views = [], None if result.poses is None else result.poses.views
+    people, doubtful = [], None if result.poses is None else result.poses.doubtful
     for number in sorted(set(poses) | set(tracks)):
         points = result.poses.positions[poses[number]] if result.poses is not None and number in poses else None
         if points is not None and np.isnan(points).all():
@@ -142,7 +142,7 @@ def people_in(result: Result, frame: int) -> list[Person]:
                 position=result.tracks.positions[tracks[number]] if result.tracks is not None and number in tracks else None,
                 state=result.states.states[states[number]] if fitted and result.states is not None else None,
                 body=(result.bodies or {}).get(number),
-                guessed=None if points is None or views is None else views[poses[number]] < ENOUGH_VIEWS,
+                doubtful=None if points is None or doubtful is None else doubtful[poses[number]],
             )
         )
     return people
@@ -247,7 +247,7 @@ def draw_people(image: np.ndarray, camera: Camera, people: list[Person], outline
             draw_outline(image, camera, person.body, person.state, person.number)
     for person in people:
         if person.landmarks is not None:
-            draw_sticks(image, camera, person.landmarks, person.number, width, person.guessed)
+            draw_sticks(image, camera, person.landmarks, person.number, width, person.doubtful)
         elif person.position is not None:
             draw_track(image, camera, person.position, person.number, width)
     for person in people:

@@ -44,7 +44,7 @@ def person_color(person: int) -> Color:
 
 
 def draw_sticks(
-    image: np.ndarray, camera: Camera, points: np.ndarray, person: int, width: float = 2.0, guessed: np.ndarray | None = None
+    image: np.ndarray, camera: Camera, points: np.ndarray, person: int, width: float = 2.0, doubtful: np.ndarray | None = None
 ) -> None:
     """Draw a person's landmarks as a stick figure.
 
@@ -59,20 +59,20 @@ def draw_sticks(
         Number that decides the color.
     width : float
         Of a bone, pixels.
-    guessed : ndarray of bool, shape (15,), optional
-        Landmarks that are guesses: the bones that end there are broken lines, and the landmark has no white dot.
+    doubtful : ndarray of bool, shape (15,), optional
+        Landmarks that are not to be relied on: the bones that end there are broken lines, and the landmark has no white dot.
     """
-    guessed = np.zeros(len(points), bool) if guessed is None else guessed
+    doubtful = np.zeros(len(points), bool) if doubtful is None else doubtful
     ends = np.array([[landmark_index(a), landmark_index(b)] for a, b in BONES])
     t = np.linspace(0, 1, PIECES + 1)[:, None]
     lines = points[ends[:, 0], None] * (1 - t) + points[ends[:, 1], None] * t
-    lines[np.ix_(guessed[ends[:, 1]], np.arange(2, PIECES, 3))] = np.nan
+    lines[np.ix_(doubtful[ends[:, 1]], np.arange(2, PIECES, 3))] = np.nan
     colors = [{"l_": LEFT, "r_": RIGHT}.get(b[:2], person_color(person)) for _, b in BONES]
     # Dark edges first, so that no edge covers a neighbour's color.
     draw_paths(image, camera, lines, DARK, width + 2)
     draw_paths(image, camera, lines, colors, width)
     uv, valid = project(camera, points)
-    for u, v in uv[valid & ~guessed & _near_image(uv, camera)]:
+    for u, v in uv[valid & ~doubtful & _near_image(uv, camera)]:
         centre = round(u * 2**SHIFT), round(v * 2**SHIFT)
         cv2.circle(image, centre, round((width * 0.5 + 1) * 2**SHIFT), DARK, -1, cv2.LINE_AA, SHIFT)
         cv2.circle(image, centre, round((width * 0.5 + 0.25) * 2**SHIFT), (255, 255, 255), -1, cv2.LINE_AA, SHIFT)

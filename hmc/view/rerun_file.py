@@ -115,7 +115,7 @@ def _log_people(rerun: Any, to: Any, result: Result, people: list[Person]) -> No
             to.log(f"{place}/bones", rerun.Clear(recursive=False))
             to.log(f"{place}/landmarks", rerun.Clear(recursive=False))
             continue
-        points, guessed = person.landmarks, np.zeros(len(LANDMARKS), bool) if person.guessed is None else person.guessed
+        points, guessed = person.landmarks, np.zeros(len(LANDMARKS), bool) if person.doubtful is None else person.doubtful
         known = np.isfinite(points).all(axis=1)
         bones = ENDS[known[ENDS].all(axis=1)]
         sides = {"l_": LEFT[::-1], "r_": RIGHT[::-1]}

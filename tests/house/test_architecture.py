@@ -34,7 +34,7 @@ FINISHED = MOTION | {"view"}
 FOLLOWING = PERSON | FINISHED | {"pose.finished", "pose.records", "pose.follow", "pose.keypoint_cues", "pose.keypoint_sides"}
 METHODS = STARTS | MIXTURES | {"pose.recovery", "pose.methods"}
 POSE = METHODS | FOLLOWING | {"pose.backward", "pose.clear_views", "pose.keypoint_tracks", "pose.occluders", "pose.registry"}
-POSE |= {"pose.keypoint_views", "pose.smoothing"}
+POSE |= {"pose.keypoint_views", "pose.smoothing", "pose.trust", "pose.trust_model"}
 METRICS = IO | {"metrics"}
 VIEW = VOXELS | {"body", "view"}
 EVERYTHING = POSE | METRICS | VIEW | {"motion", "check", "synthetic", "plugins"}
@@ -63,12 +63,14 @@ MAY_IMPORT = {
     "pose.keypoint_cues": OBJECTIVES | {"pose.keypoint_sides"},
     "pose.keypoint_sides": VIEWS,
     "pose.keypoint_tracks": VIEWS,
-    "pose.keypoint_views": FOLLOWING | {"pose.clear_views"},
+    "pose.keypoint_views": FOLLOWING | {"pose.trust"},
     "pose.mixtures": MIXTURES,
     "pose.occluders": VIEWS,
     "pose.backward": FOLLOWING | MIXTURES | {"pose.backward", "pose.occluders"},
     "pose.smoothing": FOLLOWING,
     "pose.clear_views": FOLLOWING,
+    "pose.trust": FOLLOWING | {"pose.clear_views", "pose.trust_model"},
+    "pose.trust_model": set(),
     "pose.methods": METHODS,
     "pose.registry": METHODS | {"pose.registry", "plugins"},
     "pose.__init__": {"callable_package"},

@@ -56,12 +56,18 @@ def test_joints_come_back(tmp_path_factory, seed, n_frames):
 
 @settings(max_examples=20, deadline=None)
 @given(seed=st.integers(0, 10_000))
-def test_views_come_back(tmp_path_factory, seed):
+def test_views_and_trust_come_back(tmp_path_factory, seed):
     path, table, rng = tmp_path_factory.mktemp("joints") / "joints.csv", make_poses(seed=seed), np.random.default_rng(seed)
     views = rng.integers(0, 9, table.positions.shape[:2]).astype(float)
     views[rng.random(views.shape) < 0.1] = np.nan
-    write_joints(path, replace(table, views=views))
+    trust = np.round(rng.random(views.shape), 3)
+    trust[rng.random(views.shape) < 0.1] = np.nan
+    write_joints(path, replace(table, trust=trust))
+    np.testing.assert_array_equal(read_joints(path).trust, trust)
+    assert read_joints(path).views is None
+    write_joints(path, replace(table, views=views, trust=trust))
     np.testing.assert_array_equal(read_joints(path).views, views)
+    np.testing.assert_array_equal(read_joints(path).of(2).trust, trust[table.persons == 2])
     np.testing.assert_array_equal(read_joints(path).of(2).views, views[table.persons == 2])
 
 

@@ -53,16 +53,17 @@ def result(tmp_path, truth):
     return folder
 
 
-def test_guesses_are_scored_apart(result, recording, capsys):
+@pytest.mark.parametrize("known", ["views", "trust"])
+def test_doubtful_landmarks_are_scored_apart(known, result, recording, capsys):
     found = read_joints(result / "joints.csv")
-    views = np.full(found.positions.shape[:2], 3.0)
-    views[found.persons == 4, landmark_index("l_wrist")] = 1  # 80 mm off, all others 30
-    write_joints(result / "joints.csv", replace(found, views=views))
+    values = np.full(found.positions.shape[:2], {"views": 3.0, "trust": 0.95}[known])
+    values[found.persons == 4, landmark_index("l_wrist")] = {"views": 1, "trust": 0.6}[known]  # 80 mm off, all others 30
+    write_joints(result / "joints.csv", replace(found, **{known: values}))
     assert main(["evaluate", str(result), str(recording)]) == 0
     report = tomllib.loads((result / "metrics.toml").read_text())["pose"]
-    assert report["guessed"] == pytest.approx({"landmarks": 20, "mean_mm": 80, "mmta_at_100mm": 1, "mmta_at_50mm": 0})
-    assert report["shown"] == pytest.approx({"landmarks": 580, "mean_mm": 30, "mmta_at_100mm": 1, "mmta_at_50mm": 1})
-    assert "20 landmarks that fewer do: guesses: mean 80.0 mm, 1.000 within 100 mm, 0.000 within 50 mm" in capsys.readouterr().out
+    assert report["doubtful"] == pytest.approx({"landmarks": 20, "mean_mm": 80, "mmta_at_100mm": 1, "mmta_at_50mm": 0})
+    assert report["trusted"] == pytest.approx({"landmarks": 580, "mean_mm": 30, "mmta_at_100mm": 1, "mmta_at_50mm": 1})
+    assert "20 landmarks that are doubtful: mean 80.0 mm, 1.000 within 100 mm, 0.000 within 50 mm" in capsys.readouterr().out
 
 
 def test_known_errors_come_out(result, recording, capsys):

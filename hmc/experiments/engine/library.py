@@ -55,6 +55,7 @@ EXPERIMENTS = {
     "whole-chain": "whole_chain",
     "ablation": "ablation",
     "cues": "cues",
+    "trust": "trust",
     "what-each-adds": "what_each_adds",
     "lost-arm": "lost_arm",
     "over-time": "over_time",

@@ -10,7 +10,7 @@ import numpy as np
 
 from hmc.errors import InputError
 from hmc.io.results import PoseTable, TrackTable
-from hmc.landmarks import ENOUGH_VIEWS, LANDMARKS, landmark_index
+from hmc.landmarks import LANDMARKS, landmark_index
 from hmc.metrics.landmarks import landmark_errors, score
 from hmc.metrics.mot import MotScores, clear_mot
 from hmc.metrics.persons import LIMB_PAIRS, exchange_sides, frames_in_words, match_persons, swapped_frames
@@ -47,8 +47,8 @@ class PersonErrors:
         Frames with truth.
     estimate, truth : ndarray, shape (n, 15, 3)
         Metres; NaN where missing.
-    views : ndarray, shape (n, 15)
-        Cameras that show each landmark clear, as the estimate says; NaN where it does not.
+    doubtful : ndarray, shape (n, 15)
+        1 where the estimate says that it is doubtful (`PoseTable.doubtful`), 0 where it is not; NaN where that is not known.
     """
 
     person: int
@@ -56,7 +56,7 @@ class PersonErrors:
     frames: np.ndarray
     estimate: np.ndarray
     truth: np.ndarray
-    views: np.ndarray
+    doubtful: np.ndarray
 
     @property
     def errors(self) -> np.ndarray:
@@ -137,7 +137,7 @@ def evaluate_pose(estimate: PoseTable, truth: PoseTable, thresholds_m: Sequence[
     }
     summary |= {key: value for key, value in rows[len(LANDMARKS)].items() if key not in ("person", "landmark", "frames", "true_frames")}
     summary |= chosen
-    summary |= _by_views(groups["all"], np.concatenate([person.views for person in persons]), known)
+    summary |= _by_trust(groups["all"], np.concatenate([person.doubtful for person in persons]), known)
     return PoseEvaluation(persons, rows, summary, tuple(_notes(persons, frame_means, estimate.persons[unmatched])), known)
 
 
@@ -233,18 +233,19 @@ def _person_errors(estimate: PoseTable, truth: PoseTable, person: int, names: Ma
     estimated_as = tuple(sorted(name for name, true_name in names.items() if true_name == person))
     rows = np.flatnonzero(np.isin(estimate.persons, estimated_as))
     positions = np.full((len(true_rows), len(LANDMARKS), 3), np.nan)
-    views = np.full((len(true_rows), len(LANDMARKS)), np.nan)
+    doubtful = np.full((len(true_rows), len(LANDMARKS)), np.nan)
     _, a, b = np.intersect1d(truth.frames[true_rows], estimate.frames[rows], return_indices=True)
     positions[a] = estimate.positions[rows[b]]
-    if estimate.views is not None:
-        views[a] = estimate.views[rows[b]]
-    return PersonErrors(person, estimated_as, truth.frames[true_rows], positions, truth.positions[true_rows], views)
+    told = estimate.doubtful
+    if told is not None:
+        doubtful[a] = told[rows[b]]
+    return PersonErrors(person, estimated_as, truth.frames[true_rows], positions, truth.positions[true_rows], doubtful)
 
 
-def _by_views(errors: np.ndarray, views: np.ndarray, thresholds_m: Sequence[float]) -> dict[str, dict[str, float]]:
-    """Scores of the landmarks that enough cameras show clear, and of those that are guesses; empty where it is not known."""
+def _by_trust(errors: np.ndarray, doubtful: np.ndarray, thresholds_m: Sequence[float]) -> dict[str, dict[str, float]]:
+    """Scores of the landmarks that are to be trusted, and of those that are doubtful; empty where it is not known."""
     scores = {}
-    for name, of_these in (("shown", views >= ENOUGH_VIEWS), ("guessed", views < ENOUGH_VIEWS)):
+    for name, of_these in (("trusted", doubtful == 0), ("doubtful", doubtful == 1)):
         chosen = errors[of_these & np.isfinite(errors)]
         if len(chosen):
             matched = {f"mmta_at_{1000 * threshold:g}mm": float((chosen <= threshold).mean()) for threshold in thresholds_m}

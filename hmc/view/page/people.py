@@ -71,10 +71,8 @@ def _person(result: Result, frames: np.ndarray, number: int) -> dict[str, Any]:
     out["landmarks"] = pack_fixed(_over(poses, frames, number, poses.positions), LENGTH_M)
     if poses.views is not None:
         out["views"] = pack(_bytes(_over(poses, frames, number, poses.views)))
-    trust = getattr(poses, "trust", None)
-    if trust is not None:
-        trust = np.broadcast_to(trust.reshape(len(trust), -1), (len(trust), len(LANDMARKS)))
-        out["trust"] = pack(_bytes(200 * np.clip(_over(poses, frames, number, trust), 0, 1)))
+    if poses.trust is not None:
+        out["trust"] = pack(_bytes(200 * np.clip(_over(poses, frames, number, poses.trust), 0, 1)))
     if result.states is not None:
         states = result.states
         values = _over(states, frames, number, states.states)

@@ -28,7 +28,7 @@ const MOMENTS = DATA.moments.map((one) => ({ at: (one.frame - DATA.first) / DATA
 // Whether a landmark is to be doubted: by its trust where that is known, else by the number of cameras that show it clear.
 function doubted(person, at, k) {
   const place = at * N_LANDMARKS + k;
-  if (person.trust && person.trust[place] !== UNKNOWN) return person.trust[place] < 100;
+  if (person.trust && person.trust[place] !== UNKNOWN) return person.trust[place] < DATA.trusted;
   return Boolean(person.views) && person.views[place] !== UNKNOWN && person.views[place] < DATA.enough;
 }
 function known(person, at) {

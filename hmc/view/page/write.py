@@ -16,7 +16,7 @@ from hmc.camera.model import Rig, backproject
 from hmc.errors import InputError
 from hmc.io.files import atomic_write
 from hmc.io.recording import Recording
-from hmc.landmarks import BONES, ENOUGH_VIEWS, LANDMARKS
+from hmc.landmarks import BONES, ENOUGH_VIEWS, LANDMARKS, TRUSTED
 from hmc.view.mosaic import Result
 from hmc.view.page.moments import moments_of, shown_moments
 from hmc.view.page.people import chosen_frames, page_people
@@ -89,6 +89,7 @@ def write_page(
         "ends": [LANDMARKS.index(_end(segment.name)) for segment in SEGMENTS],
         "angles": [] if result.states is None else list(result.states.dof_names[3:]),
         "enough": ENOUGH_VIEWS,
+        "trusted": round(200 * TRUSTED),  # in 200ths, as the page has it
         "people": people,
         "moments": moments,
     }
