@@ -11,7 +11,6 @@ from hmc.body.flesh import surface_samples
 from hmc.body.joints import N_DOF
 from hmc.body.kinematics import segment_transforms
 from hmc.body.model import BodyModel
-from hmc.landmarks import LANDMARKS
 from hmc.view.mosaic import Result
 from hmc.view.overlay import person_color
 from hmc.view.page.packed import pack, pack_fixed
