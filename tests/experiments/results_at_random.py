@@ -303,6 +303,15 @@ def pulled_off(rng, parameters, noise):
     return {"start_off_m": start, "off_m": end + np.array([0, 0, up])}
 
 
+def doubted(rng, parameters, noise):
+    """Landmarks of which one in eight is far off, whatever speaks against them, little or much."""
+    results = {"cameras": parameters["cameras"] or 7}
+    for way in ("both passes", "one pass", "at wrong times"):
+        much = rng.choice([0.01, 1.0]) if noise else 0.01
+        results[way] = {"features": much * rng.uniform(0, 1, (40, 15, 6)), "errors_m": rng.exponential(0.03, (40, 15))}
+    return results
+
+
 #: By the folder of the cells: ``draw(rng, parameters, noise) -> results``.
 RESULTS = {
     "fig-2.4": colored, "fig-3.3": peaks, "fig-3.5": over_annealed, "fig-4.2": components, "table-4.2": classified, "fig-4.4": tree,
@@ -310,7 +319,7 @@ RESULTS = {
     "fig-6.11": maps, "markers": marked, "filters": filtered, "markerless": pose, "fig-7.8": schedule, "fig-7.15": behind_furniture,
     "lost-arm": lost_arm, "over-time": unseen, "all-methods": timed, "fig-B.1": square, "hsiao-3.8": ghosts, "hsiao-parts": parts,
     "hsiao-4": swarmed, "why-hsiao": swarmed, "hsiao-pso": optimised, "repairs": overlaps, "body-bias": pulled_off,
-    "chain": chained, "cues": cued,
+    "chain": chained, "cues": cued, "trust": doubted,
     "kehl-1": carved, "kehl-4": edges, "kehl-9": displaced, "kehl": descended,
 }  # fmt: skip
 
