@@ -108,7 +108,7 @@ def test_what_speaks_against_a_landmark_never_helps_it(values, which, more):
 
     worse = [shown, denied, bare, apart]
     worse[which] = np.maximum(worse[which] - more, 0) if which == 0 else worse[which] + more
-    assert (trust(*worse) <= trust(shown, denied, bare, apart)).all()
+    assert (trust(*worse) <= trust(shown, denied, bare, apart) + 1e-3).all()  # it is rounded
 
 
 def test_a_window_is_a_mean_over_the_frames_around_of_the_same_person():
