@@ -13,7 +13,7 @@ __all__ = ["POSTURE", "posture_spread"]
 _SPREAD_DEG = {
     "torso_x": 25, "torso_y": 45, "torso_z": 25, "spine_x": 10, "spine_y": 15, "girdle_x": 10, "girdle_z": 12, "neck_x": 25, "neck_y": 30,
     "shoulder_x": 90, "shoulder_y": 40, "shoulder_z": 70, "elbow_z": 90,
-    "hip_x": 30, "hip_y": 70, "hip_z": 25, "knee_y": 90, "ankle_y": 30, "ankle_z": 10,
+    "hip_x": 30, "hip_y": 70, "hip_z": 25, "knee_y": 90, "ankle_y": 15, "ankle_z": 8,
 }  # fmt: skip
 
 

@@ -17,8 +17,8 @@ from hmc.errors import InputError
 from hmc.landmarks import LANDMARKS
 
 __all__ = [
-    "CANTON_LENGTHS", "DEFAULT_LENGTHS", "GIRTHS", "SOLE", "canton_body", "default_body", "landmark_segments", "make_bodies", "make_body",
-    "sole_ends", "stature", "stiff_body",
+    "CANTON_LENGTHS", "DEFAULT_LENGTHS", "GIRTHS", "SOLE", "SOLE_PITCH", "canton_body", "default_body", "landmark_segments", "make_bodies",
+    "make_body", "sole_ends", "stature", "stiff_body",
 ]  # fmt: skip
 
 #: Joint-centre lengths over stature. Trunk: hip centres' middle to the base of the neck. Sources: Winter (2009), figure 4.1
@@ -49,14 +49,18 @@ CANTON_LENGTHS: dict[str, float] = DEFAULT_LENGTHS | {
     "ankle_height": 0.0, "foot": 0.0, "chest_forward": 0.0, "head_forward": 0.0, **dict.fromkeys(_ONCE_UNKNOWN, 0.0),
 }  # fmt: skip
 
-#: Where the foot's flesh begins, over the floor and over stature. Soles are round and cameras stand higher: the lowest 2 cm of feet are
+#: The foot's axis at the heel, over the floor and over stature. Soles are round and cameras stand higher: the lowest 2 cm of feet are
 #: hardly in any hull, and a flesh that reached to the floor would lift the whole body out of it (`python -m hmc.experiments run
-#: body-bias`). For the same reason the flesh that fits hulls best points down from a flat sole, by 8 degrees.
+#: body-bias`).
 SOLE = 0.036
 
 #: The sole's ends, from below the ankle forward: the heel's over stature, and the sole's length over that of `DEFAULT_LENGTHS`, which is
 #: the foot's from the ankle on.
 HEEL, SOLE_LENGTH = -0.032, 1.35
+
+#: The angle of an ankle at which the sole is at a right angle to the shank, radians, toes down: for the same reason the flesh that fits
+#: hulls best points down from a flat sole (people of our own renderer who stand and walk; flesh that is turned by as much lifts bodies).
+SOLE_PITCH = 0.14
 
 #: What hulls do not show of a hand, over stature.
 FINGER_TIPS = 0.006
@@ -254,6 +258,6 @@ def _flesh(d: dict[str, float], sole: float) -> Cones:
         if foot > 0:
             low = -ankle + sole * h
             heel, toe = sole_ends(d)
-            ends = (heel, ankle_y, low + 0.0045 * h), (toe, ankle_y, low - 0.027 * h)
+            ends = (heel, ankle_y, low), (toe, ankle_y, low - 0.012 * h)
             cone(f"{side}_foot", ends, ((0.020, 0.024), (0.028, 0.012)), y, (1.0, 1.0))
     return Cones(*(np.array(column) for column in zip(*rows, strict=True)))

@@ -13,7 +13,7 @@ from hmc.body.feet import foot_points
 from hmc.body.joints import DOF_NAMES, N_DOF, dof_index, mirror_state
 from hmc.body.kinematics import landmarks
 from hmc.body.model import neutral_state
-from hmc.body.proportions import canton_body, default_body, sole_ends
+from hmc.body.proportions import SOLE_PITCH, canton_body, default_body, sole_ends
 from hmc.io.results import PoseTable, read_joints, write_joints
 from hmc.landmarks import FOOT_POINTS, landmark_index
 from hmc.metrics.scores.feet import feet_errors
@@ -23,8 +23,9 @@ BODY = default_body(1.75)
 TINY = Path(__file__).parents[2] / "data" / "synthetic" / "tiny"
 
 
-def test_soles_of_who_stands_are_flat_below_the_ankles_and_as_long_as_feet_are():
+def test_soles_at_a_right_angle_to_the_shanks_are_flat_below_the_ankles_and_as_long_as_feet_are():
     state = neutral_state("down")
+    state[dof_index("l_ankle_y", "r_ankle_y")] = SOLE_PITCH
     points, ankles = foot_points(BODY, state), landmarks(BODY, state)[[landmark_index("l_ankle"), landmark_index("r_ankle")]]
     assert_allclose(points[:, 2], np.repeat(ankles[:, 2], 2) - BODY.dimensions["ankle_height"])
     # Winter (2009), figure 4.1: a foot is .152 of the stature; shoes and the cut of the sole's ends aside.
