@@ -137,12 +137,9 @@ def read_tree(path: str | Path) -> PersonTree:
         When there is no such file or it holds no tree; the line is named.
     """
     path = Path(path)
-    try:
-        text = read_text_file(path)
-    except FileNotFoundError:
-        raise InputError(f"{path}: there is no such file; train a tree: python -m hmc.tracking.train_person_tree") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read as a person tree ({error})") from None
+    if not Path(path).exists():
+        raise InputError(f"{path}: there is no such file; train a tree: python -m hmc.tracking.train_person_tree")
+    text = read_text_file(path)
     numbered = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip() and not line.startswith("#")]
     try:
         rows = list(csv.reader(io.StringIO("\n".join(line for _, line in numbered))))

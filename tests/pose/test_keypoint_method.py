@@ -232,7 +232,7 @@ def test_a_stopped_run_goes_on_and_ends_as_if_it_had_not_been(clip, tmp_path, st
 def test_the_command(clip, tmp_path, capsys):
     out = tmp_path / "out"
     assert main(["pose", str(clip), "--cues", "keypoints", "--frames", "8", "--height", "1.76", "--out", str(out), "--quiet"]) == 0
-    assert sorted(path.name for path in out.iterdir()) == ["joints.csv", "pose.npz", "run.toml", "tracks.csv"]
+    assert sorted(path.name for path in out.iterdir()) == ["feet.csv", "joints.csv", "pose.npz", "run.toml", "tracks.csv"]
     run = read_run(out / "run.toml")
     assert run["method"] == "keypoints" and run["parameters"]["cues"] == "keypoints" and "voxel_size_m" not in run["parameters"]
     assert read_tracks(out / "tracks.csv").frames.tolist() == list(range(8))
