@@ -132,7 +132,7 @@ def test_a_tree_that_is_not_there_or_is_no_text(tmp_path):
         LifecycleSettings(person=str(tmp_path / "none.csv"))
     (tmp_path / "bytes").write_bytes(b"\xff\xfe\x00")
     for path in (tmp_path / "bytes", tmp_path):
-        with pytest.raises(InputError, match="not text in UTF-8|cannot be read"):
+        with pytest.raises(InputError, match=r"not text in UTF-8|cannot be read"):
             read_tree(path)
 
 
