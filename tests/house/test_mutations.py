@@ -5,7 +5,7 @@ import pytest
 from families import FAMILIES
 from mutations import build, trials, warm
 
-COUNT = 500
+COUNT = 40
 
 
 @pytest.mark.slow
