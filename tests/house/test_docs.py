@@ -155,4 +155,4 @@ def test_python_of_the_readme_runs(tmp_path, monkeypatch, capsys):
     assert 5 < float(capsys.readouterr().out) < 30  # millimetres
     assert (tmp_path / "people.png").is_file()
     rows = (tmp_path / "result" / "joints.csv").read_text().splitlines()
-    assert rows[0] == "frame,person,joint,x,y,z,views" and len(rows) == 1 + 30 * 15
+    assert rows[0] == "frame,person,joint,x,y,z,views,trust" and len(rows) == 1 + 30 * 15
