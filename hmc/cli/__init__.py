@@ -18,7 +18,9 @@ from hmc.errors import InputError
 
 __all__ = ["command_parser", "main", "make_parser", "repeated"]
 
-COMMANDS = ("check", "world", "sync", "synth", "track", "pose", "evaluate", "view", "export", "run", "experiments", "cite", "completion")
+COMMANDS = (
+    "check", "world", "sync", "synth", "track", "pose", "evaluate", "view", "export", "angles", "run", "experiments", "cite", "completion",
+)  # fmt: skip
 
 EXIT_WORKER = 1
 EXIT_INPUT = 2

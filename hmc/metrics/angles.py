@@ -17,7 +17,10 @@ from hmc.errors import InputError
 from hmc.landmarks import LANDMARKS
 from hmc.metrics.landmarks import landmark_errors, mean_and_deviation
 
-__all__ = ["IMAGE_ANGLES", "REFERENCE_ANGLES", "AngleScores", "angular_errors", "reference_angles", "score_angles"]
+__all__ = [
+    "IMAGE_ANGLES", "REFERENCE_ANGLES", "AngleScores", "angular_errors", "landmark_frame", "limb_angles", "reference_angles",
+    "score_angles",
+]  # fmt: skip
 
 #: A limb that is bent less than this does not show how it is turned about itself.
 LEAST_BEND_RAD = np.radians(15)
@@ -144,8 +147,8 @@ def score_angles(errors: np.ndarray, by: Literal["all", "angle", "frame"] = "all
 
 def _in_space(at: dict[str, np.ndarray]) -> np.ndarray:
     trunk = at["neck"] - at["pelvis"]
-    pelvis = _frame(trunk, at["l_hip"] - at["r_hip"], keep_side=True)
-    chest = _frame(trunk, at["l_shoulder"] - at["r_shoulder"], keep_side=False)
+    pelvis = landmark_frame(trunk, at["l_hip"] - at["r_hip"], keep_side=True)
+    chest = landmark_frame(trunk, at["l_shoulder"] - at["r_shoulder"], keep_side=False)
     # The pelvis is taken to be upright under the trunk, as its tilt shows in no landmark: two angles are left.
     turn = np.swapaxes(pelvis, -1, -2) @ chest
     columns = [np.arctan2(-turn[..., 1, 2], turn[..., 2, 2]), np.arctan2(-turn[..., 0, 1], turn[..., 0, 0])]
@@ -153,16 +156,30 @@ def _in_space(at: dict[str, np.ndarray]) -> np.ndarray:
     columns += [np.arctan2(-y, z), np.arcsin(np.clip(x, -1, 1))]
     for ball, hinge, end in _LIMBS:
         arm = hinge.endswith("elbow")
-        carrier = chest if arm else pelvis
-        columns += _limb(_into(carrier, at[hinge] - at[ball]), _into(carrier, at[end] - at[hinge]), 1.0 if ball[0] == "l" else -1.0, arm)
+        carrier, side = chest if arm else pelvis, 1.0 if ball[0] == "l" else -1.0
+        columns += limb_angles(_into(carrier, at[hinge] - at[ball]), _into(carrier, at[end] - at[hinge]), side, arm)
     return np.stack(columns, axis=-1)
 
 
-def _limb(upper: np.ndarray, lower: np.ndarray, side: float, arm: bool) -> list[np.ndarray]:
+def limb_angles(upper: np.ndarray, lower: np.ndarray, side: float, arm: bool) -> list[np.ndarray]:
     """Flexion, abduction, rotation and the hinge's angle of a limb, from its links in the frame that carries it.
 
     With the neutral limb along -z, the upper link is ``R_y(-flexion) R_x(side * abduction) R_z(side * rotation)`` of it, and the hinge
     turns about the link's own y axis: elbows bend forwards, knees backwards.
+
+    Parameters
+    ----------
+    upper, lower : ndarray, shape (..., 3)
+        From shoulder or hip to elbow or knee, and on to wrist or ankle; x forward, y to the left, z up.
+    side : float
+        1 for a left limb, -1 for a right one.
+    arm : bool
+        Whether the hinge is an elbow.
+
+    Returns
+    -------
+    list of ndarray, shape (...)
+        Radians, rotation outwards; NaN as in `reference_angles`.
     """
     upper, lower = _unit(upper), _unit(lower)
     normal = np.cross(upper, lower)
@@ -201,8 +218,20 @@ def _between(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     return np.where((cross == 0) & ((first * second).sum(axis=-1) == 0), np.nan, np.arctan2(cross, (first * second).sum(axis=-1)))
 
 
-def _frame(up: np.ndarray, left: np.ndarray, keep_side: bool) -> np.ndarray:
-    """Rotation whose columns are forward, left and up; `left` is kept and `up` made perpendicular to it, or the other way round."""
+def landmark_frame(up: np.ndarray, left: np.ndarray, keep_side: bool) -> np.ndarray:
+    """Rotation whose columns are forward, left and up; `left` is kept and `up` made perpendicular to it, or the other way round.
+
+    Parameters
+    ----------
+    up, left : ndarray, shape (..., 3)
+    keep_side : bool
+        Keep `left`.
+
+    Returns
+    -------
+    ndarray, shape (..., 3, 3)
+        NaN where the two are parallel, or one is 0.
+    """
     first, second = (left, up) if keep_side else (up, left)
     first = _unit(first)
     second = _unit(second - (second * first).sum(axis=-1, keepdims=True) * first)

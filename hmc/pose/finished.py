@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -11,6 +12,9 @@ from hmc.errors import InputError
 from hmc.io.results import PoseStates, PoseTable
 
 if TYPE_CHECKING:
+    from matplotlib.animation import FuncAnimation
+    from matplotlib.figure import Figure
+
     from hmc.motion.trajectory import Trajectory
 
 __all__ = ["FinishedPeople"]
@@ -21,6 +25,7 @@ class FinishedPeople:
 
     poses: PoseTable
     states: PoseStates
+    costs: np.ndarray
     fps: float | None
 
     def trajectories(self, fps: float | None = None) -> list[Trajectory]:
@@ -81,8 +86,104 @@ class FinishedPeople:
         changes = {"poses": replace(self.poses, positions=positions), "states": replace(self.states, states=states)}
         return replace(self, **changes)  # type: ignore[type-var]
 
+    def clinical_angles(self, fps: float | None = None) -> Any:
+        """Angles over time with clinical names and signs, degrees (docs/angles.md).
+
+        Parameters
+        ----------
+        fps : float, optional
+            As for `trajectories`.
+
+        Returns
+        -------
+        pandas.DataFrame
+            ``frame``, ``time_s``, ``person`` and the names of `hmc.motion.clinical.CLINICAL_ANGLES`; NaN where an angle is not shown.
+
+        Raises
+        ------
+        InputError
+            When the frame rate is not known, or nobody has a pose.
+        """
+        import pandas as pd
+
+        return pd.DataFrame(self._angle_table(fps))
+
+    def plot_angles(self, names: Sequence[str] | None = None, fps: float | None = None) -> Figure:
+        """A figure of the angles over time, left and right in one panel.
+
+        Parameters
+        ----------
+        names : sequence of str, optional
+            Such as ``["knee_flexion", "trunk_flexion"]``; by default all.
+        fps : float, optional
+            As for `trajectories`.
+
+        Raises
+        ------
+        InputError
+            When there is no such angle, the frame rate is not known, or nobody has a pose.
+        """
+        from hmc.view.motion_plots import draw_angles
+
+        return draw_angles(self._angle_table(fps), names)
+
+    def animate(self, step: int = 1, fps: float | None = None) -> FuncAnimation:
+        """Moving stick figures; in a notebook ``HTML(people.animate().to_jshtml())`` shows them.
+
+        Parameters
+        ----------
+        step : int
+            Each how many frames one is shown; more where there would be more than 300.
+        fps : float, optional
+            As for `trajectories`.
+
+        Raises
+        ------
+        InputError
+            When there is no pose, or the frame rate is not known.
+        """
+        from hmc.view.motion_plots import animate_sticks
+
+        return animate_sticks(self.poses.frames, self.poses.persons, self.poses.positions, self._known_fps(fps), step)
+
+    def _repr_html_(self) -> str:
+        """A small table for notebooks: a row a person."""
+        heads = ["person", "frames", "with a pose", "stature (m)", "mean cost", "mean views", "mean trust"]
+        rows = []
+        for person in np.unique(self.poses.persons).tolist():
+            own = self.poses.persons == person
+            fitted = own & np.isfinite(self.poses.positions).any(axis=(1, 2))
+            frames = self.poses.frames[own]
+            of_landmarks = [None if values is None else values[fitted] for values in (self.poses.views, self.poses.trust)]
+            rows.append([
+                str(person), f"{frames.min()}–{frames.max()}", str(fitted.sum()),
+                _mean(self.states.bodies.get(person, {}).get("height"), 2), _mean(self.costs[fitted], 4),
+                *(_mean(values, 2) for values in of_landmarks),
+            ])  # fmt: skip
+        lines = [_html_row("th", heads), *(_html_row("td", row) for row in rows)]
+        return f"<table>{''.join(lines)}</table>"
+
+    def _angle_table(self, fps: float | None) -> dict[str, np.ndarray]:
+        from hmc.motion.clinical import angle_table
+
+        found = self.trajectories(fps)
+        if not found:
+            raise InputError("nobody has a pose")
+        return angle_table(found)
+
     def _known_fps(self, fps: float | None) -> float:
         known = fps or self.fps
         if not known:
             raise InputError("how many frames a second is not known of these poses; give fps")
         return known
+
+
+def _mean(values: Any, digits: int) -> str:
+    """Of the known ones; a dash where there are none."""
+    values = np.atleast_1d(np.asarray(np.nan if values is None else values, float))
+    known = values[np.isfinite(values)]
+    return f"{known.mean():.{digits}f}" if len(known) else "–"
+
+
+def _html_row(tag: str, cells: list[str]) -> str:
+    return "<tr>" + "".join(f"<{tag}>{cell}</{tag}>" for cell in cells) + "</tr>"

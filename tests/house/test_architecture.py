@@ -93,7 +93,7 @@ MAY_IMPORT = {
 }
 
 #: What draws; only this may need what a server lacks.
-DRAWING = ("hmc.view.plots", "hmc.experiments")
+DRAWING = ("hmc.view.plots", "hmc.view.motion_plots", "hmc.experiments")
 UNWANTED = ("matplotlib", "mpl_toolkits", "pandas", "tqdm")
 
 #: What takes long to import and few runs need, and what all of them need but a command that only explains itself.
