@@ -72,7 +72,9 @@ def test_a_run_leaves_its_four_files_and_its_silhouettes_and_nothing_else(finish
     for table in (tracks, states):
         assert_array_equal(table.frames, joints.frames)
         assert_array_equal(table.persons, joints.persons)
-    assert run["method"] == "apf" and run["seed"] == 0 and run["problems"] == []
+    assert run["method"] == "apf" and run["seed"] == 0
+    # So little work leaves poses some centimetres off, and the run says so.
+    assert len(run["problems"]) == 1 and "of the landmarks are doubtful" in run["problems"][0]
     assert run["parameters"]["voxel_size_m"] == 0.05 and run["parameters"]["preset"]["name"] == "default"
     truth = read_joints(TINY / "truth" / "joints.csv")
     error = np.linalg.norm(joints.positions - truth.where(truth.frames < 5).positions, axis=-1)
@@ -211,7 +213,6 @@ def test_a_stopped_run_goes_on_and_ends_as_if_it_had_not_been(tmp_path, monkeypa
     one, other = (read_pose(tmp_path / folder / "pose.npz") for folder in ("cut", "whole"))
     assert_array_equal(one.states, other.states)
     assert sorted(path.name for path in (tmp_path / "cut").iterdir()) == [
-        "feet.csv",
         "joints.csv",
         "pose.npz",
         "run.toml",
