@@ -9,6 +9,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from os.path import realpath
 from pathlib import Path
 from typing import Any
 
@@ -218,7 +219,7 @@ def named_files(path: Path, names: Sequence[str], settings: Mapping[str, Any]) -
             found = find_files(path, kind, names, settings)
         except InputError:
             continue  # told where the files are opened
-        files.update(file.resolve() for own in found.files.values() for file in own)
+        files.update(Path(realpath(file)) for own in found.files.values() for file in own)
         guesses.update(found.notes.values())
     return files, guesses
 
@@ -229,7 +230,7 @@ def unused_views(path: Path, names: Sequence[str], files: set[Path]) -> list[str
         f"{item}: no camera of this name in the calibration; it is not used"
         for kind in FILES
         for item in footage_items(path / kind)
-        if item_name(item) not in names and not any(file == item.resolve() or item.resolve() in file.parents for file in files)
+        if item_name(item) not in names and not any(Path(realpath(item)) in (file, *file.parents) for file in files)
     ]
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import glob
 import re
 from collections.abc import Mapping, Sequence
+from os.path import realpath
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -77,8 +78,8 @@ def find_files(recording: Path, kind: str, names: Sequence[str], settings: Mappi
     for name, (file,) in files.items():
         if not file.exists():
             raise InputError(f"{recording / 'recording.toml'}: `{kind}` gives camera '{name}' the file {file}, which is not there")
-    given = {path.resolve() for paths in files.values() for path in paths}
-    items = [item for item in footage_items(folder or recording / kind) if item.resolve() not in given]
+    given = {realpath(path) for paths in files.values() for path in paths}
+    items = [item for item in footage_items(folder or recording / kind) if realpath(item) not in given]  # of links that go round too
     exact = {item_name(item) for item in items}
     if kind == "videos":  # no guess goes before images that bear the camera's name
         exact |= {item_name(item) for item in footage_items(recording / "images")}

@@ -3,6 +3,7 @@
 import re
 import shutil
 from dataclasses import replace
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -486,3 +487,12 @@ def test_one_error_is_told_whichever_camera_is_opened_first(recording_folder):
         (recording_folder / "videos" / f"{name}.avi").write_bytes(b"")
     with pytest.raises(InputError, match=r"cam_01\.avi"):
         open_recording(recording_folder)
+
+
+def test_a_link_that_goes_round_is_a_file_that_is_not_there(tmp_path):
+    shutil.copytree(Path(__file__).parents[2] / "data" / "synthetic" / "tiny", tmp_path / "tiny")
+    loop = tmp_path / "tiny" / "background" / "cam_00.mp4"
+    loop.unlink()
+    loop.symlink_to(loop.name)
+    recording = open_recording(tmp_path / "tiny")
+    assert [name for name in recording.rig.names if name in " ".join(recording.problems)] == ["cam_00"]  # the others have their empty scene
