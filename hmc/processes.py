@@ -67,18 +67,19 @@ def end_with(parent: int) -> None:
 
 
 def ahead(make: Callable[[], Iterable[T]], workers: int = 2) -> Iterator[T]:
-    """Items of an iterable that is made, and runs ahead, in a process of its own.
+    """Items of an iterable that is made, and runs ahead, in a process of its own, from this call on.
 
     Parameters
     ----------
     make : callable
         Gives the iterable; it is called there. Its items must be such as can be sent to another process.
     workers : int
-        With fewer than two all is done in this process.
+        With fewer than two all is done in this process, item by item as they are asked for.
 
-    Yields
-    ------
-    T
+    Returns
+    -------
+    iterator of T
+        A generator; close it where not all of it is taken.
 
     Raises
     ------
@@ -86,14 +87,25 @@ def ahead(make: Callable[[], Iterable[T]], workers: int = 2) -> Iterator[T]:
         When the process ended without a word, as by a signal. What is raised there is raised here.
     """
     if workers < 2 or not may_fork():
-        yield from make()
-        return
-    process, here = _forked(lambda there: _send_all(make(), there))
+        return (item for item in make())
+    return _begun(_items(lambda there: _send_all(make(), there)))
+
+
+def _items(run: Callable[[Connection], None]) -> Iterator[Any]:
+    """None when the process has been started, then the items that it sends."""
+    process, here = _forked(run)
     try:
+        yield None
         while (message := _received(process, here))[0] == ITEM:
             yield message[1]
     finally:
         _ended(process, here)
+
+
+def _begun(items: Iterator[T]) -> Iterator[T]:
+    """A generator that is past its first item: what it waits for is on its way before anybody asks for it."""
+    next(items)
+    return items
 
 
 def arrays_ahead(
@@ -109,19 +121,22 @@ def arrays_ahead(
     item_bytes : int
         How large an item's arrays may be, together; those that do not fit come as they do in `ahead`.
 
-    Yields
-    ------
-    arrays : list of ndarray or None
-        Lent: when the next item is asked for they change. Copy what is to be kept.
-    rest : T
+    Returns
+    -------
+    iterator of (arrays, rest)
+        The arrays are lent: when the next item is asked for they change. Copy what is to be kept.
     """
     if workers < 2 or not may_fork():
-        for arrays, rest in make():
-            yield list(arrays), rest
-        return
+        return ((list(arrays), rest) for arrays, rest in make())
+    return _begun(_lent(make, item_bytes))
+
+
+def _lent(make: Callable[[], Iterable[tuple[Sequence[np.ndarray | None], T]]], item_bytes: int) -> Iterator[Any]:
+    """None when the process has been started, then arrays in shared memory with the rest of each item."""
     arena = mmap.mmap(-1, DEPTH * item_bytes)
     process, here = _forked(lambda there: _send_all(_put(make(), there, arena, item_bytes), there))
     try:
+        yield None
         while (message := _received(process, here))[0] == ITEM:
             slot, placed, rest = message[1]
             yield [_taken(arena, one) for one in placed], rest

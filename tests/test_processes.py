@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import closing
 from pathlib import Path
 
 import cv2
@@ -60,6 +61,22 @@ def test_arrays_are_the_same_whether_they_fit_into_shared_memory_or_not(workers,
 def test_items_are_made_in_another_process_and_with_one_worker_in_this():
     assert next(iter(ahead(lambda: iter([os.getpid()])))) != os.getpid()
     assert list(ahead(lambda: iter([os.getpid()]), workers=1)) == [os.getpid()]
+
+
+def test_processes_begin_before_they_are_asked():
+    begun = multiprocessing.get_context("fork").Value("q", 0)
+
+    def count():
+        with begun.get_lock():
+            begun.value += 1
+        yield [np.zeros(1)], 0
+
+    with closing(ahead(count)), closing(arrays_ahead(count, 2, 1 << 10)):
+        until = time.monotonic() + 10
+        while begun.value < 2 and time.monotonic() < until:
+            time.sleep(0.01)
+        assert begun.value == 2
+    assert not multiprocessing.active_children()
 
 
 def test_no_more_arrays_wait_than_there_is_room_for():
