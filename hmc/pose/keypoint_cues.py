@@ -8,7 +8,7 @@ things of a detector are learnt, not assumed. How far it scatters: by how far ca
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -24,6 +24,7 @@ from hmc.pose.keypoint_sides import Turned, exchanged_sides, people_at
 from hmc.pose.objectives.keypoints import BESIDE_M, Beside
 from hmc.pose.views.keypoints import SCATTER_M, SeenKeypoints, body_detections, see_keypoints
 from hmc.pose.views.person_view import PersonView
+from hmc.processes import each_ahead
 
 __all__ = ["KeypointCues", "beside_body", "learn_beside", "learn_scatter", "with_keypoints"]
 
@@ -82,7 +83,7 @@ def _seen(rig: Rig, tracks: TrackTable, cues: KeypointCues, frame: int) -> dict[
     return see_keypoints(rig, detections, people_at(tracks, frame), cues.scatter_m, cues.turned.get(frame, {}))
 
 
-def learn_scatter(rig: Rig, tracks: TrackTable, source: KeypointSource, fps: float) -> KeypointCues:
+def learn_scatter(rig: Rig, tracks: TrackTable, source: KeypointSource, fps: float, workers: int = 1) -> KeypointCues:
     """Which cameras exchange left and right, and how far each one's detections of each keypoint are from where the others' lines meet.
 
     Parameters
@@ -92,21 +93,31 @@ def learn_scatter(rig: Rig, tracks: TrackTable, source: KeypointSource, fps: flo
     source : KeypointSource
     fps : float
         Frames a second.
+    workers : int
+        Processes that read frames and look at each by itself.
 
     Returns
     -------
     KeypointCues
     """
     scatter = np.full((len(rig), len(BODY_KEYPOINTS)), SCATTER_M)
-    cues = KeypointCues(source, scatter, exchanged_sides(rig, tracks, source, fps))
+    cues = KeypointCues(source, scatter, exchanged_sides(rig, tracks, source, fps, workers))
     missed: list[list[list[float]]] = [[[] for _ in BODY_KEYPOINTS] for _ in rig]
-    for frame in spread_frames(np.unique(tracks.frames), LEARNING_FRAMES):
-        for seen in _seen(rig, tracks, cues, frame).values():
-            off = seen.missed(seen.points)
-            cameras = np.bincount(seen.keypoint, minlength=len(BODY_KEYPOINTS))[seen.keypoint]
-            # The point was fitted to the line too: it is as much nearer as one of so many lines pulls it.
-            squared = (off**2).sum(axis=1) / np.maximum(1 - 1.5 / np.maximum(cameras, 2), 0.25)
-            for c, k, value in zip(seen.camera.tolist(), seen.keypoint.tolist(), squared.tolist(), strict=True):
+
+    def squares(frames: Sequence[int]) -> Iterator[list[tuple[np.ndarray, np.ndarray, np.ndarray]]]:
+        for frame in frames:
+            of_people = []
+            for seen in _seen(rig, tracks, cues, frame).values():
+                off = seen.missed(seen.points)
+                cameras = np.bincount(seen.keypoint, minlength=len(BODY_KEYPOINTS))[seen.keypoint]
+                # The point was fitted to the line too: it is as much nearer as one of so many lines pulls it.
+                squared = (off**2).sum(axis=1) / np.maximum(1 - 1.5 / np.maximum(cameras, 2), 0.25)
+                of_people.append((seen.camera, seen.keypoint, squared))
+            yield of_people
+
+    for of_people in each_ahead(squares, spread_frames(np.unique(tracks.frames), LEARNING_FRAMES), workers):
+        for camera, keypoint, squared in of_people:
+            for c, k, value in zip(camera.tolist(), keypoint.tolist(), squared.tolist(), strict=True):
                 if np.isfinite(value):
                     missed[c][k].append(value)
     scatter = cues.scatter_m.copy()

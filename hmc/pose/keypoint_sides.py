@@ -7,7 +7,7 @@ Of all sequences of a frame's pattern or its complement the cheapest is taken (V
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -18,6 +18,7 @@ from hmc.io.keypoints.source import KeypointSource
 from hmc.io.results import TrackTable
 from hmc.pose.views.exchanged_sides import FrameSides, sides_of_frame
 from hmc.pose.views.keypoints import body_detections, lines_of_people
+from hmc.processes import each_ahead
 
 __all__ = ["Turned", "cheapest_states", "exchanged_sides", "kept_or_exchanged", "people_at"]
 
@@ -44,7 +45,7 @@ class _Chain:
     ways: np.ndarray | None = None
 
 
-def exchanged_sides(rig: Rig, tracks: TrackTable, source: KeypointSource, fps: float) -> dict[int, dict[int, np.ndarray]]:
+def exchanged_sides(rig: Rig, tracks: TrackTable, source: KeypointSource, fps: float, workers: int = 1) -> dict[int, dict[int, np.ndarray]]:
     """Which cameras have exchanged left and right, of every person in every frame.
 
     Parameters
@@ -55,6 +56,8 @@ def exchanged_sides(rig: Rig, tracks: TrackTable, source: KeypointSource, fps: f
     source : KeypointSource
     fps : float
         Frames a second.
+    workers : int
+        Processes that read frames and look at each by itself.
 
     Returns
     -------
@@ -62,11 +65,17 @@ def exchanged_sides(rig: Rig, tracks: TrackTable, source: KeypointSource, fps: f
         By frame and person; frames and persons without any such camera are left out.
     """
     chains: dict[int, _Chain] = {}
-    for frame in np.unique(tracks.frames).tolist() if len(rig) > 1 else []:
-        for person, own in lines_of_people(rig, body_detections(source, frame), people_at(tracks, frame)).items():
-            sides = sides_of_frame(rig.centres, own.directions, own.deviation_m)
-            if sides.told.any():
-                _append(chains.setdefault(person, _Chain()), frame, sides, fps)
+    frames = np.unique(tracks.frames).tolist() if len(rig) > 1 else []
+
+    def told(some: Sequence[int]) -> Iterator[dict[int, FrameSides]]:
+        for frame in some:
+            people = lines_of_people(rig, body_detections(source, frame), people_at(tracks, frame))
+            sides = {person: sides_of_frame(rig.centres, own.directions, own.deviation_m) for person, own in people.items()}
+            yield {person: one for person, one in sides.items() if one.told.any()}
+
+    for frame, of_people in zip(frames, each_ahead(told, frames, workers), strict=True):
+        for person, sides in of_people.items():
+            _append(chains.setdefault(person, _Chain()), frame, sides, fps)
     found: dict[int, dict[int, np.ndarray]] = {}
     for person, chain in chains.items():
         both = np.array([chain.turned, chain.other])

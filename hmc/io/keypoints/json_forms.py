@@ -216,6 +216,9 @@ def _persons(entry: Any) -> Iterator[np.ndarray]:
     if not isinstance(points[0], list | dict):
         if len(points) % 3:
             raise ValueError(f"{len(points)} numbers are no list of x, y, confidence")
+        if scores is None and (rows := _flat_rows(points)) is not None:
+            yield as_people(rows[None], places(len(rows)))[0]
+            return
         points = [points[k : k + 3] for k in range(0, len(points), 3)]
     if scores is not None and (not isinstance(scores, list) or len(scores) != len(points)):
         raise ValueError("not as many scores as points")
@@ -234,6 +237,17 @@ def _persons(entry: Any) -> Iterator[np.ndarray]:
     if scores is not None:
         rows[:, 2] = [_number(score[0] if isinstance(score, list) and len(score) == 1 else score, 0.0) for score in scores]
     yield as_people(rows[None], order)[0]
+
+
+def _flat_rows(numbers: list[Any]) -> np.ndarray | None:
+    """Rows of x, y and confidence, of finite numbers and nothing else: what most files hold, all at once; else None."""
+    if not set(map(type, numbers)) <= {int, float}:
+        return None
+    try:
+        rows = np.array(numbers, float).reshape(-1, 3)
+    except OverflowError:
+        return None
+    return rows if np.isfinite(rows).all() else None
 
 
 def _point(point: Any) -> tuple[float, float, float]:
