@@ -254,6 +254,7 @@ def pose(
     from hmc.pose.registry import pose_method
     from hmc.pose.smoothing import smooth_people
     from hmc.pose.trust import with_trust
+    from hmc.pose.views.recent import RecentViews
     from hmc.voxels.run_options import RunOptions
 
     recording, method = _opened(recording), pose_method(method) if isinstance(method, str) else method
@@ -279,7 +280,7 @@ def pose(
             if keypoints is None or tracks is None or not method.keypoints
             else learn_scatter(recording.rig, tracks, keypoints, recording.fps)
         )
-        options = FollowOptions(POSE_VOXEL_M, seed, height, detections, keypoints=cues)
+        options = FollowOptions(POSE_VOXEL_M, seed, height, detections, keypoints=cues, recent=RecentViews())
         people = replace(follow(recording, tracks, method, options, run), fps=recording.fps)
         run = replace(run, progress=None)
         if tracks is not None:

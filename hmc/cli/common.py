@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -26,6 +27,7 @@ __all__ = [
     "load_given_plugins",
     "note_changes",
     "open_given_keypoints",
+    "open_meanwhile",
     "open_selected",
     "output_path",
     "places_source",
@@ -126,6 +128,34 @@ def open_selected(args: argparse.Namespace):
     from hmc.io.recording import open_recording
 
     return open_recording(given_places(args), cameras=args.cameras, start=args.start, frames=args.frames)
+
+
+def open_meanwhile(args: argparse.Namespace, held: ExitStack) -> Callable[[], Any]:
+    """Begin to open the recording that `add_selection_options` describes, in a thread: it is decoding, most of all.
+
+    Parameters
+    ----------
+    args : Namespace
+    held : ExitStack
+        When it ends, the thread has ended.
+
+    Returns
+    -------
+    callable
+        Waits for the recording and gives it, or raises what `open_selected` does.
+    """
+    from concurrent.futures import ThreadPoolExecutor
+
+    import hmc.io.recording  # noqa: F401  here, so that no two threads import it
+
+    pool = held.enter_context(ThreadPoolExecutor(1))
+    opened = pool.submit(open_selected, args)
+
+    def wait() -> Any:
+        with pool:  # no thread is left when processes are forked
+            return opened.result()
+
+    return wait
 
 
 def open_given_keypoints(recording, asked: str):

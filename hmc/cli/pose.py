@@ -18,7 +18,7 @@ from hmc.cli.common import (
     load_given_plugins,
     note_changes,
     open_given_keypoints,
-    open_selected,
+    open_meanwhile,
     output_path,
     positive_float,
     print_problems,
@@ -142,6 +142,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _run(args: argparse.Namespace, held: ExitStack) -> int:
+    opened = open_meanwhile(args, held)  # and import meanwhile what poses need
     from hmc.errors import InputError
     from hmc.io.files import to_toml
     from hmc.io.fits import write_fits
@@ -154,6 +155,7 @@ def _run(args: argparse.Namespace, held: ExitStack) -> int:
     from hmc.pose.keypoint_views import with_keypoint_views
     from hmc.pose.smoothing import smooth_people
     from hmc.pose.trust import with_trust
+    from hmc.pose.views.recent import RecentViews
     from hmc.tracking.resumable import person_grid, track_recording
     from hmc.trials.quality import trust_summary
     from hmc.voxels.run_options import RunOptions
@@ -161,7 +163,7 @@ def _run(args: argparse.Namespace, held: ExitStack) -> int:
     plugins = load_given_plugins(args)
     name = args.method or ("keypoints" if args.cues == CUES[2] else "apf")
     method = pose_method(name, args.preset, args.model, args.init, args.markers == "skin", args.passes, _settings(args, name))
-    recording = open_selected(args)
+    recording = opened()
     if not args.full_images:
         recording = for_method(recording, method, min(args.voxel, args.track_voxel))
     if args.out.is_file():
@@ -241,10 +243,10 @@ def _run(args: argparse.Namespace, held: ExitStack) -> int:
         tracks = tracks_of_keypoints(recording, source_of_keypoints, kept(JOURNAL, TRACKING))
     bar.people = 1 if tracks is None else len(set(tracks.persons.tolist()))
     detections = None if markers is None else markers.table(args, key, problems)
-    cues = (
-        None if tracks is None or source_of_keypoints is None else learn_scatter(recording.rig, tracks, source_of_keypoints, recording.fps)
-    )
-    options = FollowOptions(args.voxel, args.seed, height, detections, keypoints=cues)
+    cues = None
+    if tracks is not None and source_of_keypoints is not None:
+        cues = learn_scatter(recording.rig, tracks, source_of_keypoints, recording.fps, selected_workers(args))
+    options = FollowOptions(args.voxel, args.seed, height, detections, keypoints=cues, recent=RecentViews())
     people = follow(recording, tracks, method, options, kept(POSE_JOURNAL, FOLLOWING))
     if markers is not None:
         markers.refuse_nothing(people)

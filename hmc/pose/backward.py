@@ -155,10 +155,6 @@ class _Pass:
     bodies: Mapping[int, BodyModel]
     places: HiddenPlaces | None
 
-    def views(self, frames: Sequence[int]) -> Iterator[tuple[int, dict[int, PersonView]]]:
-        """What some frames show of all people, made ahead."""
-        return self.each(self.views_of, frames)
-
     def each(self, make: Callable[[Sequence[int]], Iterator[T]], frames: Sequence[int]) -> Iterator[T]:
         """What is made of each of some frames, made ahead by processes."""
         shared_tables(person_grid(self.recording, self.options.voxel_size_m), self.recording.rig)  # once, for all processes
@@ -166,22 +162,37 @@ class _Pass:
 
     def views_of(self, frames: Sequence[int]) -> Iterator[tuple[int, dict[int, PersonView]]]:
         """What some frames show of all people, in any order, by what the first pass tells of the scene and of the others' poses."""
-        grid = person_grid(self.recording, self.options.voxel_size_m)
-        masks = kept_frames(self.run.masks or "", self.run.key, frames)
-        for hull in stream_hulls(self.recording, grid, self.run.frontend, masks=masks):
-            unseen = None if self.places is None else unseen_voxels(self.places, hull.masks)
-            views = views_of(self.recording, grid, self.tracks, hull, unseen=unseen)
-            views = with_keypoints(views, self.recording.rig, self.tracks, self.options.keypoints)
+        made = self._made([frame for frame in frames if self.recent(frame) is None])
+        for frame in frames:
+            recent = self.recent(frame)
+            views = next(made) if recent is None else recent
             if not self.settings.own_rays:
-                yield hull.index, views
+                yield frame, views
                 continue
-            rows = np.flatnonzero(self.states.frames == hull.index)
+            rows = np.flatnonzero(self.states.frames == frame)
             rows = rows[np.isfinite(self.states.states[rows]).all(axis=1)]
             poses = {
                 person: (self.bodies[person], self.states.states[row])
                 for person, row in zip(self.states.persons[rows].tolist(), rows, strict=True)
             }
-            yield hull.index, {person: with_own_rays(view, person, poses) for person, view in views.items()}
+            yield frame, {person: with_own_rays(view, person, poses) for person, view in views.items()}
+
+    def recent(self, frame: int) -> dict[int, PersonView] | None:
+        """What the first pass saw in a frame, if that is still there and nothing has been learnt of the scene since."""
+        recent = self.options.recent
+        if recent is None or self.places is not None or frame not in recent.views:
+            return None
+        views = recent.views[frame]
+        return {person: view if self.options.keypoints else replace(view, keypoints=None) for person, view in views.items()}
+
+    def _made(self, frames: Sequence[int]) -> Iterator[dict[int, PersonView]]:
+        """The same of each of some frames, by its silhouettes."""
+        grid = person_grid(self.recording, self.options.voxel_size_m)
+        masks = kept_frames(self.run.masks or "", self.run.key, frames)
+        for hull in stream_hulls(self.recording, grid, self.run.frontend, masks=masks):
+            unseen = None if self.places is None else unseen_voxels(self.places, hull.masks)
+            views = views_of(self.recording, grid, self.tracks, hull, unseen=unseen)
+            yield with_keypoints(views, self.recording.rig, self.tracks, self.options.keypoints)
 
     def rng(self, person: int, frame: int) -> np.random.Generator:
         """The random numbers of a person's frame."""
@@ -204,16 +215,21 @@ def _with_beside(pass_: _Pass, people: PosedPeople, fitted: np.ndarray, bodies: 
     if pass_.options.keypoints is None:
         return pass_
     persons = {number: _begun(people, fitted, number, make_subject(body, pass_.capture)) for number, body in bodies.items()}
-    found, costs = [], []
-    for frame, views in pass_.views(spread_frames(np.unique(people.frames[fitted]), BESIDE_FRAMES)):
-        for number, person in persons.items():
-            view = views.get(number)
-            if frame in person.row_of and view is not None and view.keypoints is not None and shows_enough(view.target):
-                hulls = fine_objective(pass_.rng(number, frame), person.subject, replace(view, keypoints=None), pass_.settings.polish)
-                state, info = refine(hulls, person.own[person.row_of[frame]], pass_.settings.polish.refine)
-                costs.append(info.cost)
-                found.append(beside_body(person.subject.body, state, view.keypoints))
-    return replace(pass_, capture=replace(pass_.capture, beside=learn_beside(found, costs)))
+
+    def told(some: Sequence[int]) -> Iterator[list[tuple[np.ndarray, float]]]:
+        for frame, views in pass_.views_of(some):
+            of_frame = []
+            for number, person in persons.items():
+                view = views.get(number)
+                if frame in person.row_of and view is not None and view.keypoints is not None and shows_enough(view.target):
+                    hulls = fine_objective(pass_.rng(number, frame), person.subject, replace(view, keypoints=None), pass_.settings.polish)
+                    state, info = refine(hulls, person.own[person.row_of[frame]], pass_.settings.polish.refine)
+                    of_frame.append((beside_body(person.subject.body, state, view.keypoints), info.cost))
+            yield of_frame
+
+    frames = spread_frames(np.unique(people.frames[fitted]), BESIDE_FRAMES)
+    found = [one for of_frame in pass_.each(told, frames) for one in of_frame]
+    return replace(pass_, capture=replace(pass_.capture, beside=learn_beside([beside for beside, _ in found], [cost for _, cost in found])))
 
 
 def _bodies(pass_: _Pass, people: PosedPeople, fitted: np.ndarray) -> dict[int, BodyModel]:
@@ -283,19 +299,26 @@ def _each_refined(
 ) -> Iterator[tuple[int, dict[int, tuple[PersonView, np.ndarray]]]]:
     """What some frames show of those people of whom it is enough, with their first pose, refined: all that needs no other frame."""
 
-    def refined(some: Sequence[int]) -> Iterator[tuple[int, dict[int, tuple[PersonView, np.ndarray]]]]:
+    def refined(some: Sequence[int]) -> Iterator[tuple[int, dict[int, tuple[PersonView | None, np.ndarray]]]]:
         for frame, views in pass_.views_of(some):
+            recent = pass_.recent(frame) or {}
             shown = {number: view for number, view in views.items() if number in persons and frame in persons[number].row_of}
             yield (
                 frame,
                 {
-                    number: (view, _own(pass_.rng(number, frame), persons[number], view, pass_.settings.polish))
+                    # What the asking process has too is not sent.
+                    number: (
+                        None if number in recent and view.target is recent[number].target else view,
+                        _own(pass_.rng(number, frame), persons[number], view, pass_.settings.polish),
+                    )
                     for number, view in shown.items()
                     if shows_enough(view.target)
                 },
             )
 
-    return pass_.each(refined, frames)
+    for frame, found in pass_.each(refined, frames):
+        recent = pass_.recent(frame) or {}
+        yield frame, {number: (recent[number] if view is None else view, own) for number, (view, own) in found.items()}
 
 
 def _own(rng: np.random.Generator, person: _Person, view: PersonView, settings: PolishSettings) -> np.ndarray:

@@ -32,6 +32,7 @@ from hmc.pose.person import DecidedFrames, PersonState, PersonTrack, PoseTask, p
 from hmc.pose.records import keep_decided, kept_decided
 from hmc.pose.views.markers import marker_views, seen_in_frame
 from hmc.pose.views.person_view import IMAGES_FOR, PersonView, check_needs, views_of
+from hmc.pose.views.recent import RecentViews
 from hmc.processes import ahead, each_ahead
 from hmc.tracking.resumable import WARM_UP_FRAMES, kept_silhouettes, person_grid
 from hmc.tracking.tracks import velocities
@@ -154,6 +155,8 @@ class FollowOptions:
         P0 of filters, as in `hmc.pose.method.Capture`.
     keypoints : KeypointCues or None
         What a detector of 2-D keypoints saw.
+    recent : RecentViews or None
+        Where the pass forward leaves views for the pass backward; None: that makes all of them again. The result is the same.
     """
 
     voxel_size_m: float = 0.03
@@ -162,6 +165,7 @@ class FollowOptions:
     detections: DetectionTable | None = None
     drift: np.ndarray | None = None
     keypoints: KeypointCues | None = None
+    recent: RecentViews | None = None
 
 
 def follow(
@@ -206,7 +210,9 @@ def follow(
         states[decided.person] = resumed(task, states[decided.person], decided)
     left = {number: person.frames[person.frames > states[number].done_to] for number, person in persons.items()}
     first = min((int(frames[0]) for frames in left.values() if len(frames)), default=None)
-    for views in () if first is None else _views_from(recording, tracks, method, options, run, first):
+    for frame, views in () if first is None else _views_from(recording, tracks, method, options, run, first):
+        if options.recent is not None and method.back is not None:
+            options.recent.add(frame, views)
         for number, view in views.items():
             before = states[number].done_to
             if view.frame <= before:
@@ -226,7 +232,7 @@ def follow(
 
 def _views_from(
     recording: Recording, tracks: TrackTable, method: PoseMethod, options: FollowOptions, run: RunOptions, first: int
-) -> Iterator[dict[int, PersonView]]:
+) -> Iterator[tuple[int, dict[int, PersonView]]]:
     """What each frame shows of every person, from the first that one still needs to the end of the selection."""
     end = recording.start + recording.n_frames
     cues = options.keypoints if method.keypoints else None
@@ -235,7 +241,7 @@ def _views_from(
         for frame in run.progress(frames, end - first) if run.progress else frames:
             persons = tracks.persons[tracks.frames == frame].tolist()
             blank = with_keypoints({person: PersonView(frame) for person in persons}, recording.rig, tracks, cues)
-            yield _with_markers(blank, recording, method, options)
+            yield frame, _with_markers(blank, recording, method, options)
         return
     grid = person_grid(recording, options.voxel_size_m)
 
@@ -255,8 +261,7 @@ def _views_from(
     else:
         shared_tables(grid, recording.rig)  # once, for all processes
         views = each_ahead(lambda frames: again(kept_frames(run.masks or "", run.key, frames)), range(first, end), run.workers)
-    for _, of_frame in run.progress(views, end - first) if run.progress else views:
-        yield of_frame
+    yield from run.progress(views, end - first) if run.progress else views
 
 
 def _new_hulls(recording: Recording, grid: VoxelGrid, run: RunOptions, first: int) -> Iterator[HullStep]:

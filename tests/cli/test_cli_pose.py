@@ -224,16 +224,16 @@ def test_a_stopped_run_goes_on_and_ends_as_if_it_had_not_been(tmp_path, monkeypa
 
 @pytest.mark.slow
 def test_a_run_killed_in_the_second_pass_goes_on_there(finished, tmp_path, monkeypatch):
-    views, seen = backward.views_of, []
+    back, seen = backward._back, []
 
-    def dying(recording, grid, tracks, hull, **options):
-        seen.append(hull.index)
+    def dying(rng, subject, own, after, view, settings):
+        seen.append(view.frame)
         if len(seen) == dies_after:
             raise KeyboardInterrupt
-        return views(recording, grid, tracks, hull, **options)
+        return back(rng, subject, own, after, view, settings)
 
-    default = ("--frames", "5", "--voxel", "0.05", "--workers", "1")  # what is done in another process is not noted here
-    monkeypatch.setattr(backward, "views_of", dying)
+    default = ("--frames", "5", "--voxel", "0.05")
+    monkeypatch.setattr(backward, "_back", dying)
     dies_after = 3
     assert pose(tmp_path, *default) == 130 and not (tmp_path / "joints.csv").exists()
     dies_after, before = 0, len(seen)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import multiprocessing
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +16,7 @@ from hmc.body.kinematics import landmarks
 from hmc.body.limbs import LIMBS
 from hmc.body.proportions import make_bodies
 from hmc.errors import InputError
+from hmc.io.masks import kept_frames
 from hmc.landmarks import LANDMARKS
 from hmc.pose import mixtures
 from hmc.pose.backward import backward
@@ -22,6 +24,10 @@ from hmc.pose.follow import FollowOptions
 from hmc.pose.mixtures import mixed_poses, mixture
 from hmc.pose.registry import pose_method
 from hmc.pose.starts.own_body import LEAST_BODY_FRAMES, choose_frames
+from hmc.pose.views.person_view import views_of
+from hmc.pose.views.recent import RecentViews, bytes_of
+from hmc.tracking.resumable import person_grid
+from hmc.voxels.hulls import stream_hulls
 from hmc.voxels.run_options import RunOptions
 
 FRAMES = 10
@@ -45,9 +51,9 @@ def with_a_lost_arm(people):
     return replace(people, poses=poses, states=replace(people.states, states=states))
 
 
-def second(people, run, method=None):
+def second(people, run, method=None, recent=None):
     method = method or pose_method("apf")
-    options = FollowOptions(VOXEL_M, 3, HEIGHT_M)
+    options = FollowOptions(VOXEL_M, 3, HEIGHT_M, recent=recent)
     return backward(tiny_clip(FRAMES), true_tracks(FRAMES), method, people, options, run)
 
 
@@ -98,6 +104,34 @@ def test_a_stopped_pass_goes_on_to_the_same_numbers(one_pass, tmp_path):
         np.testing.assert_array_equal(again.states.states, whole.states.states)
         np.testing.assert_array_equal(again.positions, whole.positions)
         assert again.states.bodies == whole.states.bodies
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_views_that_the_first_pass_left_are_not_made_again_and_change_nothing(one_pass, monkeypatch, workers):
+    people, run = one_pass
+    method = pose_method("apf")
+    method = replace(method, back=replace(method.back, hidden_places=False, fit_body=None))
+    clip, tracks = tiny_clip(FRAMES), true_tracks(FRAMES)
+    grid = person_grid(clip, VOXEL_M)
+    steps = stream_hulls(clip, grid, masks=kept_frames(run.masks, run.key, range(FRAMES)))
+    views = {step.index: views_of(clip, grid, tracks, step) for step in steps}
+    last = sorted(views)[FRAMES // 2 :]
+    recent = RecentViews(sum(bytes_of(view) for frame in last for view in views[frame].values()))
+    for frame, of_frame in views.items():
+        recent.add(frame, of_frame)
+    assert list(recent.views) == last  # the others no longer fitted
+    carved = multiprocessing.get_context("fork").Value("q", 0)
+
+    def counted(*args, **options):
+        carved.value += 1
+        return views_of(*args, **options)
+
+    whole = second(people, run, method)
+    monkeypatch.setattr("hmc.pose.backward.views_of", counted)
+    found = second(people, replace(run, workers=workers), method, recent)
+    assert carved.value == FRAMES - len(last)
+    np.testing.assert_array_equal(found.states.states, whole.states.states)
+    np.testing.assert_array_equal(found.costs, whole.costs)
 
 
 def test_without_silhouettes_on_disk_the_poses_stay_and_a_note_says_so(one_pass):
