@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from hmc.check.sync.barcodes import barcode, shared_planes, unlikeness
 from hmc.check.sync.courses import NONE, Course, best_course
-from hmc.check.sync.evidence import by_silhouettes, pack, unpack
+from hmc.check.sync.evidence import Evidence, by_silhouettes, pack, unpack
 from hmc.check.sync.find import find_synchrony
 from hmc.check.sync.shifts import find_shifts
 from hmc.cli import main
@@ -98,6 +98,25 @@ def test_where_nobody_moves_a_dropped_frame_may_be_anywhere():
     assert [change for _, change in course.steps] == [-1] and course.shift == 0
     low, high = course.spans[0]
     assert 24 <= low <= 32 and 57 <= high <= 65
+
+
+@pytest.mark.parametrize(("dropped", "placed"), [((40, 40, 40), True), ((12, 45, 85), False)])
+def test_where_others_do_not_agree_a_dropped_frame_is_not_placed(dropped, placed):
+    """Cameras of which each says, of a fourth, where a frame of it is missing; all others are in time."""
+    n, reach = 100, 20
+    apart = np.minimum(np.abs(np.arange(-reach, reach + 1)), 6) / 20 + 0.02
+    bands = {pair: np.tile(apart, (n, 1)) for pair in ((0, 1), (0, 2), (1, 2))}
+    for c, moment in enumerate(dropped):
+        own = np.arange(n) - (np.arange(n) >= moment)  # the frame of the fourth at each moment
+        there = np.arange(n)[:, None] + np.arange(-reach, reach + 1)
+        bands[c, 3] = np.minimum(np.abs(there - own[:, None]), 6) / 20 + 0.02
+    found = find_synchrony(Evidence(4, n, reach, bands)).cameras
+    assert all(one.course == Course() and one.unplaced == 0 for one in found[:3])
+    assert (found[3].unplaced == 0, bool(found[3].course.steps)) == (placed, placed)
+    if placed:
+        assert [change for _, change in found[3].course.steps] == [-1] and abs(found[3].course.steps[0][0] - 40) <= 1
+    else:
+        assert found[3].unplaced == 1 and found[3].doubt >= 1
 
 
 def test_a_clock_that_drifts_is_found(ring):

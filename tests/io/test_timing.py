@@ -4,6 +4,7 @@ import json
 import re
 import shutil
 import struct
+import subprocess
 import tomllib
 
 import cv2
@@ -14,6 +15,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hmc.errors import InputError
+from hmc.io import footage
+from hmc.io.ffmpeg import ffmpeg_path
 from hmc.io.keypoints import open_keypoints
 from hmc.io.new_timing import with_first_frames, write_new_timing
 from hmc.io.recording import iterate_frames, open_recording
@@ -115,6 +118,26 @@ def test_frames_that_a_camera_of_variable_rate_left_out_are_none(recording_folde
     assert recording.n_frames == 12 and recording.problems == ()
     assert [row[1] is not None for row in found] == [frame in kept for frame in range(12)]
     np.testing.assert_allclose([row[1] for row in found if row[1] is not None], kept, atol=0.6)
+
+
+@pytest.mark.parametrize("suffix", ["mp4", "mkv", "ts"])
+def test_time_stamps_are_those_of_decoded_frames_without_decoding(tmp_path, monkeypatch, suffix):
+    """A rate that varies, and frames that are shown in another order than that in which they are stored."""
+    program = ffmpeg_path()
+    if program is None:
+        pytest.skip("needs an ffmpeg program")
+    video = tmp_path / f"cam.{suffix}"
+    source = ["-f", "lavfi", "-i", "testsrc=size=64x48:rate=60:duration=2", "-vf", r"select=not(eq(mod(n\,7)\,3))", "-fps_mode", "vfr"]
+    done = subprocess.run([program, "-loglevel", "error", *source, "-c:v", "libx264", "-bf", "2", str(video)], check=False)
+    if done.returncode:
+        pytest.skip("this ffmpeg makes no such video")
+    capture, decoded = cv2.VideoCapture(str(video)), []
+    while capture.grab():
+        decoded.append(capture.get(cv2.CAP_PROP_POS_MSEC) / 1000)
+    monkeypatch.setattr(footage, "_decoded_times", lambda view: pytest.fail("decoded"))
+    found = footage.stamps(footage.open_video(video))
+    np.testing.assert_allclose(found, np.array(decoded) - decoded[0], atol=1e-9)
+    np.testing.assert_allclose(found, [n / 60 for n in range(120) if n % 7 != 3], atol=1e-3)
 
 
 @pytest.mark.parametrize("as_images", [False, True])

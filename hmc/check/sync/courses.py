@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from hmc.check.sync.evidence import Evidence
 
-__all__ = ["Course", "against", "best_course"]
+__all__ = ["Course", "against", "best_course", "disagreement"]
 
 #: No frame of a camera belongs to a moment.
 NONE = -(10**9)
@@ -164,6 +164,37 @@ def best_course(costs: np.ndarray) -> tuple[Course, float]:
     if course.steps and all(change == course.steps[0][1] for _, change in course.steps):
         course = _evenly(course, filled) or course
     return course, gain / charge
+
+
+def disagreement(evidence: Evidence, frames: Sequence[np.ndarray], members: Sequence[int], c: int, course: Course) -> float:
+    """At how many moments a camera's course would be another without one of the cameras that it is compared with.
+
+    Where people hardly move, what silhouettes are off by decides at which moment a frame was dropped, and that is another for each pair.
+
+    Parameters
+    ----------
+    evidence, frames, members, c
+        As of `against`; of the other cameras the courses that were found.
+    course : Course
+        The camera's own.
+
+    Returns
+    -------
+    float
+        The largest share of the moments over all cameras that are left out, from 0 to 1; 1 where fewer than two are left to compare with.
+    """
+    partners = [j for j in members if j != c and (min(c, j), max(c, j)) in evidence.bands]
+    if len(partners) < 2:
+        return 1.0
+    n = evidence.n_moments
+    about = [*frames[:c], Course(course.shift).frames(n), *frames[c + 1 :]]
+    own, worst = course.frames(n), 0.0
+    for left_out in partners:
+        other, _ = best_course(against(evidence, about, [j for j in partners if j != left_out], c))
+        there = replace(other, shift=other.shift + course.shift).frames(n)
+        both = (own != NONE) & (there != NONE)
+        worst = max(worst, float((own != there)[both].mean()) if both.any() else 1.0)
+    return worst
 
 
 def _rise(costs: np.ndarray) -> tuple[float, float]:

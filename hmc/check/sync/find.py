@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hmc.check.sync.courses import Course, against, best_course
+from hmc.check.sync.courses import Course, against, best_course, disagreement
 from hmc.check.sync.evidence import Evidence
 from hmc.check.sync.shifts import Certainty, certainty, find_shifts, fractions, moved_curve
 
@@ -22,6 +22,8 @@ LEAST_PARTNERS = 3
 #: The share of what stays unlike that may be due to time, and the frames on either side over which its rise is measured: where views stay
 #: unlike for another reason, some shift happens to fit a little better. A real recording with one camera 28 px off gained 2 frames so.
 BIAS, SIDE = 0.2, 4
+#: Steps are believed where, whichever other camera is left out, no more than this share of the moments would have another frame.
+MOST_DISAGREEING = 0.25
 #: Who may be off by more frames than this is left as they are.
 MOST_DOUBT = 3.0
 #: Cameras of which the time is known.
@@ -54,6 +56,8 @@ class CameraTime:
         The shift that its sound tells, and by how much that may be off; NaN where it tells nothing.
     fits : bool
         False of a camera with the status "sound" whose images fit at no time.
+    unplaced : int
+        Frames that it seems to have dropped, or to have twice, without it being told where: they are not in the course, and in the doubt.
     """
 
     course: Course
@@ -66,6 +70,7 @@ class CameraTime:
     heard: float = float("nan")
     heard_doubt: float = float("nan")
     fits: bool = True
+    unplaced: int = 0
 
 
 @dataclass(frozen=True)
@@ -136,6 +141,7 @@ def find_synchrony(evidence: Evidence) -> Synchrony:
         still = int(np.median([courses[c].shift for c in fitting]))
         courses = {c: _moved(course, -still) for c, course in courses.items()}
         shifts = shifts - still
+    courses, unplaced = _placed(evidence, courses, shifts, fitting)
     frames = [courses[c].frames(moments) for c in range(n)]
     now = [np.arange(moments)] * n
     parts = fractions(curves, shifts, fitting)
@@ -146,12 +152,12 @@ def find_synchrony(evidence: Evidence) -> Synchrony:
         costs = against(evidence, frames, partners, c)
         before, after = _middle(against(evidence, now, partners, c)), _middle(costs)
         part = float(parts[c]) if courses[c].is_plain else np.nan
-        doubt = BIAS * after / rise if (rise := _rise(costs)) > 0 else np.inf
+        doubt = unplaced.get(c, 0) + (BIAS * after / rise if (rise := _rise(costs)) > 0 else np.inf)
         course = courses[c]
-        if course.is_plain and course.shift and not _told(course, part, doubt):
+        if course.is_plain and course.shift and (after > before or not _told(course, part, doubt)):
             course, part, after = Course(), np.nan, before
         status = "sure" if len(fitting) >= 2 and c in fitting and doubt <= MOST_DOUBT else "weak"
-        found.append(CameraTime(course, part, doubt, own, before, after, status))
+        found.append(CameraTime(course, part, doubt, own, before, after, status, unplaced=unplaced.get(c, 0)))
     usual = float(np.median([found[c].after for c in fitting])) if fitting else np.nan
     for c, one in enumerate(found):
         if one.status != "sure":
@@ -195,6 +201,16 @@ def _refined(evidence: Evidence, courses: dict[int, Course], members: Sequence[i
             return courses
         courses[best[1]] = best[2]
     return courses
+
+
+def _placed(
+    evidence: Evidence, courses: dict[int, Course], shifts: np.ndarray, members: Sequence[int]
+) -> tuple[dict[int, Course], dict[int, int]]:
+    """Courses without steps of which the other cameras do not agree where they are, and how many frames those are, by camera."""
+    frames = [courses[c].frames(evidence.n_moments) for c in range(evidence.n_cameras)]
+    doubtful = [c for c in members if courses[c].steps and disagreement(evidence, frames, members, c, courses[c]) > MOST_DISAGREEING]
+    unplaced = {c: sum(abs(change) for _, change in courses[c].steps) for c in doubtful}
+    return {c: Course(int(shifts[c])) if c in unplaced else course for c, course in courses.items()}, unplaced
 
 
 def _moved(course: Course, by: int) -> Course:

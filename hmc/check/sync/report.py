@@ -80,10 +80,10 @@ def sync_lines(recording: Recording, found: Synchrony, shares: np.ndarray, first
     lines = [f"{'camera':{wide}}  offset   +/-   sound  first frame  drift/s  dropped  how sure  unlike others   covered by hulls"]
     for c, (name, one) in enumerate(zip(names, found.cameras, strict=True)):
         course = one.course
-        dropped = sum(-change for _, change in course.steps if change < 0)
+        dropped = "?" if one.unplaced else str(sum(-change for _, change in course.steps if change < 0))
         first = str(first_frames.get(name, "times"))
         cells = f"{_offset(one):>6}  {_doubt(one):>4}  {_heard(one):>6}  {first:>11}  {course.slope * recording.fps:7.2f}"
-        cells += f"  {dropped:7d}  {one.status:>8}"
+        cells += f"  {dropped:>7}  {one.status:>8}"
         lines.append(
             f"{name:{wide}}  {cells}  {_number(one.before)} -> {_number(one.after)}  {_share(shares[0, c])} -> {_share(shares[1, c])}"
         )
@@ -101,6 +101,9 @@ def _remarks(name: str, one: CameraTime) -> list[str]:
         by_sound = f"camera '{name}': its time is by its sound alone, to about {one.doubt:.1f} frames"
         return [by_sound if one.fits else f"{by_sound}; its images fit the others at no time: has it moved since it was calibrated?"]
     told = _told_otherwise(name, one)
+    if one.unplaced:
+        seems = f"about {one.unplaced} frame{'s' * (one.unplaced > 1)}"
+        return [*told, f"camera '{name}': seems to have dropped {seems}, but where cannot be told; nothing is written of that"]
     steps = one.course.steps
     if not steps:
         return told
