@@ -41,7 +41,7 @@ def add_plugins(files: Iterable[str | Path]) -> None:
         When there is no such file, or it cannot be run.
     """
     known = list(plugin_files())
-    new = [path for path in dict.fromkeys(str(Path(file).resolve()) for file in files) if path not in known]
+    new = [path for path in dict.fromkeys(os.path.realpath(file) for file in files) if path not in known]
     for path in new:
         _load(path)
     if new:

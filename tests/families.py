@@ -12,8 +12,6 @@ import zipfile
 import zlib
 from pathlib import Path
 
-import numpy as np
-
 NUMBER = re.compile(rb"(?<![\w.])-?\d+(?:\.\d*)?(?:[eE][+-]?\d+)?(?![\w.])")
 STRANGE_NUMBERS = (b"nan", b"inf", b"-inf", b"-1", b"0", b"1e308", b"-1e308", b"99999999999999999999", b"1e999", b"9" * 5000, b'""', b"null", b"true", b"[]",
                    b"4294967296", b"1e-320", b"2147483648", b"{}", b"0.5", b"400000000")  # fmt: skip
@@ -276,12 +274,3 @@ FAMILIES = {
     "deep nesting": deep_nesting, "huge": huge_count, "strange neighbors": strange_neighbors, "another name": other_name, "a neighbor's content": neighbor_in_place,
     "entities": entities,
 }  # fmt: skip
-
-
-def break_file(seed: tuple[int, ...], path: Path) -> str:
-    """Break a file by a family that is drawn, and name the family. Ways that change a number or a line come as often as all others."""
-    rng = np.random.default_rng(seed)
-    names = list(FAMILIES)
-    name = names[int(rng.integers(len(names)))]
-    FAMILIES[name](rng, path)
-    return name

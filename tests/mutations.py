@@ -1,46 +1,57 @@
 # ruff: noqa: E501
 """Files broken at random, given to whole commands: counts of how they end.
 
-``python tests/house/mutations.py --count 10000 --jobs 2`` makes a miniature of everything that commands read, breaks a file of a copy of it
-by a family that is drawn, runs a command on it in a process of its own with 2 GB and 60 s, and counts:
+``python tests/mutations.py --count 10000 --jobs 2`` makes a miniature of everything that commands read, breaks a file of a copy of it, runs
+a command on it in a process of its own with 2 GB and 60 s, and counts:
 
 - ok: exit code 0; the file did not matter, or what was lost is told
+- silent: exit code 0, other tracks or poses than without the fault, and no word that is not said without it too
 - told: exit code 2 (1, of experiments with a failed cell), with words and no traceback
 - bad: a traceback, a signal, another exit code, no end within the time, more memory than there is, or a file beside the folders given
 
-A process is forked of one that has everything imported; a trial with the same seed and number is the same trial.
+A process is forked of one that has everything imported. Trial after trial goes through all families in an order that is drawn anew each time,
+and likewise through all commands, each as often in a round as its number says; a trial with the same seed and number is the same trial.
 """
 
 from __future__ import annotations
 
 import argparse
+import gc
+import multiprocessing
 import os
+import re
 import resource
+import select
 import shutil
 import signal
 import sys
 import tempfile
 import time
 import traceback
-from collections import Counter
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
-from families import break_file
-from miniature import COMMANDS, build, call
+from families import FAMILIES
+from miniature import COMMANDS, Given, build, call
 
 MEMORY_BYTES = 2 * 2**30
 #: Of the processor; and of the clock, as a busy machine needs more of it.
 TIME_S, CLOCK_S = 60, 240
+#: All commands, each as often as it says.
+ROUND = [k for k, given in enumerate(COMMANDS) for _ in range(given.often)]
+NUMBER = re.compile(r"[\d.]+")
 
 
 @dataclass(frozen=True)
 class Ending:
-    """How a trial ended: `ok`, `told` or `bad`, why, and what it was."""
+    """How a trial ended: `ok`, `silent`, `told` or `bad`, why, and what it was; and what it left: tables' bytes by their places, and its words."""
 
     kind: str
     why: str
@@ -48,39 +59,64 @@ class Ending:
     family: str
     file: str
     words: str
-    text: str = ""
+    text: str
+    tables: dict[str, bytes]
+    said: frozenset[str]
 
 
-def trial(base: Path, seed: int, number: int) -> Ending:
-    """Break a file and run a command."""
-    rng = np.random.default_rng((seed, number))
-    weights = np.array([one.weight for one in COMMANDS])
-    given = COMMANDS[int(rng.choice(len(COMMANDS), p=weights / weights.sum()))]
+def drawn(seed: int, number: int) -> tuple[str, Given]:
+    """The family and the command of a trial: each round of either is another permutation."""
+    family = np.random.default_rng((seed, 0, number // len(FAMILIES))).permutation(list(FAMILIES))[number % len(FAMILIES)]
+    command = np.random.default_rng((seed, 1, number // len(ROUND))).permutation(ROUND)[number % len(ROUND)]
+    return str(family), COMMANDS[command]
+
+
+def trial(base: Path, seed: int, whole: dict[tuple[str, ...], Ending], number: int) -> Ending:
+    """Break a file and run a command; compared with how it ends on files that are whole."""
+    rng = np.random.default_rng((seed, 2, number))
+    family, given = drawn(seed, number)
     with tempfile.TemporaryDirectory(prefix="broken-") as name:
-        folder = Path(name) / "in"
-        folder.mkdir()
-        for part in given.folders:
-            source, target = base / part, folder / part
-            target.parent.mkdir(parents=True, exist_ok=True)
-            (shutil.copytree if source.is_dir() else shutil.copy2)(source, target)
-        pattern = given.broken[int(rng.integers(len(given.broken)))]
-        files = sorted(file for file in folder.glob(pattern) if file.is_file())
-        if not files:
-            return Ending("ok", "nothing to break", number, "", pattern, " ".join(given.words))
+        folder = _copied(base, given, Path(name))
+        there = [pattern for pattern in given.broken if any(file.is_file() for file in folder.glob(pattern))]
+        files = sorted(file for file in folder.glob(there[int(rng.integers(len(there)))]) if file.is_file())
         file = files[int(rng.integers(len(files)))]
         where = str(file.relative_to(folder))
-        family = break_file((seed, number, 1), file)
-        return judged(folder, given.words, number, family, where)
+        FAMILIES[family](rng, file)
+        ending = judged(folder, given.words, number, family, where)
+    without = whole[given.words]
+    if ending.kind == "ok" and ending.tables != without.tables and ending.said <= without.said:
+        return replace(ending, kind="silent", why="another result")
+    return ending
+
+
+def whole_endings(base: Path, jobs: int) -> dict[tuple[str, ...], Ending]:
+    """How each command ends when nothing is broken."""
+    return dict(_spread(_whole, [(base, given) for given in COMMANDS], jobs))
+
+
+def _whole(task: tuple[Path, Given]) -> tuple[tuple[str, ...], Ending]:
+    base, given = task
+    with tempfile.TemporaryDirectory(prefix="whole-") as name:
+        return given.words, judged(_copied(base, given, Path(name)), given.words, -1, "", "")
+
+
+def _copied(base: Path, given: Given, where: Path) -> Path:
+    folder = where / "in"
+    folder.mkdir()
+    for part in given.folders:
+        source, target = base / part, folder / part
+        target.parent.mkdir(parents=True, exist_ok=True)
+        (shutil.copytree if source.is_dir() else shutil.copy2)(source, target)
+    return folder
 
 
 def judged(folder: Path, words: tuple[str, ...], number: int, family: str, file: str) -> Ending:
     """Run a command in a folder and say how it ended."""
     log = folder.parent / "log"
-    begun = time.monotonic()
     pid = os.fork()
     if pid == 0:
         _child(folder, words, log)
-    status, late = _wait(pid, begun + CLOCK_S)
+    status, late = _wait(pid)
     text = log.read_text(errors="replace")
     strangers = sorted(one.name for one in folder.parent.iterdir() if one.name not in ("in", "log"))
     line = (text.strip().splitlines() or [""])[-1][:300]
@@ -103,7 +139,12 @@ def judged(folder: Path, words: tuple[str, ...], number: int, family: str, file:
         kind, why = "told", f"code {code}"
     else:
         kind, why = "bad", f"code {code}"
-    return Ending(kind, why, number, family, file, " ".join(words), text[-3000:] if kind == "bad" else line)
+    tables = {}
+    if kind == "ok" and words[0] in ("track", "pose"):
+        made = folder / words[words.index("--out") + 1]
+        tables = {one.name: one.read_bytes() for one in sorted(made.glob("*.csv"))}
+    said = frozenset(NUMBER.sub("#", one) for one in text.splitlines())
+    return Ending(kind, why, number, family, file, " ".join(words), text[-3000:] if kind == "bad" else line, tables, said)
 
 
 def _child(folder: Path, words: tuple[str, ...], log: Path) -> None:
@@ -135,16 +176,16 @@ def _child(folder: Path, words: tuple[str, ...], log: Path) -> None:
             os._exit(code)
 
 
-def _wait(pid: int, deadline: float) -> tuple[int, bool]:
-    pause = 0.002
-    while time.monotonic() < deadline:
-        done, status = os.waitpid(pid, os.WNOHANG)
-        if done:
-            return status, False
-        time.sleep(pause)
-        pause = min(pause * 1.3, 0.1)
-    os.killpg(pid, signal.SIGKILL)
-    return os.waitpid(pid, 0)[1], True
+def _wait(pid: int) -> tuple[int, bool]:
+    """Its status, and whether it had to be ended."""
+    handle = os.pidfd_open(pid)
+    try:
+        late = not select.select([handle], [], [], CLOCK_S)[0]
+        if late:
+            os.killpg(pid, signal.SIGKILL)
+        return os.waitpid(pid, 0)[1], late
+    finally:
+        os.close(handle)
 
 
 def warm() -> None:
@@ -158,27 +199,30 @@ def warm() -> None:
         "scipy.stats scipy.signal tqdm hmc.experiments.engine.page matplotlib.pyplot"
     ).split():
         importlib.import_module(name)
+    gc.collect()
+    gc.freeze()  # what a child's collector does not touch need not be copied for it
 
 
-def trials(base: Path, seed: int, numbers: range, jobs: int) -> Iterator[Ending]:
+def trials(base: Path, seed: int, numbers: range, jobs: int, whole: dict[tuple[str, ...], Ending]) -> Iterator[Ending]:
     """All of them, as they end."""
+    return _spread(partial(trial, base, seed, whole), numbers, jobs)
+
+
+def _spread(work: Callable, tasks: Iterable, jobs: int) -> Iterator:
     if jobs == 1:
-        yield from (trial(base, seed, number) for number in numbers)
+        yield from map(work, tasks)
         return
-    from multiprocessing import get_context
-
-    with get_context("fork").Pool(jobs, initializer=_no_daemon) as pool:
-        yield from pool.imap_unordered(_one, ((base, seed, number) for number in numbers), chunksize=4)
+    with get_context("fork").Pool(jobs, initializer=_no_daemon, initargs=(work,)) as pool:
+        yield from pool.imap_unordered(_work, tasks)
 
 
-def _no_daemon() -> None:
-    import multiprocessing
-
+def _no_daemon(work: Callable) -> None:
     multiprocessing.current_process()._config["daemon"] = False  # type: ignore[attr-defined]  # what is broken may start processes
+    globals()["_worker"] = work  # inherited, not sent
 
 
-def _one(given: tuple[Path, int, int]) -> Ending:
-    return trial(*given)
+def _work(task):
+    return globals()["_worker"](task)
 
 
 def main() -> None:
@@ -189,19 +233,21 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--base", type=Path, help="where the miniature is made, and found again")
-    parser.add_argument("--show", action="store_true", help="print every ending")
+    parser.add_argument("--show", nargs="*", choices=("ok", "silent", "told", "bad"), default=("silent", "bad"), help="endings to print")
     args = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         base = build((args.base or Path(name) / "miniature").resolve())
         warm()
+        whole = whole_endings(base, args.jobs)
         counts, begun = Counter[str](), time.monotonic()
-        families: dict[str, Counter[str]] = {}
-        for one in trials(base, args.seed, range(args.first, args.first + args.count), args.jobs):
+        families, commands = (defaultdict[str, Counter[str]](Counter) for _ in range(2))
+        for one in trials(base, args.seed, range(args.first, args.first + args.count), args.jobs, whole):
             counts[f"{one.kind}: {one.why}" if one.kind == "bad" else one.kind] += 1
-            families.setdefault(one.family or "-", Counter())[one.kind] += 1
-            if one.kind == "bad" or args.show:
+            families[one.family][one.kind] += 1
+            commands[one.words.split()[0]][one.kind] += 1
+            if one.kind in args.show:
                 print(f"--- {one.kind} {one.why}: {one.number}, {one.family}, {one.file}: {one.words}\n{one.text.strip()}", flush=True)
-        for name, own in sorted(families.items()):
+        for name, own in sorted(families.items()) + sorted(commands.items()):
             print(f"{name}: {dict(own)}")
         print(f"{sum(counts.values())} trials in {time.monotonic() - begun:.0f} s: {dict(counts)}")
 

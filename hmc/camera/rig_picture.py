@@ -36,6 +36,7 @@ def draw_rig(rig: Rig, room: np.ndarray, ax=None):
     -------
     matplotlib Axes
     """
+    from matplotlib.collections import PolyCollection
     from matplotlib.figure import Figure
     from matplotlib.patches import Rectangle
 
@@ -58,7 +59,7 @@ def draw_rig(rig: Rig, room: np.ndarray, ax=None):
         color = f"C{index % 10}"
         x, y, z = camera.centre
         cone = view_cone(camera, length, room[0, 2])
-        ax.fill(*cone.T, facecolor=color, alpha=0.08)
+        ax.add_collection(PolyCollection([cone], facecolor=color, alpha=0.08), autolim=False)  # `fill` looks at each of its points
         ax.plot(*cone.T, color=color, linewidth=0.8)
         ax.plot(x, y, "o", color=color, markersize=8)
         side = 1 if x < corners[:, 0].mean() else -1

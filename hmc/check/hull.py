@@ -15,8 +15,10 @@ from hmc.camera.model import Camera, Rig
 from hmc.check.moments import Masks
 from hmc.voxels.carving import pixel_of_voxel
 
-__all__ = ["Hull", "best_move", "beyond_room", "fine_hull", "floor_height", "misfit", "odd_camera"]
+__all__ = ["CoarseGrid", "Hull", "best_move", "beyond_room", "coarse_grid", "fine_hull", "floor_height", "misfit", "odd_camera"]
 
+#: Column and row of the pixels on which points fall, and whether the camera sees them.
+Places = tuple[np.ndarray, np.ndarray, np.ndarray]
 #: How far beyond the room people are looked for, metres.
 AROUND_M = 0.3
 #: Sides of the coarse voxels (wider in a hall that would need more than `MOST_POINTS`) and of the fine ones, metres.
@@ -68,32 +70,70 @@ class Hull:
         return self.points[~self.missed.any(axis=0) & (self.seen.sum(axis=0) >= 3)]
 
 
-def fine_hull(rig: Rig, masks: Masks, room: np.ndarray) -> Hull:
+@dataclass(frozen=True)
+class CoarseGrid:
+    """Coarse voxels of a room and a little around it, and where a rig's cameras see them: the same at every moment.
+
+    Attributes
+    ----------
+    points : ndarray, shape (n, 3)
+        Centres, world, metres.
+    voxel_m : float
+    places : tuple of (column, row, seen), ndarrays of shape (n,), one a camera
+        As of `pixel_of_voxel`.
+    """
+
+    points: np.ndarray
+    voxel_m: float
+    places: tuple[Places, ...]
+
+
+def coarse_grid(rig: Rig, room: np.ndarray) -> CoarseGrid:
+    """The coarse voxels in which people are looked for.
+
+    Parameters
+    ----------
+    rig : Rig
+    room : ndarray, shape (2, 3)
+        Two opposite corners, metres.
+
+    Returns
+    -------
+    CoarseGrid
+    """
+    low, high = room[0] - AROUND_M, room[1] + AROUND_M
+    voxel_m = max(COARSE_M, float(np.prod(high - low) / MOST_POINTS) ** (1 / 3))
+    axes = [np.arange(a, b, voxel_m) + voxel_m / 2 for a, b in zip(low, high, strict=True)]
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    return CoarseGrid(points, voxel_m, tuple(pixel_of_voxel(camera, points) for camera in rig))
+
+
+def fine_hull(rig: Rig, masks: Masks, grid: CoarseGrid) -> Hull:
     """The hull of one moment.
 
     Parameters
     ----------
     rig : Rig
     masks : sequence of ndarray of bool, shape (height, width), or None; one a camera
-    room : ndarray, shape (2, 3)
+    grid : CoarseGrid
+        Of this rig.
 
     Returns
     -------
     Hull
     """
-    low, high = room[0] - AROUND_M, room[1] + AROUND_M
-    coarse_m = max(COARSE_M, float(np.prod(high - low) / MOST_POINTS) ** (1 / 3))
-    axes = [np.arange(a, b, coarse_m) + coarse_m / 2 for a, b in zip(low, high, strict=True)]
-    coarse = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    coarse, coarse_m = grid.points, grid.voxel_m
     wide = [None if mask is None else _dilate(mask, _reach(camera, coarse, coarse_m)) for camera, mask in zip(rig, masks, strict=True)]
-    seen, missed, _ = _look(rig, wide, coarse)
+    seen, missed = _look(wide, grid.places)
     n = round(coarse_m / FINE_M)
     steps = ((np.indices((n, n, n)).reshape(3, -1).T + 0.5) / n - 0.5) * coarse_m
     kept = coarse[(seen.sum(axis=0) >= 3) & (missed.sum(axis=0) <= 1)]
     points = (kept[:, None] + steps).reshape(-1, 3)
-    seen, missed, pixels = _look(rig, masks, points)
+    places = [pixel_of_voxel(camera, points) for camera in rig]
+    seen, missed = _look(masks, places)
     near = missed.sum(axis=0) <= 1
-    return Hull(points[near], coarse_m / n, seen[:, near], missed[:, near], tuple(place[:, near] for place in pixels), tuple(masks))
+    pixels = tuple(np.stack([row[near], column[near]]) for column, row, _ in places)
+    return Hull(points[near], coarse_m / n, seen[:, near], missed[:, near], pixels, tuple(masks))
 
 
 def misfit(rig: Rig, hulls: Sequence[Hull], members: Sequence[int]) -> np.ndarray:
@@ -232,17 +272,14 @@ def beyond_room(hulls: Sequence[Hull], room: np.ndarray) -> list[tuple[int, int,
     return found
 
 
-def _look(rig: Rig, masks: Masks, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
-    """Which cameras see the points, which of them see no person there, and on which pixel (row, column) they fall."""
-    seen, missed = (np.zeros((len(rig), len(points)), bool) for _ in range(2))
-    pixels = []
-    for c, (camera, mask) in enumerate(zip(rig, masks, strict=True)):
-        column, row, in_image = pixel_of_voxel(camera, points)
-        pixels.append(np.stack([row, column]))
+def _look(masks: Masks, places: Sequence[Places]) -> tuple[np.ndarray, np.ndarray]:
+    """Which cameras see points that fall on these pixels, and which of them see no person there; both (n_cameras, n)."""
+    seen, missed = (np.zeros((len(places), len(places[0][2])), bool) for _ in range(2))
+    for c, (mask, (column, row, in_image)) in enumerate(zip(masks, places, strict=True)):
         if mask is not None:
             seen[c] = in_image
             missed[c] = in_image & ~mask[row, column]
-    return seen, missed, pixels
+    return seen, missed
 
 
 def _reach(camera: Camera, points: np.ndarray, voxel_m: float) -> int:

@@ -10,7 +10,7 @@ import numpy as np
 
 from hmc.camera.coverage import inside_image
 from hmc.camera.model import Camera, project
-from hmc.check.hull import Hull, best_move, beyond_room, fine_hull, floor_height, misfit, odd_camera
+from hmc.check.hull import Hull, best_move, beyond_room, coarse_grid, fine_hull, floor_height, misfit, odd_camera
 from hmc.io.recording import Recording
 
 __all__ = ["covered_shares", "disagreements", "hull_findings", "silhouette_agreement"]
@@ -102,7 +102,8 @@ def hull_findings(recording: Recording, masks: Sequence[Sequence[np.ndarray | No
     """
     rig, room = recording.rig, recording.room
     moments = [frame for frame in masks if sum(mask is not None and mask.any() for mask in frame) >= LEAST_VIEWS]
-    hulls = [hull for hull in (fine_hull(rig, frame, room) for frame in moments) if len(hull.strict)]
+    grid = coarse_grid(rig, room)
+    hulls = [hull for hull in (fine_hull(rig, frame, grid) for frame in moments) if len(hull.strict)]
     cut = [
         f"people reach {reach:.1f} m beyond the room's limit {'xyz'[axis]} = {room[end, axis]:g} m, where {share:.0%} of their volume is "
         "cut off; widen `room` in recording.toml"

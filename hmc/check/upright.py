@@ -17,7 +17,7 @@ from scipy.optimize import least_squares
 from hmc.camera.coverage import point_looked_at
 from hmc.camera.model import Rig
 from hmc.camera.world import World, in_world
-from hmc.check.hull import fine_hull
+from hmc.check.hull import coarse_grid, fine_hull
 from hmc.check.moments import Masks
 
 __all__ = ["Figure", "Ground", "find_figures", "find_ground", "level_share"]
@@ -116,11 +116,11 @@ def find_figures(rig: Rig, moments: Sequence[Masks]) -> list[Figure]:
     usual = float(np.median(np.linalg.norm(rig.centres - target, axis=1)))
     free = World(origin=target, scale=DISTANCE / max(usual, 1e-9))
     free_rig = in_world(rig, free)
-    room = np.array([[-REACH] * 3, [REACH] * 3])
+    grid = coarse_grid(free_rig, np.array([[-REACH] * 3, [REACH] * 3]))
     figures: list[Figure] = []
     for moment, masks in enumerate(moments):
         if sum(mask is not None and mask.any() for mask in masks) >= 3:
-            figures += [_figure(free.old_points(part), moment) for part in _parts(fine_hull(free_rig, masks, room).strict)]
+            figures += [_figure(free.old_points(part), moment) for part in _parts(fine_hull(free_rig, masks, grid).strict)]
     return figures
 
 

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 
 from hmc.cli.common import add_session_option, camera_names, given_places, output_path
+from hmc.io.files import real_path
 
 __all__ = ["add_parser", "run"]
 
@@ -37,7 +38,7 @@ def run(args: argparse.Namespace) -> int:
         from hmc.check.keypoints import agreement_lines
 
         print(*agreement_lines(inspection.keypoints), sep="\n")
-    name = args.recording.resolve().name
+    name = real_path(args.recording).name
     verdict = f"{name}: {_summary(inspection)}"
     if inspection.rig is not None and inspection.room is not None:
         from hmc.camera.rig_picture import save_rig_picture

@@ -9,6 +9,8 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from hmc.io.files import real_path
+
 if TYPE_CHECKING:
     from hmc.io.camera_faults import CameraFault
 
@@ -259,9 +261,9 @@ def places_source(places) -> dict[str, Any]:
     """As `recording_source`, of a recording that need not be opened."""
     from datetime import UTC, datetime
 
-    source = {"recording": places.path.resolve(), "recording_changed": datetime.fromtimestamp(places.changed_s(), UTC).isoformat()}
+    source = {"recording": real_path(places.path), "recording_changed": datetime.fromtimestamp(places.changed_s(), UTC).isoformat()}
     lacks = {"calibration": places.calibration, "background": places.background, "videos": places.videos, **places.settings}
-    given = {name: value.resolve() if isinstance(value, Path) else value for name, value in lacks.items() if value is not None}
+    given = {name: real_path(value) if isinstance(value, Path) else value for name, value in lacks.items() if value is not None}
     return source | ({"given": given} if given else {})
 
 

@@ -11,7 +11,7 @@ from typing import Literal
 
 from hmc.cli.common import whole_number
 from hmc.errors import InputError
-from hmc.io.files import atomic_write, write_toml
+from hmc.io.files import atomic_write, real_path, write_toml
 
 __all__ = ["add_parser", "run"]
 
@@ -220,7 +220,7 @@ def made_from(directory: Path, recording: Path | None) -> list[str]:
 
     run = directory / "run.toml"
     made = read_run(run).get("recording") if run.is_file() else None
-    if recording is None or not isinstance(made, str) or Path(made).name == recording.resolve().name:
+    if recording is None or not isinstance(made, str) or Path(made).name == real_path(recording).name:
         return []
     return [f"{run}: the result was made from {made}, not from {recording}; are they the same recording?"]
 

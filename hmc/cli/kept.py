@@ -7,6 +7,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from hmc.io.files import real_path
+
 __all__ = ["MASKS", "add_silhouette_options", "given_silhouettes", "leave_silhouettes", "silhouettes_source", "take_silhouettes"]
 
 #: Silhouettes of a run that is not finished, which its stages share.
@@ -52,7 +54,7 @@ def given_silhouettes(args: argparse.Namespace, recording, wanted: bool):
         return None
     if not wanted:
         raise InputError(f"--silhouettes-from {folder}: the method makes no use of silhouettes; leave it out")
-    if folder.resolve() == args.out.resolve():
+    if real_path(folder) == real_path(args.out):
         raise InputError(f"--silhouettes-from {folder}: is what --out {args.out} would overwrite; choose another folder")
     found = open_silhouettes(folder)
     if found is None:
@@ -68,7 +70,7 @@ def silhouettes_source(given) -> dict[str, Any]:
     if given is None:
         return {}
     run = given.directory / "run.toml"
-    return {"silhouettes": given.directory.resolve(), "silhouettes_changed": str(run.stat().st_mtime_ns)}
+    return {"silhouettes": real_path(given.directory), "silhouettes_changed": str(run.stat().st_mtime_ns)}
 
 
 def take_silhouettes(given, recording, masks: Path, key: str, on_problem: Callable[[str], None]) -> None:
@@ -87,7 +89,7 @@ def leave_silhouettes(args: argparse.Namespace, recording, key: str, on_problem:
     from hmc.io.masks import kept_masks
     from hmc.io.silhouettes import SILHOUETTES, remove_silhouettes, write_silhouettes
 
-    if args.out.resolve() == recording.path.resolve():
+    if real_path(args.out) == real_path(recording.path):
         if args.silhouettes:
             on_problem(f"{args.out / SILHOUETTES}: is the recording's own; silhouettes are not kept; give --out another folder")
         return

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from hmc.errors import InputError
+from hmc.io.files import real_path
 
 __all__ = ["add_like_option", "arguments_of", "known_options", "like_words", "repeated_preset", "told_options"]
 
@@ -37,7 +38,7 @@ def told_options(args: argparse.Namespace) -> dict[str, Any]:
 def _told(value: Any) -> Any:
     if isinstance(value, list):
         return [_told(one) for one in value]
-    return str(value.resolve()) if isinstance(value, Path) else value
+    return str(real_path(value)) if isinstance(value, Path) else value
 
 
 def like_words(parser: argparse.ArgumentParser, args: argparse.Namespace) -> list[str]:
@@ -148,7 +149,7 @@ def _word(action: argparse.Action, value: Any, folder: Path) -> str:
     if not isinstance(value, str | int | float) or isinstance(value, bool):
         raise ValueError(f"must be a text or a number; got {value!r}")
     if action.type is Path:
-        return str((folder / str(value)).resolve())
+        return str(real_path(folder / str(value)))
     word = str(value)
     made = action.type(word) if callable(action.type) else word
     if action.choices is not None and made not in action.choices:

@@ -33,6 +33,7 @@ from hmc.cli.option_tables import add_like_option, repeated_preset, told_options
 from hmc.cli.pose_markers import MARKERS_JOURNAL, add_marker_options, read_markers
 from hmc.cli.run_bar import FIRST_POSE, FITTING, FOLLOWING, LEARNING, SECOND_PASS, TRACKING, VIEWS, RunBar
 from hmc.cli.track import JOURNAL, add_tracker_options, selected_frontend, selected_tracker
+from hmc.io.files import real_path
 from hmc.pose.registry import BUILT_IN, INITS, METHODS, pose_method
 
 if TYPE_CHECKING:
@@ -201,7 +202,7 @@ def _run(args: argparse.Namespace, held: ExitStack) -> int:
     silhouettes = given_silhouettes(args, recording, hulls)
     source |= silhouettes_source(silhouettes)
     if given is not None:
-        source |= {"tracks": args.tracks.resolve(), "tracks_changed": str(args.tracks.stat().st_mtime_ns)}
+        source |= {"tracks": real_path(args.tracks), "tracks_changed": str(args.tracks.stat().st_mtime_ns)}
     if "detections" in method.needs:
         markers = read_markers(args, recording)
         parameters |= markers.parameters
@@ -316,7 +317,7 @@ def _given_tracks(args: argparse.Namespace, method, recording):
         raise InputError(f"--tracks {args.tracks}: method {method.name} needs no tracks; leave one of both out")
     if args.tracker is not None:
         raise InputError(f"--tracks {args.tracks}: --tracker {args.tracker} would have nothing to do; leave one of both out")
-    if args.tracks.resolve() == (args.out / "tracks.csv").resolve():
+    if real_path(args.tracks) == real_path(args.out / "tracks.csv"):
         raise InputError(f"--tracks {args.tracks}: is what --out {args.out} would overwrite; choose another folder")
     table = read_tracks(args.tracks)
     table = table.where((table.frames >= recording.start) & (table.frames < recording.start + recording.n_frames))

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from hmc.cli.common import progress
+from hmc.io.files import real_path
 
 __all__ = ["MARKERS_JOURNAL", "Markers", "add_marker_options", "read_markers"]
 
@@ -65,7 +66,7 @@ class Markers:
         """What a run depends on."""
         from hmc.camera.marker_color import MarkerColorSettings
 
-        where = {"detections": self.used.resolve()} if self.ready else {"labels": self.used.resolve(), "color": MarkerColorSettings()}
+        where = {"detections": real_path(self.used)} if self.ready else {"labels": real_path(self.used), "color": MarkerColorSettings()}
         return {"markers": self.markers, **where}
 
     @property

@@ -16,6 +16,7 @@ from typing import Any
 from hmc.cli.common import add_workers_option, camera_names, output_path, whole_number
 from hmc.cli.one_trial import TrialOptions, pose_arguments, run_trial
 from hmc.errors import InputError
+from hmc.io.files import real_path
 
 __all__ = ["add_parser", "run"]
 
@@ -127,8 +128,8 @@ def _by_scheduler(session: Path, options: TrialOptions, names: Sequence[str], sc
     """Trials by the workers of a Dask scheduler."""
     from hmc.experiments.engine.cluster import spread
 
-    there = replace(options, out=options.out.resolve())
-    failed = list(filter(None, spread(partial(_remote, session.resolve(), there), [{"trial": name} for name in names], scheduler)))
+    there = replace(options, out=real_path(options.out))
+    failed = list(filter(None, spread(partial(_remote, real_path(session), there), [{"trial": name} for name in names], scheduler)))
     for name in names:
         words = next((one for one in failed if one.startswith(f"{name}\n") or f"'{name}'" in one), None)
         code = 0 if words is None else int(words.rpartition("\n")[2]) if words.startswith(f"{name}\n") else EXIT_FAULT

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 
 from hmc.cli.common import output_path, positive_float, whole_number
+from hmc.io.files import real_path
 
 __all__ = ["add_parser", "run"]
 
@@ -45,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
 
     recording = open_recording(args.recording, frames=args.frames, any_world=True)
     found, shares = inspect_synchrony(recording, args.search, MOMENTS)
-    name = args.recording.resolve().name
+    name = real_path(args.recording).name
     first_frames, times = new_timing(recording, [one.course for one in found.cameras])
     for line in sync_lines(recording, found, shares, first_frames):
         print(line)

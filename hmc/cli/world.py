@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 
 from hmc.cli.common import add_session_option, given_places, output_path, positive_float
+from hmc.io.files import real_path
 
 __all__ = ["add_parser", "run"]
 
@@ -105,7 +106,7 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"{args.recording}: {error}") from None
     for line in found.lines:
         print(line)
-    name = args.recording.resolve().name
+    name = real_path(args.recording).name
     picture = args.out or Path(f"{name}_world.png")
     save_world_picture(picture, rig, found.world, figures, first.images, name)
     print(f"picture: {picture}")

@@ -22,7 +22,7 @@ from hmc.errors import InputError
 from hmc.io.c3d import PointData, read_c3d
 from hmc.io.calibration import build_camera, natural_key, write_calibration
 from hmc.io.calibration.cal import read_cal
-from hmc.io.files import write_toml
+from hmc.io.files import real_path, write_toml
 from hmc.io.footage import open_images, open_video
 from hmc.io.recording import open_recording
 from hmc.io.results import PoseTable, write_joints
@@ -342,7 +342,7 @@ def _link(source: Path, place: Path) -> None:
         elif place.is_dir():
             shutil.rmtree(place)
         try:
-            os.symlink(source.resolve(), place)
+            os.symlink(real_path(source), place)
         except OSError:
             (shutil.copytree if source.is_dir() else shutil.copyfile)(source, place)
     except OSError as error:

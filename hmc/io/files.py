@@ -12,7 +12,12 @@ from typing import IO, Any
 
 from hmc.errors import InputError
 
-__all__ = ["atomic_write", "sibling", "to_toml", "write_toml"]
+__all__ = ["atomic_write", "real_path", "sibling", "to_toml", "write_toml"]
+
+
+def real_path(path: str | Path) -> Path:
+    """The absolute path without links: `Path.resolve`, which raises no `InputError` where a link leads to itself; such a link stays."""
+    return Path(os.path.realpath(path))
 
 
 @contextmanager

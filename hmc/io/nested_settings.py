@@ -34,6 +34,8 @@ from hmc.io.files import to_toml
 __all__ = ["SettingsTable", "changed", "read_settings_table"]
 
 T = TypeVar("T")
+#: What counts more, particles or samples, is a slip: no memory holds it.
+MAX_COUNT = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -138,6 +140,7 @@ class _Change:
             if found is not _WRONG:
                 return found
         wanted = " or ".join(_said(kind) for kind in kinds or [type(current)])
+        wanted += f" of at most {MAX_COUNT}" if type(value) is int and value > MAX_COUNT else ""
         self.faults.append(f"`{path}` must be {wanted}; got {reprlib.repr(value)}")
         return current
 
@@ -157,6 +160,8 @@ def _plain(value: Any, kind: Any) -> Any:
         return _WRONG if len(inner) != len(value) or any(one is _WRONG for one in found) else found
     if kind is float and isinstance(value, int | float) and not isinstance(value, bool) and not math.isnan(value):
         return float(value)
+    if kind is int and type(value) is int and value > MAX_COUNT:
+        return _WRONG
     return value if kind in (bool, int, str) and type(value) is kind else _WRONG
 
 

@@ -22,6 +22,7 @@ from hmc.camera.reduction import reduce_image, reduce_mask, reduced_camera, redu
 from hmc.camera.world import World
 from hmc.errors import InputError
 from hmc.io.calibration import build_camera, read_entries
+from hmc.io.files import real_path
 from hmc.io.footage import Footage, read_footage
 from hmc.io.places import AnyPlaces, RecordingPlaces, places_of, to_places
 from hmc.io.settings import read_settings
@@ -249,7 +250,7 @@ def open_recording(
     room = settings.get("room")
     return Recording(
         path=path,
-        name=settings.get("name", path.resolve().name),
+        name=settings.get("name", real_path(path).name),
         fps=float(fps),
         rig=rig,
         room=estimate_room(rig) if room is None else room,

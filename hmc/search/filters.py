@@ -31,6 +31,9 @@ __all__ = [
     "truncated_drift",
 ]
 
+#: More layers, or particles in one, are a slip: memory and time for them are nowhere.
+MOST_LAYERS, MOST_PARTICLES = 1_000, 100_000
+
 #: ``(n, d)`` states to ``(n,)`` log likelihoods.
 LogLikelihood = Callable[[np.ndarray], np.ndarray]
 #: Generator and ``(n, d)`` states to ``(n, d)`` moved states.
@@ -124,14 +127,14 @@ class AnnealedSettings:
     spread: Literal["survival", "variance"] | float = "survival"
 
     def __post_init__(self) -> None:
-        if self.layers < 1:
-            raise InputError(f"`layers` must be at least 1; got {self.layers}")
+        if not 1 <= self.layers <= MOST_LAYERS:
+            raise InputError(f"`layers` must be at least 1 and at most {MOST_LAYERS}; got {self.layers}")
         for name in ("particles", "survival_rate"):
             value = getattr(self, name)
             if np.ndim(value) > 0 and np.shape(value) != (self.layers,):
                 raise InputError(f"`{name}` must be one number or one for each of the {self.layers} layers; got {value}")
-        if np.min(self.particles) < 1:
-            raise InputError(f"`particles` must be at least 1 in every layer; got {self.particles}")
+        if not (np.min(self.particles) >= 1 and np.max(self.particles) <= MOST_PARTICLES):
+            raise InputError(f"`particles` must be at least 1 and at most {MOST_PARTICLES} in every layer; got {self.particles}")
         if not (np.min(self.survival_rate) > 0 and np.max(self.survival_rate) <= 1):
             raise InputError(f"`survival_rate` must be above 0 and at most 1; got {self.survival_rate}")
         if self.spread not in ("survival", "variance") and not (isinstance(self.spread, (int, float)) and 0 < self.spread < np.inf):

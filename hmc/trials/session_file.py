@@ -15,6 +15,7 @@ from typing import Any
 from hmc.errors import InputError
 from hmc.io.calibration import find_calibration
 from hmc.io.door import read_toml_file
+from hmc.io.files import real_path
 from hmc.io.places import CAMERA, RecordingPlaces
 from hmc.io.settings import check_settings
 
@@ -127,7 +128,7 @@ def places_in_session(session: Session, recording: str | Path) -> RecordingPlace
     """Where the parts of a recording lie, as the session has them: those of a trial, or a folder with what is the same for all trials."""
     recording = Path(recording)
     for trial in session.trials:
-        if trial.places.path.resolve() == recording.resolve():
+        if real_path(trial.places.path) == real_path(recording):
             return trial.places
     base = session.base
     return RecordingPlaces(recording, base.calibration, base.background, None, base.settings)
@@ -162,7 +163,7 @@ class _Reading:
         found = {name: self.trial(name, said.get(name, {}), folders.get(name), base, pose, people, videos) for name in names}
         if not found and not self.faults:
             self.faults.append('no trials; say where they are: trials = "trials/*", or [[trial]] name = ...')
-        return Session(self.path, self.text(table, "name", folder.resolve().name), base, tuple(found.values()))
+        return Session(self.path, self.text(table, "name", real_path(folder).name), base, tuple(found.values()))
 
     def listed(self, tables: Any) -> dict[str, Mapping[str, Any]]:
         """The tables of trials by their names."""

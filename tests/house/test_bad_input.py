@@ -117,3 +117,13 @@ def test_a_file_that_is_no_text(clip, tmp_path, capsys, name):
     assert main(["track", str(clip), "--out", str(tmp_path / "out"), "--quiet"]) == 2
     error = capsys.readouterr().err
     assert f"{name}: not a TOML file" in error and "mend or remove it" in error and error.count("\n") == 1
+
+
+@pytest.mark.parametrize("words", [("check", "{loop}"), ("pose", "{clip}", "--out", "{out}", "--tracks", "{loop}"),
+                                   ("pose", "{clip}", "--out", "{out}", "--silhouettes-from", "{loop}"), ("track", "{clip}", "--out", "{loop}")])  # fmt: skip
+def test_a_link_to_itself_is_told(clip, tmp_path, capsys, words):
+    loop = tmp_path / "loop"
+    loop.symlink_to(loop)
+    assert main([word.format(loop=loop, clip=clip, out=tmp_path / "out") for word in words]) == 2
+    said = capsys.readouterr()
+    assert f"{loop}: " in said.err and "RuntimeError" not in said.err

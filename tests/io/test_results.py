@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hmc.errors import InputError
-from hmc.io.files import atomic_write, to_toml
+from hmc.io.files import atomic_write, real_path, to_toml
 from hmc.io.journal import append_journal, read_journal
 from hmc.io.results import (
     PoseStates,
@@ -275,3 +275,12 @@ def test_a_journal_survives_a_run_that_dies_while_it_writes(tmp_path):
     path.write_text("not json\n" + path.read_text())
     told: list[str] = []
     assert read_journal(path, told.append) == [] and "damaged in line 1" in told[0]
+
+
+def test_real_paths_are_resolved_but_for_links_to_themselves(tmp_path):
+    (tmp_path / "there").mkdir()
+    (tmp_path / "link").symlink_to("there")
+    (tmp_path / "loop").symlink_to("loop")
+    for name in (".", "link", "link/../x", "there/none", "there/./a"):
+        assert real_path(tmp_path / name) == (tmp_path / name).resolve()
+    assert real_path(tmp_path / "loop") == tmp_path.resolve() / "loop"

@@ -23,6 +23,7 @@ from hmc.experiments.engine.store import digest
 from hmc.experiments.five_actions import action_recipes
 from hmc.experiments.nine_actions import nine_recipes
 from hmc.experiments.person_data import render_brought_in, training_recipes
+from hmc.io.files import real_path
 from hmc.io.recording import Recording, open_recording
 from hmc.synthetic.recipe import Recipe, load_recipe
 from hmc.synthetic.render import render_recording
@@ -85,7 +86,7 @@ def source_of(folder: Path) -> Source:
     files = sorted({file for pattern in _CONTENT for file in folder.glob(pattern) if file.is_file()})
     sizes = [[str(file.relative_to(folder)), file.stat().st_size] for file in files]
     text = [file.read_text(encoding="utf-8", errors="replace") for file in files if file.parent == folder]
-    return Source(f"{folder.resolve().name}@{digest([sizes, text], 8)}", folder.resolve())
+    return Source(f"{real_path(folder).name}@{digest([sizes, text], 8)}", real_path(folder))
 
 
 def once(path: Path, make: Callable[[Path], object]) -> Path:

@@ -25,6 +25,7 @@ from hmc.experiments.engine.inputs import Inputs, rendered, source_of
 from hmc.experiments.engine.library import find_experiment
 from hmc.experiments.engine.selection import grid_of
 from hmc.experiments.engine.store import cell_key, cell_path, cell_rng, cell_text, read_cell, write_text
+from hmc.io.files import real_path
 from hmc.io.provenance import code_state, machine
 from hmc.plugins import add_plugins, plugin_files
 from hmc.processes import end_with
@@ -160,8 +161,10 @@ def compute_cells(
         What a cell raised that concerns the user: the rest would meet the same.
     """
     if scheduler is not None:
-        name = str(Path(name).resolve()) if name.endswith(".py") else name  # workers have folders of their own
-        yield from spread(functools.partial(_compute_cell, name, _Shared(out.resolve(), dict(folders), plugin_files())), missing, scheduler)
+        name = os.path.realpath(name) if name.endswith(".py") else name  # workers have folders of their own
+        yield from spread(
+            functools.partial(_compute_cell, name, _Shared(real_path(out), dict(folders), plugin_files())), missing, scheduler
+        )
         return
     task = functools.partial(_compute_and_store, name, _Shared(out, dict(folders), plugin_files()))
     if workers <= 1 or len(missing) <= 1:
