@@ -119,11 +119,18 @@ def test_a_file_that_is_no_text(clip, tmp_path, capsys, name):
     assert f"{name}: not a TOML file" in error and "mend or remove it" in error and error.count("\n") == 1
 
 
-@pytest.mark.parametrize("words", [("check", "{loop}"), ("pose", "{clip}", "--out", "{out}", "--tracks", "{loop}"),
-                                   ("pose", "{clip}", "--out", "{out}", "--silhouettes-from", "{loop}"), ("track", "{clip}", "--out", "{loop}")])  # fmt: skip
+@pytest.mark.parametrize(
+    "words",
+    [
+        "check {loop}",
+        "pose {clip} --out {out} --tracks {loop}",
+        "pose {clip} --out {out} --silhouettes-from {loop}",
+        "track {clip} --out {loop}",
+    ],
+)
 def test_a_link_to_itself_is_told(clip, tmp_path, capsys, words):
     loop = tmp_path / "loop"
     loop.symlink_to(loop)
-    assert main([word.format(loop=loop, clip=clip, out=tmp_path / "out") for word in words]) == 2
-    said = capsys.readouterr()
-    assert f"{loop}: " in said.err and "RuntimeError" not in said.err
+    assert main(words.format(loop=loop, clip=clip, out=tmp_path / "out").split()) == 2
+    said = "".join(capsys.readouterr())
+    assert f"{loop}: " in said and "RuntimeError" not in said
