@@ -10,16 +10,15 @@ import argparse
 import csv
 import importlib.util
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from hmc.landmarks import LANDMARKS
 from hmc.motion.export import export_trajectories
 from hmc.motion.trajectory import Trajectory, read_trajectories
 
-# Readers return (n_frames, 15, 3) in metres, z up: what each file says of its axes is undone here once more, by hand.
+# Readers return (n_frames, k, 3) of k names in metres, z up: what each file says of its axes is undone here once more, by hand.
 
 
 def from_y_up(points: np.ndarray) -> np.ndarray:
@@ -34,45 +33,47 @@ def from_z_forward(points: np.ndarray) -> np.ndarray:
     return np.stack([z, x, y], axis=-1)
 
 
-def trc_opensim(path: Path) -> np.ndarray:
+def trc_opensim(path: Path, names: Sequence[str]) -> np.ndarray:
     """By OpenSim's own reader of TRC."""
     import opensim
 
     opensim.Logger.setLevelString("off")
     table = opensim.TimeSeriesTableVec3(str(path))
-    columns = [table.getDependentColumn(name) for name in LANDMARKS]
+    columns = [table.getDependentColumn(name) for name in names]
     points = [[[column[row][axis] for axis in range(3)] for column in columns] for row in range(table.getNumRows())]
     return from_y_up(np.array(points) / 1000)
 
 
-def trc_pandas(path: Path) -> np.ndarray:
+def trc_pandas(path: Path, names: Sequence[str]) -> np.ndarray:
     """By pandas, as the format's documentation has the columns."""
     import pandas as pd
 
     table = pd.read_csv(path, sep="\t", skiprows=6, header=None)
-    return from_y_up(table.to_numpy(float)[:, 2 : 2 + 3 * len(LANDMARKS)].reshape(len(table), -1, 3) / 1000)
+    header = path.read_text().splitlines()[3].split("\t")
+    columns = [header.index(name) + axis for name in names for axis in range(3)]
+    return from_y_up(table.to_numpy(float)[:, columns].reshape(len(table), -1, 3) / 1000)
 
 
-def c3d_ezc3d(path: Path) -> np.ndarray:
+def c3d_ezc3d(path: Path, names: Sequence[str]) -> np.ndarray:
     """By ezc3d."""
     import ezc3d
 
     file = ezc3d.c3d(str(path))
     points = file["data"]["points"][:3].transpose(2, 1, 0) / 1000
     points[file["data"]["meta_points"]["residuals"][0].T < 0] = np.nan
-    return points[:, [file["parameters"]["POINT"]["LABELS"]["value"].index(name) for name in LANDMARKS]]
+    return points[:, [file["parameters"]["POINT"]["LABELS"]["value"].index(name) for name in names]]
 
 
-def bvh_pybvh(path: Path) -> np.ndarray:
+def bvh_pybvh(path: Path, names: Sequence[str]) -> np.ndarray:
     """By pybvh, with its forward kinematics."""
     import pybvh
 
     motion = pybvh.read_bvh_file(str(path))
     points = motion.node_positions(centered="world") / 100
-    return from_z_forward(points[:, [motion.node_index[name] for name in LANDMARKS]])
+    return from_z_forward(points[:, [motion.node_index[name] for name in names]])
 
 
-def glb_pygltflib(path: Path) -> np.ndarray:
+def glb_pygltflib(path: Path, names: Sequence[str]) -> np.ndarray:
     """Content by pygltflib; nodes placed as the glTF specification says, with SciPy's rotations."""
     import pygltflib
     from scipy.spatial.transform import Rotation
@@ -103,10 +104,10 @@ def glb_pygltflib(path: Path) -> np.ndarray:
             place(child, turn, position)
 
     place(file.scenes[0].nodes[0], Rotation.identity(n), np.zeros((n, 3)))
-    return from_z_forward(np.stack([places[name] for name in LANDMARKS], axis=1))
+    return from_z_forward(np.stack([places[name] for name in names], axis=1))
 
 
-def mot_opensim(path: Path) -> np.ndarray:
+def mot_opensim(path: Path, names: Sequence[str]) -> np.ndarray:
     """The model moved by the motion in OpenSim, and where its markers are."""
     import opensim
 
@@ -116,7 +117,7 @@ def mot_opensim(path: Path) -> np.ndarray:
     table = opensim.TimeSeriesTable(str(path))
     coordinates = [model.getCoordinateSet().get(label) for label in table.getColumnLabels()]
     degrees = table.getTableMetaDataAsString("inDegrees") == "yes"
-    out = np.empty((table.getNumRows(), len(LANDMARKS), 3))
+    out = np.empty((table.getNumRows(), len(names), 3))
     for k in range(len(out)):
         row = table.getRowAtIndex(k)
         for column, coordinate in enumerate(coordinates):
@@ -124,27 +125,27 @@ def mot_opensim(path: Path) -> np.ndarray:
             coordinate.setValue(state, np.radians(row[column]) if degrees and turns else row[column], False)
         model.realizePosition(state)
         markers = model.getMarkerSet()
-        out[k] = [[markers.get(name).getLocationInGround(state)[axis] for axis in range(3)] for name in LANDMARKS]
+        out[k] = [[markers.get(name).getLocationInGround(state)[axis] for axis in range(3)] for name in names]
     return from_y_up(out)
 
 
-def csv_python(path: Path) -> np.ndarray:
+def csv_python(path: Path, names: Sequence[str]) -> np.ndarray:
     """By Python's own reader of CSV."""
     with path.open(newline="") as file:
-        rows = [[float(row[f"{name}_{axis}_m"] or "nan") for name in LANDMARKS for axis in "xyz"] for row in csv.DictReader(file)]
+        rows = [[float(row[f"{name}_{axis}_m"] or "nan") for name in names for axis in "xyz"] for row in csv.DictReader(file)]
     return np.array(rows).reshape(len(rows), -1, 3)
 
 
-def parquet_pandas(path: Path) -> np.ndarray:
+def parquet_pandas(path: Path, names: Sequence[str]) -> np.ndarray:
     """By pandas."""
     import pandas as pd
 
     table = pd.read_parquet(path)
-    return table[[f"{name}_{axis}_m" for name in LANDMARKS for axis in "xyz"]].to_numpy(float).reshape(len(table), -1, 3)
+    return table[[f"{name}_{axis}_m" for name in names for axis in "xyz"]].to_numpy(float).reshape(len(table), -1, 3)
 
 
 #: Of each format, readers by the package that they need.
-READERS: tuple[tuple[str, str, Callable[[Path], np.ndarray]], ...] = (
+READERS: tuple[tuple[str, str, Callable[[Path, Sequence[str]], np.ndarray]], ...] = (
     ("trc", "opensim", trc_opensim),
     ("trc", "pandas", trc_pandas),
     ("c3d", "ezc3d", c3d_ezc3d),
@@ -157,9 +158,10 @@ READERS: tuple[tuple[str, str, Callable[[Path], np.ndarray]], ...] = (
 
 
 def largest_difference_m(found: np.ndarray, one: Trajectory) -> float:
-    """Largest distance of a known landmark from where the file has it."""
-    known = np.isfinite(one.positions).all(axis=-1)
-    return float(np.linalg.norm(found - one.positions, axis=-1)[known].max())
+    """Largest distance of a known point, landmarks and feet, from where the file has it."""
+    _, positions = one.points
+    known = np.isfinite(positions).all(axis=-1)
+    return float(np.linalg.norm(found - positions, axis=-1)[known].max())
 
 
 def main() -> None:
@@ -167,14 +169,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("result", type=Path)
     for one in read_trajectories(parser.parse_args().result):
-        print(f"person {one.person}, {len(one.frames)} frames")
+        print(f"person {one.person}, {len(one.frames)} frames, {len(one.points[0])} points")
         with tempfile.TemporaryDirectory() as folder:
             for kind, package, read in READERS:
                 if importlib.util.find_spec(package) is None:
                     print(f"| {kind} | {package} | not installed |")
                     continue
-                export_trajectories([one], Path(folder) / f"motion.{kind}")
-                print(f"| {kind} | {package} | {1000 * largest_difference_m(read(Path(folder) / f'motion.{kind}'), one):.4f} mm |")
+                file = Path(folder) / f"motion.{kind}"
+                export_trajectories([one], file)
+                print(f"| {kind} | {package} | {1000 * largest_difference_m(read(file, one.points[0]), one):.4f} mm |")
 
 
 if __name__ == "__main__":

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from hmc.body.feet import foot_places
 from hmc.body.joints import DOF_NAMES, SEGMENTS
 from hmc.body.kinematics import SEGMENT_DOFS
 from hmc.body.model import BodyModel, Cones
 from hmc.body.proportions import landmark_segments, stature
 from hmc.io.export.glb import Mesh
 from hmc.io.export.joint_tree import Joint, JointTree
-from hmc.landmarks import LANDMARKS
+from hmc.landmarks import FOOT_POINTS, LANDMARKS
 
 __all__ = ["flesh_meshes", "joint_tree"]
 
@@ -19,7 +20,7 @@ _RING = 16
 
 
 def joint_tree(body: BodyModel) -> JointTree:
-    """The joints of a body, with the landmarks as named points.
+    """The joints of a body, with the landmarks, and heels and toes where it has feet, as named points.
 
     Parameters
     ----------
@@ -29,6 +30,9 @@ def joint_tree(body: BodyModel) -> JointTree:
         Joint(one.name, one.parent, offset, one.axes, dofs) for one, offset, dofs in zip(SEGMENTS, body.offsets, SEGMENT_DOFS, strict=True)
     )
     points = {name: (int(place), tip) for name, place, tip in zip(LANDMARKS, landmark_segments(), body.tips, strict=True)}
+    feet = foot_places(body)
+    if feet is not None:
+        points |= {name: (int(place), offset) for name, place, offset in zip(FOOT_POINTS, *feet, strict=True)}
     return JointTree(joints, DOF_NAMES, body.limits.low, body.limits.high, points, stature(body.dimensions))
 
 

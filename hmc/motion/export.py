@@ -18,7 +18,7 @@ from hmc.io.export.mot import write_mot
 from hmc.io.export.osim import write_osim
 from hmc.io.export.tables import write_csv, write_parquet
 from hmc.io.export.trc import write_trc
-from hmc.landmarks import LANDMARKS
+from hmc.landmarks import FOOT_POINTS, LANDMARKS
 from hmc.motion.body_tree import flesh_meshes, joint_tree
 from hmc.motion.gaps import complete_states
 from hmc.motion.trajectory import Trajectory
@@ -91,17 +91,21 @@ def export_trajectories(found: Sequence[Trajectory], out: str | Path, kind: str 
 
 def _trc(path: Path, found: Sequence[Trajectory]) -> Exported:
     (one,) = found
-    write_trc(path, LANDMARKS, one.frames, one.positions, one.fps)
+    names, positions = one.points
+    write_trc(path, names, one.frames, positions, one.fps)
     return Exported((path,), ())
 
 
 def _c3d(path: Path, found: Sequence[Trajectory]) -> Exported:
     first, last = min(int(one.frames[0]) for one in found), max(int(one.frames[-1]) for one in found)
-    positions = np.full((last - first + 1, len(found), len(LANDMARKS), 3), np.nan)
-    for k, one in enumerate(found):
-        positions[one.frames - first, k] = one.positions
-    labels = [name if len(found) == 1 else f"person_{one.person}:{name}" for one in found for name in LANDMARKS]
-    write_c3d(path, labels, first, positions.reshape(len(positions), -1, 3), found[0].fps)
+    labels, parts = [], []
+    for one in found:
+        names, positions = one.points
+        spread = np.full((last - first + 1, len(names), 3), np.nan)
+        spread[one.frames - first] = positions
+        parts.append(spread)
+        labels += [name if len(found) == 1 else f"person_{one.person}:{name}" for name in names]
+    write_c3d(path, labels, first, np.concatenate(parts, axis=1), found[0].fps)
     return Exported((path,), ())
 
 
@@ -155,8 +159,16 @@ def _columns(found: Sequence[Trajectory]) -> dict[str, np.ndarray]:
         "time_s": np.concatenate([one.times_s for one in found]),
         "person": np.concatenate([np.full(len(one.frames), one.person) for one in found]),
     }
-    positions = np.concatenate([one.positions for one in found])
-    columns |= {f"{name}_{axis}_m": positions[:, k, a] for k, name in enumerate(LANDMARKS) for a, axis in enumerate("xyz")}
+    feet = [one.feet for one in found]
+    every = [*LANDMARKS, *(FOOT_POINTS if any(one is not None for one in feet) else ())]
+    positions = np.full((len(columns["frame"]), len(every), 3), np.nan)
+    positions[:, : len(LANDMARKS)] = np.concatenate([one.positions for one in found])
+    if len(every) > len(LANDMARKS):
+        shape = len(FOOT_POINTS), 3
+        positions[:, len(LANDMARKS) :] = np.concatenate(
+            [np.full((len(one.frames), *shape), np.nan) if own is None else own for one, own in zip(found, feet, strict=True)]
+        )
+    columns |= {f"{name}_{axis}_m": positions[:, k, a] for k, name in enumerate(every) for a, axis in enumerate("xyz")}
     if any(one.views is not None for one in found):
         views = np.concatenate([np.full(one.positions.shape[:2], np.nan) if one.views is None else one.views for one in found])
         columns |= {f"{name}_views": views[:, k] for k, name in enumerate(LANDMARKS)}

@@ -9,11 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from hmc.body.joints import DOF_NAMES, N_DOF, JointLimits, default_limits
+from hmc.body.feet import foot_places, foot_points
+from hmc.body.joints import DOF_NAMES, N_DOF, JointLimits, default_limits, dof_index
 from hmc.body.model import BodyModel
 from hmc.body.proportions import make_body
 from hmc.errors import InputError
 from hmc.io.results import PoseStates, PoseTable, read_joints, read_pose, read_run
+from hmc.landmarks import ENOUGH_VIEWS, FOOT_POINTS, LANDMARKS, landmark_index
 
 __all__ = ["Trajectory", "read_trajectories", "trajectories"]
 
@@ -51,6 +53,33 @@ class Trajectory:
     def times_s(self) -> np.ndarray:
         """When each frame was taken, shape (n,)."""
         return self.frames / self.fps
+
+    @property
+    def feet(self) -> np.ndarray | None:
+        """Heels and toes (`hmc.landmarks.FOOT_POINTS`), shape (n, 4, 3), metres; None for a body without feet, or whose feet are held.
+
+        NaN in gaps, and where fewer than two cameras show the ankle clear: there a foot is where posture puts it.
+        """
+        if self.states is None or self.body is None or foot_places(self.body) is None:
+            return None
+        turns = self.states[:, [dof_index(f"{side}_ankle_{axis}")[0] for side in "lr" for axis in "yz"]]
+        if not np.nan_to_num(turns).any():
+            return None
+        points = np.full((len(self.frames), len(FOOT_POINTS), 3), np.nan)
+        known = np.isfinite(self.states).all(axis=1)
+        points[known] = foot_points(self.body, self.states[known])
+        if self.views is not None:
+            hidden = self.views[:, [landmark_index(f"{name[0]}_ankle") for name in FOOT_POINTS]] < ENOUGH_VIEWS
+            points[hidden] = np.nan
+        return points
+
+    @property
+    def points(self) -> tuple[tuple[str, ...], np.ndarray]:
+        """Names of all points that are known of this person, k of them, and where they are, shape (n, k, 3): landmarks, then feet."""
+        feet = self.feet
+        if feet is None:
+            return LANDMARKS, self.positions
+        return (*LANDMARKS, *FOOT_POINTS), np.concatenate([self.positions, feet], axis=1)
 
 
 def trajectories(poses: PoseTable, states: PoseStates | None, fps: float) -> list[Trajectory]:

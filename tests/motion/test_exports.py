@@ -19,7 +19,7 @@ from hmc.cli.export import FORMATS as SAID
 from hmc.errors import InputError
 from hmc.io.c3d import read_c3d
 from hmc.io.results import PoseStates, PoseTable, write_joints, write_pose
-from hmc.landmarks import LANDMARKS
+from hmc.landmarks import FOOT_POINTS, LANDMARKS
 from hmc.motion.export import FORMATS, export_trajectories
 from hmc.motion.gaps import fill_trajectory
 from hmc.motion.trajectory import read_trajectories, trajectories
@@ -60,8 +60,10 @@ def test_landmarks_elsewhere_are_ours(tmp_path, kind, package, read):
     pytest.importorskip(package)
     (one,) = moving().trajectories()
     export_trajectories([one], tmp_path / f"walk.{kind}")
-    found = read(tmp_path / f"walk.{kind}")
-    assert found.shape == one.positions.shape
+    names, positions = one.points
+    assert names[len(LANDMARKS) :] == FOOT_POINTS
+    found = read(tmp_path / f"walk.{kind}", names)
+    assert found.shape == positions.shape
     assert elsewhere.largest_difference_m(found, one) < 1e-5
 
 
@@ -77,8 +79,34 @@ def test_a_gap_is_one_elsewhere(tmp_path, kind):
     readers = [(package, read) for one, package, read in elsewhere.READERS if one == kind]
     for package, read in readers:
         if importlib.util.find_spec(package) is not None:
-            empty = np.isnan(read(tmp_path / f"walk.{kind}")).all(axis=(1, 2))
+            empty = np.isnan(read(tmp_path / f"walk.{kind}", (*LANDMARKS, *FOOT_POINTS))).all(axis=(1, 2))
             assert np.flatnonzero(empty).tolist() == [4, 5], package
+
+
+def test_feet_are_those_of_feet_csv_and_left_out_where_few_cameras_show_them(tmp_path):
+    people = moving()
+    (one,) = people.trajectories()
+    np.testing.assert_array_equal(one.feet, people.feet.positions)
+    views = np.full(people.positions.shape[:2], 4)
+    views[3:5, LANDMARKS.index("l_ankle")] = 1
+    (one,) = replace(people, poses=replace(people.poses, views=views)).trajectories()
+    empty = np.isnan(one.feet).all(axis=-1)
+    assert empty[3:5, :2].all() and empty.sum() == 4
+    export_trajectories([one], tmp_path / "walk.trc")
+    found = elsewhere.trc_pandas(tmp_path / "walk.trc", FOOT_POINTS)
+    np.testing.assert_allclose(found, one.feet, atol=1e-6)
+
+
+def test_feet_that_are_held_are_not_told(tmp_path):
+    """Methods whose body has no feet that turn hold them at 0."""
+    people = moving()
+    states = people.states.states.copy()
+    states[:, [dof_index(f"{side}_ankle_{axis}")[0] for side in "lr" for axis in "yz"]] = 0
+    (one,) = replace(people, states=replace(people.states, states=states)).trajectories()
+    assert one.feet is None and one.points[0] == LANDMARKS
+    for kind in ("trc", "csv"):
+        export_trajectories([one], tmp_path / f"walk.{kind}")
+        assert "heel" not in (tmp_path / f"walk.{kind}").read_text()
 
 
 def test_times_are_those_of_the_recording(tmp_path):
@@ -96,9 +124,9 @@ def test_our_own_reader_of_c3d_agrees(tmp_path):
     people = with_gap(moving(persons=(0, 3)), [2])
     hmc.export(people, tmp_path / "two.c3d")
     data = read_c3d(tmp_path / "two.c3d")
-    assert data.rate == 50 and len(data.labels) == 30
+    assert data.rate == 50 and len(data.labels) == 38
     first, second = people.trajectories()
-    assert np.allclose(data.positions, np.hstack([first.positions, second.positions]), atol=1e-6, equal_nan=True)
+    assert np.allclose(data.positions, np.hstack([first.points[1], second.points[1]]), atol=1e-6, equal_nan=True)
 
 
 def test_our_own_reader_of_bvh_agrees(tmp_path):
