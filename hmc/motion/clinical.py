@@ -16,6 +16,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from hmc.body.joints import dof_index
+from hmc.body.proportions import SOLE_PITCH
 from hmc.errors import InputError
 from hmc.landmarks import ENOUGH_VIEWS, LANDMARKS, landmark_index
 from hmc.metrics.angles import LEAST_BEND_RAD, LEAST_OFF_SIDE_RAD, landmark_frame, limb_angles
@@ -113,7 +114,7 @@ def state_angles(one: Trajectory) -> dict[str, np.ndarray]:
         down, about = turned[f"{side}_ankle_y"], turned[f"{side}_ankle_z"]
         # Methods whose body has feet that do not turn hold them at 0.
         if np.nan_to_num(down).any() or np.nan_to_num(about).any():
-            found[f"{side}_ankle_dorsiflexion_deg"] = np.where(hidden, np.nan, -down)
+            found[f"{side}_ankle_dorsiflexion_deg"] = np.where(hidden, np.nan, np.degrees(SOLE_PITCH) - down)
             found[f"{side}_foot_turning_out_deg"] = np.where(hidden, np.nan, sign * about)
     return found
 

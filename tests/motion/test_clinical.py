@@ -182,7 +182,13 @@ def test_tilt_and_feet_are_those_of_the_states():
     frame = people.clinical_angles()
     states = np.degrees(people.states.states)
     assert frame["pelvis_tilt_deg"].to_numpy() == pytest.approx(states[:, dof_index("root_ry")[0]])
-    assert frame["r_ankle_dorsiflexion_deg"].to_numpy() == pytest.approx(-states[:, dof_index("r_ankle_y")[0]])
+    # The angle of the sole to the shank, by points on it and joint centres, of feet that are not turned out.
+    still = replace(people, states=replace(people.states, states=people.states.states.copy()))
+    still.states.states[:, dof_index("r_ankle_z", "l_ankle_z")] = 0
+    sole, joints = still.feet.positions[:, 3] - still.feet.positions[:, 2], still.poses.positions
+    shank = joints[:, landmark_index("r_knee")] - joints[:, landmark_index("r_ankle")]
+    between = np.arccos((sole * shank).sum(axis=1) / np.linalg.norm(sole, axis=1) / np.linalg.norm(shank, axis=1))
+    assert frame["r_ankle_dorsiflexion_deg"].to_numpy() == pytest.approx(90 - np.degrees(between), abs=1e-6)
     assert frame["r_foot_turning_out_deg"].to_numpy() == pytest.approx(-states[:, dof_index("r_ankle_z")[0]])
     turned = frame["l_foot_turning_out_deg"].to_numpy()
     assert np.flatnonzero(np.isnan(turned)).tolist() == [3]
