@@ -56,8 +56,8 @@ height_m = 1.62
 name = "Ben"
 height_m = 1.84
 """
-#: Times, which differ from run to run.
-TIMES = re.compile(rb"<time>.*?</time>|^(check|pose|view) = [0-9.]+$", re.MULTILINE)
+#: Times, which differ from run to run, and the report's links to logs, which trials that run side by side have.
+TIMES = re.compile(rb"<time>.*?</time>|^(check|pose|view) = [0-9.]+$| &middot; <a href=.[^\"]*/log\.txt.>log\.txt</a>", re.MULTILINE)
 
 
 def make_session(folder: Path) -> Path:

@@ -141,18 +141,33 @@ def smooth_trajectory(one: Trajectory, how: Smoothing) -> Trajectory:
     positions = one.positions.copy()
     for k in range(positions.shape[1]):
         for rows in stretches(np.isfinite(positions[:, k]).all(axis=1)):
-            whole = positions[rows, k]
-            smooth = (
-                butterworth(whole, one.fps, how.cutoff_hz) if how.kind == "butterworth" else local_polynomial(whole, one.fps, how.window_s)
-            )
-            positions[rows, k] = smooth
+            positions[rows, k] = _smooth(positions[rows, k], one.fps, how)
     if one.states is None or one.body is None:
         return replace(one, positions=positions)
-    states = one.states.copy()
     changed = np.flatnonzero((np.nan_to_num(positions) != np.nan_to_num(one.positions)).any(axis=(1, 2)))
+    states = one.states.copy()
+    # What landmarks do not show, such as feet and the pelvis's tilt, is smoothed by itself; the fit begins there.
+    states[changed] = _smoothed_states(one.states, one.fps, how)[changed]
     for row in changed:
         known = np.isfinite(states[row])
         states[row, known] = fit_landmarks(one.body, positions[row], np.where(known, states[row], 0.0), _STEPS)[0][known]
     placed = landmarks(one.body, np.nan_to_num(states[changed]))
     positions[changed] = np.where(np.isfinite(positions[changed]), placed, np.nan)
     return replace(one, positions=positions, states=states)
+
+
+def _smoothed_states(states: np.ndarray, fps: float, how: Smoothing) -> np.ndarray:
+    """Each degree of freedom by itself, angles followed over the half turn and brought back."""
+    out = states.copy()
+    for k, column in enumerate(out.T):
+        for rows in stretches(np.isfinite(column)):
+            if k < 3:
+                column[rows] = _smooth(column[rows], fps, how)
+            else:
+                followed = np.unwrap(column[rows])
+                column[rows] += _smooth(followed, fps, how) - followed
+    return out
+
+
+def _smooth(values: np.ndarray, fps: float, how: Smoothing) -> np.ndarray:
+    return butterworth(values, fps, how.cutoff_hz) if how.kind == "butterworth" else local_polynomial(values, fps, how.window_s)
