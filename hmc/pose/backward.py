@@ -248,7 +248,7 @@ def _bodies(pass_: _Pass, people: PosedPeople, fitted: np.ndarray) -> dict[int, 
         for number, person in persons.items()
     }
     for frame, refined in _each_refined(hulls_alone, in_wanted, sorted(set().union(*wanted.values()))):
-        for number, (view, own) in refined.items():
+        for number, (view, (own, *_)) in refined.items():
             objective = fine_objective(pass_.rng(number, frame), persons[number].subject, view, settings.polish)
             poses[number][persons[number].row_of[frame]] = objective, own
     for number, person in persons.items():
@@ -288,18 +288,19 @@ def _sweep(pass_: _Pass, persons: Mapping[int, _Person], first: int, end: int) -
             person, k = persons[number], persons[number].row_of[frame]
             after = person.back[k + 1] if k + 1 < len(person.rows) else person.own[k]
             back, costs = _back(pass_.rng(number, frame), person.subject, own, after, view, pass_.settings.polish)
-            _put(person, frame, own, back, costs)
-            rows.append((number, own, back, costs))
+            _put(person, frame, own[0], back, costs)
+            rows.append((number, own[0], back, costs))
         if pass_.run.journal is not None:
             append_journal(pass_.run.journal, {"frame": frame, "rows": rows})
 
 
 def _each_refined(
     pass_: _Pass, persons: Mapping[int, _Person], frames: Sequence[int]
-) -> Iterator[tuple[int, dict[int, tuple[PersonView, np.ndarray]]]]:
-    """What some frames show of those people of whom it is enough, with their first pose, refined: all that needs no other frame."""
+) -> Iterator[tuple[int, dict[int, tuple[PersonView, list[np.ndarray]]]]]:
+    """What some frames show of those people of whom it is enough, with their first pose, refined, and those that the keypoints show by
+    themselves: all that needs no other frame."""
 
-    def refined(some: Sequence[int]) -> Iterator[tuple[int, dict[int, tuple[PersonView | None, np.ndarray]]]]:
+    def refined(some: Sequence[int]) -> Iterator[tuple[int, dict[int, tuple[PersonView | None, list[np.ndarray]]]]]:
         for frame, views in pass_.views_of(some):
             recent = pass_.recent(frame) or {}
             shown = {number: view for number, view in views.items() if number in persons and frame in persons[number].row_of}
@@ -321,19 +322,20 @@ def _each_refined(
         yield frame, {number: (recent[number] if view is None else view, own) for number, (view, own) in found.items()}
 
 
-def _own(rng: np.random.Generator, person: _Person, view: PersonView, settings: PolishSettings) -> np.ndarray:
-    """A frame's first pose, refined."""
+def _own(rng: np.random.Generator, person: _Person, view: PersonView, settings: PolishSettings) -> list[np.ndarray]:
+    """A frame's first pose, refined, and where it would be by the keypoints alone."""
     objective = fine_objective(rng, person.subject, view, settings)
-    return refine(objective, person.own[person.row_of[view.frame]], settings.refine)[0]
+    own, _ = refine(objective, person.own[person.row_of[view.frame]], settings.refine)
+    return [own, *keypoint_pose(person.subject.body, view.keypoints, own)]
 
 
 def _back(
-    rng: np.random.Generator, subject: Subject, own: np.ndarray, after: np.ndarray, view: PersonView, settings: PolishSettings
+    rng: np.random.Generator, subject: Subject, own: Sequence[np.ndarray], after: np.ndarray, view: PersonView, settings: PolishSettings
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The better of a frame's first pose, refined, and the next frame's, with lost limbs looked for; and what their mixtures cost."""
+    """The better of a frame's own poses (`_own`) and the next frame's, with lost limbs looked for; and what their mixtures cost."""
     objective = fine_objective(rng, subject, view, settings)
-    back, _, _ = polish(rng, objective, [own, after, *keypoint_pose(subject.body, view.keypoints, own)], after, settings)
-    return back, objective.cost(mixed_poses(own, back))
+    back, _, _ = polish(rng, objective, [own[0], after, *own[1:]], after, settings)
+    return back, objective.cost(mixed_poses(own[0], back))
 
 
 def _joined(people: PosedPeople, persons: Mapping[int, _Person], fps: float, settings: BackwardSettings) -> PosedPeople:

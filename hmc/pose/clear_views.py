@@ -78,7 +78,7 @@ class BorneOut:
 
 @dataclass(frozen=True)
 class _Flesh:
-    """A body's surface: points and their segments, the chain of each, and of which landmarks it is, shape (n, 15)."""
+    """A body's surface: points and their segments, the chain of each, and of which landmarks it is, float32 of 0 and 1, shape (n, 15)."""
 
     points: np.ndarray
     segment: np.ndarray
@@ -208,7 +208,7 @@ def _flesh_of(body: BodyModel) -> _Flesh:
     state = neutral_state("sideways", body.limits)
     apart = np.linalg.norm(place_points(*segment_transforms(body, state), points, segment)[:, None] - landmarks(body, state), axis=2)
     near = (apart <= NEAR_M) & (chain[:, None] == _CHAIN)
-    return _Flesh(points, segment, chain, near)
+    return _Flesh(points, segment, chain, near.astype(np.float32))
 
 
 @dataclass(frozen=True)
@@ -236,9 +236,10 @@ def _seen_by(camera: Camera, mask: np.ndarray, people: Sequence[_Placed]) -> _Se
     chains_in, people_in = there.sum(axis=(0, 1))[cell], there.any(axis=1).sum(axis=0)[cell]
     alone = seen & np.where(chain > 0, chains_in == 1, people_in == 1)
     inside = mask[row, column]
+    counts = np.array([np.maximum(one.flesh.of_landmark.sum(axis=0), 1) for one in people])
     shown, denied = (
-        np.array([one.flesh.of_landmark[clear[person == k]].sum(axis=0) for k, one in enumerate(people)])
-        / np.array([np.maximum(one.flesh.of_landmark.sum(axis=0), 1) for one in people])
+        # Counts, whole numbers that single precision holds.
+        np.array([clear[person == k].astype(np.float32) @ one.flesh.of_landmark for k, one in enumerate(people)], float) / counts
         for clear in (alone & inside, alone & ~inside)
     )
     cells = np.zeros((n_rows, n_columns), np.uint8)
@@ -250,7 +251,8 @@ def _seen_by(camera: Camera, mask: np.ndarray, people: Sequence[_Placed]) -> _Se
     # Cells of which more than half is silhouette.
     whole = np.zeros((n_rows * side, n_columns * side), np.uint8)
     whole[:height, :width] = mask
-    full = 2 * whole.reshape(n_rows, side, n_columns, side).sum(axis=(1, 3)) > side**2
+    by_rows = whole.reshape(n_rows, side, -1).sum(axis=1, dtype=np.uint16)
+    full = 2 * by_rows.reshape(n_rows, n_columns, side).sum(axis=2, dtype=np.int64) > side**2
     bare = (np.argwhere(full & (wide == 0))[:, ::-1] + 0.5) * side
     bare_m2 = np.array([_bare_near(camera, one.landmarks, bare, side) for one in people])
     return _Seen(shown, denied, bare_m2, int(np.count_nonzero(mask & (bodies > 0))))

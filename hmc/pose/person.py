@@ -9,15 +9,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from itertools import chain
 
 import numpy as np
 
 from hmc.body.joints import DOF_NAMES
 from hmc.body.model import BodyModel
 from hmc.pose.legs import choose_legs, limb_points, no_alternatives
-from hmc.pose.method import Alternatives, Capture, PoseMethod, StepInfo, Subject, Tracked, begin_tracking
+from hmc.pose.method import Alternatives, Capture, PoseMethod, StepInfo, StepResult, Subject, Tracked, begin_tracking
 from hmc.pose.starts.window import walk
 from hmc.pose.views.person_view import PersonView
+from hmc.processes import share_out
 
 __all__ = ["DecidedFrames", "PersonState", "PersonTrack", "PoseTask", "end_person", "person_step", "resumed", "starts_with"]
 
@@ -185,7 +188,11 @@ def person_step(task: PoseTask, person: PersonTrack, state: PersonState, view: P
         stepped = task.method.step(rng, state.tracked, view)
         if task.method.recover is not None:
             stepped = task.method.recover(rng, state.tracked, stepped, view)
-        state = replace(state, tracked=stepped[0], followed=(*state.followed, _followed(task, rng, *stepped, view)))
+        state = replace(
+            state,
+            tracked=stepped[0],
+            followed=(*state.followed, FollowedFrame(view.frame, *stepped, _alternatives(task, rng, stepped, view))),
+        )
     return _decide(task, person, state, is_last)
 
 
@@ -228,14 +235,24 @@ def _start(task: PoseTask, person: PersonTrack, state: PersonState) -> PersonSta
     if method.recover is not None:
         usual = method.recover.first(np.array([info.cost for _, info in path]))
         path = [(replace(tracked, memory={**tracked.memory, **usual}), info) for tracked, info in path]
-    followed = tuple(_followed(task, frame_rng(k), *path[k], view) for k, view in enumerate(views))
+
+    def alternatives(some: range) -> list[Alternatives]:
+        return [_alternatives(task, frame_rng(k), path[k], views[k]) for k in some]
+
+    lots = [range(k, len(views), workers) for k in range(min(workers, len(views)))]
+    found = dict(
+        zip([k for lot in lots for k in lot], chain(*share_out([partial(alternatives, lot) for lot in lots], workers)), strict=True)
+    )
+    followed = tuple(FollowedFrame(view.frame, *path[k], found[k]) for k, view in enumerate(views))
     return replace(state, subject=subject, tracked=path[-1][0], watched=(), followed=followed)
 
 
-def _followed(task: PoseTask, rng: np.random.Generator, tracked: Tracked, info: StepInfo, view: PersonView) -> FollowedFrame:
+def _alternatives(task: PoseTask, rng: np.random.Generator, stepped: StepResult, view: PersonView) -> Alternatives:
+    """The poses of a frame between which later ones decide: that of the step, where there are no others."""
+    tracked, info = stepped
     find = task.method.alternatives
-    found = info.alternatives if find is None else find(rng, (tracked, info), view)
-    return FollowedFrame(view.frame, tracked, info, found or Alternatives(tracked.state[None], np.array([info.cost])))
+    found = info.alternatives if find is None else find(rng, stepped, view)
+    return found or Alternatives(tracked.state[None], np.array([info.cost]))
 
 
 def _decide(task: PoseTask, person: PersonTrack, state: PersonState, is_last: bool) -> tuple[PersonState, list[DecidedFrames]]:

@@ -88,6 +88,16 @@ def test_the_body_stays_a_person(walking):
         assert fitted.dimensions[name] == pytest.approx(scale * body.dimensions[name])
 
 
+def test_the_body_does_not_depend_on_the_number_of_processes(walking):
+    objectives, states = walking
+    coordinates, settings = surface_coordinates(objectives[0].body, 100), FitBodySettings(iterations=2)
+    alone, poses, info = fit_body(objectives, states, coordinates, settings)
+    for workers in (2, 3):
+        body, others, other_info = fit_body(objectives, states, coordinates, settings, workers)
+        assert body.dimensions == alone.dimensions and other_info == info
+        np.testing.assert_array_equal(others, poses)
+
+
 def test_a_strong_prior_keeps_the_body(walking):
     objectives, states = walking
     body = objectives[0].body

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from hmc.body.model import BodyModel
 from hmc.pose.objectives.objective import Objective
 from hmc.pose.objectives.residuals import residual_rows
 from hmc.pose.objectives.symmetric import body_points
+from hmc.processes import share_out
 from hmc.search.gauss_newton import damped, movable
 
 __all__ = ["WORTH_IT", "FitBodyInfo", "fit_body", "with_known_stature"]
@@ -64,7 +66,7 @@ def with_known_stature(settings: FitBodySettings, known: bool) -> FitBodySetting
 
 
 def fit_body(
-    objectives: Sequence[Objective], states: np.ndarray, coordinates: Coordinates, settings: FitBodySettings
+    objectives: Sequence[Objective], states: np.ndarray, coordinates: Coordinates, settings: FitBodySettings, workers: int = 1
 ) -> tuple[BodyModel, np.ndarray, FitBodyInfo]:
     """One person's body with dimensions fitted to several frames.
 
@@ -77,6 +79,8 @@ def fit_body(
     coordinates : tuple of ndarray
         Where the surface is sampled (`hmc.body.flesh.surface_coordinates`).
     settings : FitBodySettings
+    workers : int
+        Processes over which the frames are spread.
 
     Returns
     -------
@@ -102,14 +106,21 @@ def fit_body(
         """Residuals of each frame, how they change with the pose and with the dimensions, and what speeds up others near them."""
         step = 0.01
         here, beside = with_shape(shape), [with_shape(shape + step * unit) for unit in np.eye(len(shape))]
-        out, near = [], []
-        for k, state in enumerate(states):
-            found = here[k].linearise(state)
-            residual, jacobian = residual_rows(found)
-            by_shape = [other[k].linearise(state, found.near).residuals for other in beside]
-            out.append((residual, jacobian, (np.array(by_shape).T - residual[:, None]) / step))
-            near.append(found.near)
-        return out, near
+
+        def of_frames(lot):
+            out = []
+            for k in lot:
+                found = here[k].linearise(states[k])
+                residual, jacobian = residual_rows(found)
+                by_shape = [other[k].linearise(states[k], found.near).residuals for other in beside]
+                out.append(((residual, jacobian, (np.array(by_shape).T - residual[:, None]) / step), found.near))
+            return out
+
+        n = min(workers, len(states))
+        lots = [range(k, len(states), n) for k in range(n)]
+        told = share_out([partial(of_frames, lot) for lot in lots], workers)
+        in_turn = [told[k % n][k // n] for k in range(len(states))]
+        return [of_frame for of_frame, _ in in_turn], [near for _, near in in_turn]
 
     def costs(shape, states, near):
         data = [one.linearise(state, there).residuals for one, state, there in zip(with_shape(shape), states, near, strict=True)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from hmc.pose.method import Subject
 from hmc.pose.objectives.objective import Objective
 from hmc.pose.starts.fit_body import WORTH_IT, fit_body
 from hmc.pose.steps.refine import RefineSettings, refine
+from hmc.processes import share_out
 
 __all__ = ["LEAST_BODY_FRAMES", "choose_frames", "own_body"]
 
@@ -78,12 +80,14 @@ def own_body(
     if not picks or not held_out:
         return subject
     objectives, states = zip(*(poses[k] for k in picks), strict=True)
-    body, _, _ = fit_body(objectives, np.array(states), surface_coordinates(subject.body, surface_samples), settings)
+    coordinates, workers = surface_coordinates(subject.body, surface_samples), subject.capture.workers
+    body, _, _ = fit_body(objectives, np.array(states), coordinates, settings, workers)
     fitted = equip(body)
     tried = [poses[k] for k in held_out]
-    before, after = (
-        [refine(objective.of_body(one.body, one.points), state, refinement)[1].cost_after for objective, state in tried]
-        for one in (subject, fitted)
-    )
+
+    def costs(one: Subject) -> list[float]:
+        return [refine(objective.of_body(one.body, one.points), state, refinement)[1].cost_after for objective, state in tried]
+
+    before, after = share_out([partial(costs, subject), partial(costs, fitted)], workers)
     # Of frames that it was not fitted to.
     return fitted if np.mean(after) < WORTH_IT * np.mean(before) else subject
