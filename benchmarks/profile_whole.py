@@ -17,7 +17,7 @@ import os
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
 for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
@@ -45,8 +45,8 @@ REST = "all else, with imports"
 class Clock:
     """Processor time of each stage; one that runs within another stops the other's."""
 
-    def __init__(self) -> None:
-        self.seconds = dict.fromkeys(STAGES, 0.0)
+    def __init__(self, stages: Iterable[str]) -> None:
+        self.seconds = dict.fromkeys(stages, 0.0)
         self._running: list[str] = []
         self._since = time.process_time()
 
@@ -72,15 +72,15 @@ class Clock:
         return counted
 
 
-def watch(clock: Clock) -> None:
-    """Put the stages' functions on the clock, wherever they have been imported."""
+def watch(clock: Clock, stages: Mapping[str, Iterable[tuple[str, str]]]) -> None:
+    """Put the stages' functions, by module and name, on the clock, wherever they have been imported."""
     importlib.import_module("hmc.cli.pose")
-    for names in STAGES.values():
+    for names in stages.values():
         for module, _ in names:
             importlib.import_module(module)
     for module in ("hmc.pose.follow", "hmc.pose.backward", "hmc.pose.trust", "hmc.tracking.resumable", "hmc.pose.registry"):
         importlib.import_module(module)
-    for stage, names in STAGES.items():
+    for stage, names in stages.items():
         for module, name in names:
             plain = getattr(sys.modules[module], name, None)
             if plain is None:
@@ -94,8 +94,8 @@ def watch(clock: Clock) -> None:
 
 def profile(recording: Path, n_frames: int | None) -> dict:
     """Milliseconds a frame of each stage, and the number of frames."""
-    clock = Clock()
-    watch(clock)
+    clock = Clock(STAGES)
+    watch(clock, STAGES)
     from hmc.cli import main
     from hmc.io.recording import open_recording
 
