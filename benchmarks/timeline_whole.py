@@ -3,9 +3,9 @@
     python benchmarks/timeline_whole.py RECORDING --workers 2 --cues silhouettes
 
 Of each phase: seconds by the clock, processor time of the process that was started and of all that it forked, and how many seconds the
-phase would take at least on so many processors by these times alone: the larger of their sum over the processors and of the busiest
-process's. Where other work takes the processors, the clock says little and this says more. Processes are looked at when they send
-something, so that what one does after its last word is not told.
+phase would take at least on so many processors by these times alone: second by second, the larger of their sum over the processors and
+of the busiest process's. Where other work takes the processors, the clock says little and this says more. Processes are looked at when
+they send something, so that what one does after its last word is not told.
 """
 
 from __future__ import annotations
@@ -40,6 +40,8 @@ PHASES = {
     "trust": (("hmc.pose.trust", "with_trust"),),
 }
 REST = "all else, with imports"
+#: Within so many seconds a phase's processes could have been busy at once, whichever of them the clock let run.
+PART_S = 1.0
 
 
 class Turns(Clock):
@@ -54,11 +56,19 @@ class Turns(Clock):
         self.rows.append((time.time(), time.process_time(), self._running[-1] if self._running else REST))
 
 
-def watch_helpers(log: Path) -> None:
-    """Let every process that is forked tell its processor time with each message."""
+def watch_helpers(log: Path, turns: Turns) -> None:
+    """Let every process that is forked tell its processor time with each message, and this one look at its own before it takes one."""
     import hmc.processes
 
-    forked, file, this = hmc.processes._forked, os.open(log, os.O_CREAT | os.O_WRONLY | os.O_APPEND), os.getpid()
+    file, this = os.open(log, os.O_CREAT | os.O_WRONLY | os.O_APPEND), os.getpid()
+    forked, received = hmc.processes._forked, hmc.processes._received
+
+    def taken(*args: Any) -> Any:
+        turns._turn()
+        try:
+            return received(*args)
+        finally:
+            turns._turn()
 
     def tell(pid: int, seconds: float) -> None:
         os.write(file, f"{json.dumps([pid, time.time(), seconds])}\n".encode())
@@ -76,7 +86,7 @@ def watch_helpers(log: Path) -> None:
 
         return forked(told)
 
-    hmc.processes._forked = telling
+    hmc.processes._forked, hmc.processes._received = telling, taken
 
 
 def table(rows: list[tuple[float, float, str]], log: Path, processors: int) -> dict[str, list[float]]:
@@ -86,7 +96,12 @@ def table(rows: list[tuple[float, float, str]], log: Path, processors: int) -> d
         pid, at, seconds = json.loads(line)
         helpers[pid].append((at, seconds))
     found: dict[str, list[float]] = {name: [0.0] * 4 for name in (REST, *PHASES)}
-    for (begin, before, _), (end, after, phase) in pairwise(rows):
+    ends = {row for row, then in pairwise(rows) if row[2] != then[2]} | {rows[-1]}
+    parts = rows[:1]
+    for row in rows[1:]:
+        if row in ends or row[0] - parts[-1][0] >= PART_S:
+            parts.append(row)
+    for (begin, before, _), (end, after, phase) in pairwise(parts):
         others = [float(np.diff(np.interp([begin, end], *zip(*told, strict=True)))[0]) for told in helpers.values()]
         own = after - before
         least = max((own + sum(others)) / processors, own, *others)
@@ -105,7 +120,7 @@ def main() -> int:
 
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "log"
-        watch_helpers(log)
+        watch_helpers(log, turns)
         turns._turn()
         words = ["pose", str(given.recording), "--out", f"{folder}/out", "--height", "auto", "--workers", str(given.workers), "--quiet"]
         if hmc([*words, *more]):
