@@ -17,6 +17,8 @@ from __future__ import annotations
 
 import argparse
 import gc
+import itertools
+import math
 import multiprocessing
 import os
 import re
@@ -46,6 +48,8 @@ MEMORY_BYTES = 2 * 2**30
 TIME_S, CLOCK_S = 60, 240
 #: All commands, each as often as it says.
 ROUND = [k for k, given in enumerate(COMMANDS) for _ in range(given.often)]
+#: Trials between two looks at the clock.
+BLOCK = 50
 NUMBER = re.compile(r"[\d.]+")
 
 
@@ -232,6 +236,7 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0, help="number of the first trial")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--minutes", type=float, default=math.inf, help="begin no further block of trials after so long")
     parser.add_argument("--base", type=Path, help="where the miniature is made, and found again")
     parser.add_argument("--show", nargs="*", choices=("ok", "silent", "told", "bad"), default=("silent", "bad"), help="endings to print")
     args = parser.parse_args()
@@ -241,7 +246,10 @@ def main() -> None:
         whole = whole_endings(base, args.jobs)
         counts, begun = Counter[str](), time.monotonic()
         families, commands = (defaultdict[str, Counter[str]](Counter) for _ in range(2))
-        for one in trials(base, args.seed, range(args.first, args.first + args.count), args.jobs, whole):
+        last = args.first + args.count
+        blocks = (range(first, min(first + BLOCK, last)) for first in range(args.first, last, BLOCK))
+        in_time = itertools.takewhile(lambda _: time.monotonic() - begun < 60 * args.minutes, blocks)
+        for one in itertools.chain.from_iterable(trials(base, args.seed, block, args.jobs, whole) for block in in_time):
             counts[f"{one.kind}: {one.why}" if one.kind == "bad" else one.kind] += 1
             families[one.family][one.kind] += 1
             commands[one.words.split()[0]][one.kind] += 1

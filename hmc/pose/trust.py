@@ -24,7 +24,7 @@ from hmc.io.recording import Recording
 from hmc.io.results import PoseTable
 from hmc.landmarks import LANDMARKS
 from hmc.pose.clear_views import BorneOut, kept_borne_out, uncovered_notes
-from hmc.pose.trust_model import KINDS, ONE_PASS, TWO_PASSES
+from hmc.pose.trust_model import KINDS, NEAR_M, ONE_PASS, TWO_PASSES
 from hmc.voxels.run_options import RunOptions
 
 if TYPE_CHECKING:
@@ -42,8 +42,9 @@ ENOUGH_SHOWN, MOST_DENIED, MOST_BARE_M = 4.0, 2.0, 0.15
 DENIED_SHARE = 0.2
 #: Distances between the passes count in proportion below this, by their logarithm beyond, metres.
 APART_M = 0.02
-#: A person of whose landmarks more than this share are doubtful is told of.
-MANY_DOUBTS = 0.05
+#: A person is told of if more than this share of the landmarks are, by their trust, off: sound runs have .01 to .05 (results/trust). Where
+#: trust is not known, if more than that share is seen by too few cameras.
+MUCH_OFF, MANY_DOUBTS = 0.1, 0.05
 
 #: Place of each landmark's kind in `KINDS`, shape (15,): pelvis, neck and head are the trunk's.
 KIND_OF_LANDMARK = np.array([next((k for k, kind in enumerate(KINDS) if name.endswith(kind)), 0) for name in LANDMARKS])
@@ -120,7 +121,7 @@ def trust_of(features: np.ndarray) -> np.ndarray:
 
 
 def with_trust(people: PosedPeople, recording: Recording, run: RunOptions) -> PosedPeople:
-    """Poses with views and trust beside their landmarks, and lines on who is much in doubt and on what no body covers.
+    """Poses with views and trust beside their landmarks, and lines on whose poses are much in doubt and on what no body covers.
 
     Parameters
     ----------
@@ -140,18 +141,23 @@ def with_trust(people: PosedPeople, recording: Recording, run: RunOptions) -> Po
 
 
 def doubt_notes(poses: PoseTable) -> list[str]:
-    """A line on every person of whose landmarks many are doubtful: how many, and which most of all."""
+    """A line on every person of whose landmarks many are off or not known: how many, and which are doubtful most often."""
     notes = []
     for person in np.unique(poses.persons).tolist():
         own = poses.of(person)
         there = np.isfinite(own.positions).all(axis=2)
         doubtful = there if own.doubtful is None else own.doubtful
-        if doubtful.sum() > MANY_DOUBTS * there.sum():
+        told = there & np.isfinite(own.trust) if own.trust is not None else np.zeros_like(there)
+        if own.trust is not None and told.any():
+            share = float(1 - own.trust[told].mean())
+            what = f"by their trust about {share:.0%} of the landmarks are more than {1000 * NEAR_M:.0f} mm off (`trust` in joints.csv)"
+            much = share > MUCH_OFF
+        else:
+            share = doubtful.sum() / max(there.sum(), 1)
+            what = f"{share:.0%} of the landmarks are doubtful, as fewer than two cameras show them (`views` in joints.csv)"
+            much = share > MANY_DOUBTS
+        if much:
             counts = doubtful.sum(axis=0)
             most = ", ".join(f"{LANDMARKS[k]} {counts[k]}" for k in np.argsort(-counts, kind="stable")[:4] if counts[k])
-            column = "fewer than two cameras show them (`views`" if own.trust is None else "little speaks for them (`trust`"
-            notes.append(
-                f"person {person}: {doubtful.sum() / there.sum():.0%} of the landmarks are doubtful, as {column} in joints.csv); in how "
-                f"many of {len(there)} frames, most of all: {most}"
-            )
+            notes.append(f"person {person}: {what}; doubtful in how many of {len(there)} frames, most of all: {most}")
     return notes

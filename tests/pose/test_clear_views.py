@@ -117,8 +117,13 @@ def chains_by_loop(camera, states):
         points = place_points(*segment_transforms(BODY, state), table.points, table.segment)
         for uv, part in zip(project(camera, points)[0], table.part, strict=True):
             chain = next((k for k, limb in enumerate(LIMBS) if part in LIMBS[limb].parts), "trunk")
-            cells.setdefault(tuple((uv // 3).astype(int)), set()).add((person, chain))
+            cells.setdefault(cell_at(uv), set()).add((person, chain))
     return cells
+
+
+def cell_at(uv):
+    """Five metres away a cell of 3 cm is two of these cameras' pixels."""
+    return tuple((np.floor(uv + 0.5) // 2).astype(int))
 
 
 @pytest.mark.parametrize("camera", [FRONT, LEFT], ids=["front", "left"])
@@ -137,6 +142,6 @@ def test_wrists_as_a_loop_over_the_flesh_has_them(camera, seed):
         table = flesh_points(BODY, 0.02)
         points = place_points(*segment_transforms(BODY, state), table.points, table.segment)
         own = points[np.isin(table.part, LIMBS[name].parts) & (np.linalg.norm(points - wrist, axis=1) < 0.15)]
-        alone = np.mean([cells[tuple((uv // 3).astype(int))] == {(0, k)} for uv in project(camera, own)[0]])
+        alone = np.mean([cells[cell_at(uv)] == {(0, k)} for uv in project(camera, own)[0]])
         if abs(alone - 0.3) > 0.2:  # cells and surfaces differ at the edges
             assert found[0, LIMBS[name].landmarks[1]] == (alone > 0.3)

@@ -152,8 +152,16 @@ def test_who_is_in_doubt_is_told():
     assert trust_line(poses) == [
         "of 150 landmarks 12 are doubtful (8.0%): l_elbow of person 0 in 8 frames, r_wrist of person 0 in 4 frames"
     ]
-    assert "person 0: 8% of the landmarks are doubtful" in doubt_notes(poses)[0] and "l_elbow 8, r_wrist 4" in doubt_notes(poses)[0]
+    assert not doubt_notes(poses)  # 5.7 % are off, by their trust
+    trust[:, landmark_index("r_wrist")] = 0.02
+    note = doubt_notes(replace(poses, trust=trust))[0]
+    assert note.startswith("person 0: by their trust about 10% of the landmarks are more than 60 mm off")
+    assert note.endswith("doubtful in how many of 10 frames, most of all: r_wrist 10, l_elbow 8")
     assert not doubt_notes(replace(poses, trust=np.full((10, 15), TRUSTED)))
+    seen = np.full((10, 15), 2.0)
+    assert not doubt_notes(replace(poses, trust=None, views=seen))
+    seen[:, 0] = 1
+    assert "7% of the landmarks are doubtful, as fewer than two cameras show them" in doubt_notes(replace(poses, trust=None, views=seen))[0]
     assert trust_line(replace(poses, trust=None, views=None)) == []
 
 
