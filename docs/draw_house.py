@@ -46,7 +46,7 @@ PLACES = {
     "pose.trust": (6, -1),
 }  # fmt: skip
 #: Rooms around the way of a frame, which may use all that they need of it: no arrows.
-AROUND = ("check", "synthetic", "metrics", "view", "pose.smoothing", "api", "session", "trials", "experiments")
+AROUND = ("check", "synthetic", "metrics", "view", "motion", "api", "session", "trials", "experiments")
 #: Of everybody's use, or too small for a box.
 LEFT_OUT = {"errors", "landmarks", "plugins", "callable_package", "__init__", "__main__", "pose.__init__", "pose.trust_model"}
 WIDTH, HEIGHT, COLUMN, ROW = 2.2, 0.72, 3.05, 1.0

@@ -252,7 +252,6 @@ def pose(
     from hmc.pose.keypoint_tracks import tracks_of_keypoints
     from hmc.pose.keypoint_views import with_keypoint_views
     from hmc.pose.registry import pose_method
-    from hmc.pose.smoothing import smooth_people
     from hmc.pose.trust import with_trust
     from hmc.pose.views.recent import RecentViews
     from hmc.voxels.run_options import RunOptions
@@ -286,7 +285,7 @@ def pose(
         if tracks is not None:
             people = backward(recording, tracks, method, people, options, run)
         if smooth_s:
-            people = smooth_people(people, method.limits, recording.fps, smooth_s)
+            people = people.smoothed("polynomial", window_s=smooth_s, limits=method.limits)
         if tracks is not None and cues is not None and not method.needs_hulls:
             return with_keypoint_views(people, recording, tracks, cues)
         return with_trust(people, recording, run)

@@ -103,9 +103,9 @@ FORMATS = (
 )
 
 COMMANDS = [
-    Given(("check", "rec", "--out", "check.png"), ("rec",), REC, 4),
+    Given(("check", "rec", "--out", "check.png"), ("rec",), REC, 3),
     Given(("world", "rec", "--out", "world.png", "--dry-run"), ("rec",), REC, 1),
-    Given(("world", "rec", "--out", "world.png", "--points", "points.csv"), ("rec", "points.csv"), ("points.csv", "points.csv", "rec/calibration.toml"), 2),
+    Given(("world", "rec", "--out", "world.png", "--points", "points.csv"), ("rec", "points.csv"), ("points.csv", "points.csv", "rec/calibration.toml"), 1),
     Given(("sync", "rec", "--out", "sync.png", "--dry-run"), ("rec",), REC, 1),
     Given(("track", "rec", "--out", "new", "--voxel", "0.1", *QUICK), ("rec",), REC, 3),
     Given(("track", "rec", "--out", "new", "--cues", "keypoints", *QUICK), ("rec",), REC, 1),

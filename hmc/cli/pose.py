@@ -154,7 +154,6 @@ def _run(args: argparse.Namespace, held: ExitStack) -> int:
     from hmc.pose.keypoint_cues import learn_scatter
     from hmc.pose.keypoint_tracks import tracks_of_keypoints
     from hmc.pose.keypoint_views import with_keypoint_views
-    from hmc.pose.smoothing import smooth_people
     from hmc.pose.trust import with_trust
     from hmc.pose.views.recent import RecentViews
     from hmc.tracking.resumable import person_grid, track_recording
@@ -254,7 +253,7 @@ def _run(args: argparse.Namespace, held: ExitStack) -> int:
     if tracks is not None:
         people = backward(recording, tracks, method, people, options, kept(BACK_JOURNAL, SECOND_PASS))
     if args.smooth:
-        people = smooth_people(people, method.limits, recording.fps, args.smooth)
+        people = people.smoothed("polynomial", window_s=args.smooth, fps=recording.fps, limits=method.limits)
     if hulls:
         people = with_trust(people, recording, kept(POSE_JOURNAL, VIEWS))
     elif tracks is not None and cues is not None:

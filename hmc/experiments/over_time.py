@@ -22,10 +22,10 @@ from hmc.experiments.markerless_runs import VOXEL_M, action_sources, change_hull
 from hmc.experiments.pose_intervals import none_better, score_difference
 from hmc.experiments.truth import estimates
 from hmc.metrics.landmarks import landmark_errors
+from hmc.motion.smoothing import Smoothing, smooth_positions
 from hmc.pose.follow import FollowOptions
 from hmc.pose.method import PoseMethod
 from hmc.pose.methods.annealed import annealed_method
-from hmc.pose.smoothing import smooth_landmarks
 from hmc.pose.steps.presets import PRESETS
 from hmc.voxels.hulls import HullStep
 
@@ -191,7 +191,7 @@ def _smoothing_rows(cells: Sequence[Cell]) -> list[dict[str, Any]]:
             for one in group:
                 estimate, truth = estimates(one)
                 if window:
-                    estimate = smooth_landmarks(np.array(one.results["frames"]), estimate, one.results["fps"], window)
+                    estimate = smooth_positions(estimate, one.results["fps"], Smoothing("polynomial", window_s=window))
                 errors.append(1000 * float(np.nanmean(landmark_errors(estimate, truth))))
                 jitter.append(jitter_mm(estimate - truth))
             rows.append({"action": action, "window_s": window, "mean_mm": float(np.mean(errors)), "jitter_mm": float(np.mean(jitter))})

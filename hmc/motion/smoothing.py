@@ -1,7 +1,9 @@
 """Smoothing as a step on a finished result: landmarks, and then the angles whose landmarks these are, so that bones keep their lengths.
 
 Each landmark is smoothed in each stretch in which it is known; nothing is smoothed over a gap. Sources: Winter (2009), section 3.4.4.2, for
-the Butterworth filter run forwards and backwards; Savitzky and Golay (1964) for the polynomial.
+the Butterworth filter run forwards and backwards; Savitzky and Golay (1964) for the polynomial. A filter of poses knows only the past; once
+the whole run is there, each frame can be compared with those after it too (Canton 2009, section 3.1.2.2). Landmarks are smoothed, not
+angles: those of a straight arm jump where the arm itself does not.
 """
 
 from __future__ import annotations
@@ -16,7 +18,7 @@ from hmc.body.kinematics import landmarks
 from hmc.errors import InputError
 from hmc.motion.trajectory import Trajectory
 
-__all__ = ["Smoothing", "butterworth", "local_polynomial", "smooth_trajectory", "stretches"]
+__all__ = ["Smoothing", "butterworth", "local_polynomial", "smooth_positions", "smooth_trajectory", "stretches"]
 
 #: Degree of the polynomial: what turns round within the window is not cut off.
 DEGREE = 3
@@ -24,8 +26,6 @@ DEGREE = 3
 ORDER = 2
 #: Twice run, the filter halves power at a lower frequency than once: the cutoff is raised so that it does at the one that was asked for.
 _TWICE = (np.sqrt(2) - 1) ** (1 / (2 * ORDER))
-#: Steps of inverse kinematics from the pose as it was, which is near.
-_STEPS = 12
 
 
 @dataclass(frozen=True)
@@ -120,6 +120,32 @@ def stretches(known: np.ndarray) -> list[np.ndarray]:
     return [part for part in np.split(rows, np.flatnonzero(np.diff(rows) != 1) + 1) if len(part)]
 
 
+def smooth_positions(positions: np.ndarray, fps: float, how: Smoothing) -> np.ndarray:
+    """Points over time, each smoothed in each stretch in which it is known.
+
+    Parameters
+    ----------
+    positions : ndarray, shape (n, k, 3)
+        A row a frame; NaN where a point is not known.
+    fps : float
+    how : Smoothing
+
+    Returns
+    -------
+    ndarray, shape (n, k, 3)
+
+    Raises
+    ------
+    InputError
+        When the frame rate is too low for the cutoff.
+    """
+    out = np.array(positions, float)
+    for k in range(out.shape[1]):
+        for rows in stretches(np.isfinite(out[:, k]).all(axis=1)):
+            out[rows, k] = _smooth(out[rows, k], fps, how)
+    return out
+
+
 def smooth_trajectory(one: Trajectory, how: Smoothing) -> Trajectory:
     """A trajectory made smooth.
 
@@ -138,10 +164,7 @@ def smooth_trajectory(one: Trajectory, how: Smoothing) -> Trajectory:
     InputError
         When the frame rate is too low for the cutoff.
     """
-    positions = one.positions.copy()
-    for k in range(positions.shape[1]):
-        for rows in stretches(np.isfinite(positions[:, k]).all(axis=1)):
-            positions[rows, k] = _smooth(positions[rows, k], one.fps, how)
+    positions = smooth_positions(one.positions, one.fps, how)
     if one.states is None or one.body is None:
         return replace(one, positions=positions)
     changed = np.flatnonzero((np.nan_to_num(positions) != np.nan_to_num(one.positions)).any(axis=(1, 2)))
@@ -150,7 +173,7 @@ def smooth_trajectory(one: Trajectory, how: Smoothing) -> Trajectory:
     states[changed] = _smoothed_states(one.states, one.fps, how)[changed]
     for row in changed:
         known = np.isfinite(states[row])
-        states[row, known] = fit_landmarks(one.body, positions[row], np.where(known, states[row], 0.0), _STEPS)[0][known]
+        states[row, known] = fit_landmarks(one.body, positions[row], np.where(known, states[row], 0.0))[0][known]
     placed = landmarks(one.body, np.nan_to_num(states[changed]))
     positions[changed] = np.where(np.isfinite(positions[changed]), placed, np.nan)
     return replace(one, positions=positions, states=states)

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.animation import FuncAnimation
     from matplotlib.figure import Figure
 
+    from hmc.body.joints import JointLimits
     from hmc.motion.trajectory import Trajectory
 
 __all__ = ["FinishedPeople"]
@@ -51,6 +52,7 @@ class FinishedPeople:
         cutoff_hz: float = 6.0,
         window_s: float = 0.4,
         fps: float | None = None,
+        limits: JointLimits | None = None,
     ) -> Any:
         """The same people with smooth trajectories; seconds, as nothing is estimated again.
 
@@ -60,6 +62,8 @@ class FinishedPeople:
             As `hmc.motion.smoothing.Smoothing`.
         fps : float, optional
             As for `trajectories`.
+        limits : JointLimits, optional
+            Within which the angles stay (`hmc.pose.method.PoseMethod.limits`); by default those of `trajectories`.
 
         Returns
         -------
@@ -76,6 +80,8 @@ class FinishedPeople:
         how = Smoothing(kind, cutoff_hz, window_s)
         positions, states = self.poses.positions.copy(), self.states.states.copy()
         for one in self.trajectories(fps):
+            if limits is not None and one.body is not None:
+                one = replace(one, body=replace(one.body, limits=limits))
             smooth = smooth_trajectory(one, how)
             rows = np.flatnonzero((self.poses.persons == one.person) & np.isfinite(positions).any(axis=(1, 2)))
             places = self.poses.frames[rows] - one.frames[0]

@@ -34,7 +34,7 @@ FINISHED = MOTION | {"view"}
 FOLLOWING = PERSON | FINISHED | {"pose.finished", "pose.records", "pose.follow", "pose.keypoint_cues", "pose.keypoint_sides"}
 METHODS = STARTS | MIXTURES | {"pose.recovery", "pose.methods"}
 POSE = METHODS | FOLLOWING | {"pose.backward", "pose.clear_views", "pose.keypoint_tracks", "pose.occluders", "pose.registry"}
-POSE |= {"pose.keypoint_views", "pose.smoothing", "pose.trust", "pose.trust_model"}
+POSE |= {"pose.keypoint_views", "pose.trust", "pose.trust_model"}
 METRICS = IO | {"metrics"}
 VIEW = VOXELS | {"body", "view"}
 EVERYTHING = POSE | METRICS | VIEW | {"motion", "check", "synthetic", "plugins"}
@@ -67,7 +67,6 @@ MAY_IMPORT = {
     "pose.mixtures": MIXTURES,
     "pose.occluders": VIEWS,
     "pose.backward": FOLLOWING | MIXTURES | {"pose.backward", "pose.occluders"},
-    "pose.smoothing": FOLLOWING,
     "pose.clear_views": FOLLOWING,
     "pose.trust": FOLLOWING | {"pose.clear_views", "pose.trust_model"},
     "pose.trust_model": set(),
@@ -200,7 +199,7 @@ for name in {names!r}:
 
 @pytest.mark.parametrize(
     "program",
-    ["from hmc.cli import main; main(['--help'])", "import hmc.cli.pose, hmc.pose.backward, hmc.pose.smoothing, hmc.tracking.resumable"],
+    ["from hmc.cli import main; main(['--help'])", "import hmc.cli.pose, hmc.pose.backward, hmc.pose.finished, hmc.tracking.resumable"],
     ids=["help", "run"],
 )
 def test_what_is_slow_to_import_is_not_before_it_is_used(program):

@@ -4,12 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from scipy.signal import butter, sosfiltfilt
 
 from hmc.body.joints import dof_index
 from hmc.body.kinematics import landmarks
 from hmc.errors import InputError
-from hmc.motion.smoothing import Smoothing, butterworth, local_polynomial, smooth_trajectory, stretches
+from hmc.motion.smoothing import Smoothing, butterworth, smooth_positions, smooth_trajectory, stretches
 from hmc.motion.trajectory import Trajectory
 
 
@@ -30,10 +32,19 @@ def test_the_filter_is_that_of_scipy_in_another_form():
     assert np.allclose(butterworth(values, 60, 5.0), other)
 
 
-def test_a_parabola_stays():
-    t = np.linspace(-1, 1, 41)
-    values = np.stack([t**2, 1 - t**3], axis=1)
-    assert np.allclose(local_polynomial(values, 30, 0.4), values)
+@given(st.integers(0, 2**32 - 1), st.integers(9, 40))
+@settings(max_examples=25, deadline=None)
+def test_cubic_paths_stay_as_they_are(seed, n):
+    times = np.arange(n)[:, None, None] / 30
+    coefficients = np.random.default_rng(seed).normal(size=(4, 15, 3))
+    path = sum(c * times**k for k, c in enumerate(coefficients))
+    assert np.allclose(smooth_positions(path, 30, Smoothing("polynomial", window_s=0.3)), path, atol=1e-9)
+
+
+def test_noise_shrinks_and_a_window_of_few_frames_does_nothing():
+    noise = np.random.default_rng(1).normal(0, 0.01, (200, 15, 3))
+    assert smooth_positions(noise, 30, Smoothing("polynomial", window_s=0.3)).std() < 0.7 * noise.std()
+    assert np.array_equal(smooth_positions(noise, 30, Smoothing("polynomial", window_s=0.06)), noise)
 
 
 def test_nothing_is_smoothed_over_a_gap():
@@ -45,6 +56,10 @@ def test_nothing_is_smoothed_over_a_gap():
     assert (np.isnan(smooth) == np.isnan(positions)).all()
     alone = smooth_trajectory(replace(one, frames=np.arange(30), positions=positions[:30]), Smoothing("butterworth", 4.0)).positions
     assert np.allclose(smooth[:30, 4], alone[:, 4]) and not np.allclose(smooth[:30, 3], alone[:, 3])
+    step = np.zeros((64, 15, 3))
+    step[20:] = 1.0  # elsewhere after a frame that is not known
+    step[19] = np.nan
+    assert np.allclose(smooth_positions(step, 30, Smoothing("polynomial", window_s=0.3)), step, atol=1e-12, equal_nan=True)
     assert [part.tolist() for part in stretches(np.array([1, 1, 0, 1], bool))] == [[0, 1], [3]]
 
 

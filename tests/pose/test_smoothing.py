@@ -1,11 +1,9 @@
-"""Smoothing of finished poses: polynomials stay as they are, noise shrinks, gaps are not bridged, bones and limits hold."""
+"""Smoothing of finished poses: bones keep their lengths, joints their limits."""
 
 from dataclasses import replace
 
 import numpy as np
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 
 from hmc.body.joints import DOF_NAMES, default_limits
 from hmc.body.kinematics import landmarks
@@ -14,37 +12,8 @@ from hmc.body.proportions import default_body
 from hmc.io.results import PoseStates, PoseTable
 from hmc.landmarks import landmark_index
 from hmc.pose.follow import PosedPeople
-from hmc.pose.smoothing import smooth_landmarks, smooth_people
 
 FPS = 30.0
-
-
-@given(st.integers(0, 2**32 - 1), st.integers(9, 40))
-@settings(max_examples=25, deadline=None)
-def test_cubic_paths_stay_as_they_are(seed, n):
-    times = np.arange(n)[:, None, None] / FPS
-    coefficients = np.random.default_rng(seed).normal(size=(4, 15, 3))
-    path = sum(c * times**k for k, c in enumerate(coefficients))
-    assert_allclose(smooth_landmarks(np.arange(n), path, FPS, 0.3), path, atol=1e-9)
-
-
-def test_noise_shrinks_and_a_window_of_few_frames_does_nothing():
-    rng = np.random.default_rng(1)
-    noise = rng.normal(0, 0.01, (200, 15, 3))
-    smooth = smooth_landmarks(np.arange(200), noise, FPS, 0.3)
-    assert smooth.std() < 0.7 * noise.std()
-    assert_array_equal(smooth_landmarks(np.arange(200), noise, FPS, 0.06), noise)
-
-
-def test_gaps_and_missing_frames_are_not_bridged():
-    frames = np.r_[0:20, 30:50, 60:64]
-    step = np.zeros((len(frames), 15, 3))
-    step[20:] = 1.0  # the person is elsewhere after the gap
-    assert_allclose(smooth_landmarks(frames, step, FPS, 0.3), step, atol=1e-12)
-    step[10] = np.nan
-    smooth = smooth_landmarks(frames, step, FPS, 0.3)
-    assert np.isnan(smooth[10]).all() and np.isfinite(np.delete(smooth, 10, 0)).all()
-    assert_allclose(np.delete(smooth, 10, 0), np.delete(step, 10, 0), atol=1e-12)
 
 
 def people_of(states: np.ndarray, body) -> PosedPeople:
@@ -69,7 +38,7 @@ def test_smoothed_poses_are_poses_of_the_same_body():
     people = replace(
         people, poses=replace(people.poses, positions=np.where(np.isnan(noisy).any(1)[:, None, None], np.nan, people.poses.positions))
     )
-    smooth = smooth_people(people, default_limits(), FPS, 0.4)
+    smooth = people.smoothed("polynomial", window_s=0.4, fps=FPS, limits=default_limits())
     assert np.isnan(smooth.poses.positions[5]).all()
     kept = np.delete(np.arange(40), 5)
     truth = landmarks(body, true)[kept]
