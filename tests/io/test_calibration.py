@@ -202,7 +202,7 @@ adjusted = false
         ("c.qca.txt", QUALISYS.replace('x="1000" ', ""), "camera '20' needs <transform>"),
         ("c.cal", "1 2 3", "a .cal file holds 22 numbers"),
         ("c.cal", "one two", "a .cal file holds 22 numbers"),
-        ("notes.txt", "hello", "no calibration found"),
+        ("notes.txt", "hello", r"no calibration found here or in calibration/ \(notes.txt: not of a known form\)"),
     ],
 )
 def test_wrong_files_say_what_is_wrong(tmp_path, file, text, message):

@@ -113,7 +113,10 @@ def find_calibration(path: str | Path) -> list[Path]:
                 )
             if files:
                 return files
-    raise InputError(f"{path}: no calibration found here or in calibration/; what can be read is {KNOWN}")
+    others = [file.name for folder in (path, path / "calibration") for file in sorted(folder.glob("*.*")) if file.is_file()]
+    others = [name for name in others if name != "recording.toml" and not name.startswith(".")]
+    seen = f" ({', '.join(others[:4])}{', ...' if len(others) > 4 else ''}: not of a known form)" if others else ""
+    raise InputError(f"{path}: no calibration found here or in calibration/{seen}; what can be read is {KNOWN}")
 
 
 def _read_file(path: Path) -> list[CalibrationEntry]:
