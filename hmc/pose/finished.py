@@ -163,8 +163,8 @@ class FinishedPeople:
             of_landmarks = [None if values is None else values[fitted] for values in (self.poses.views, self.poses.trust)]
             rows.append([
                 str(person), f"{frames.min()}–{frames.max()}", str(fitted.sum()),
-                _mean(self.states.bodies.get(person, {}).get("height"), 2), _mean(self.costs[fitted], 4),
-                *(_mean(values, 2) for values in of_landmarks),
+                _mean(self.states.bodies.get(person, {}).get("height")), _mean(self.costs[fitted], "3g"),
+                *(_mean(values) for values in of_landmarks),
             ])  # fmt: skip
         lines = [_html_row("th", heads), *(_html_row("td", row) for row in rows)]
         return f"<table>{''.join(lines)}</table>"
@@ -184,11 +184,11 @@ class FinishedPeople:
         return known
 
 
-def _mean(values: Any, digits: int) -> str:
+def _mean(values: Any, form: str = "2f") -> str:
     """Of the known ones; a dash where there are none."""
     values = np.atleast_1d(np.asarray(np.nan if values is None else values, float))
     known = values[np.isfinite(values)]
-    return f"{known.mean():.{digits}f}" if len(known) else "–"
+    return f"{known.mean():.{form}}" if len(known) else "–"
 
 
 def _html_row(tag: str, cells: list[str]) -> str:

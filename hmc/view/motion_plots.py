@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from io import BytesIO
 
 import numpy as np
 from matplotlib.animation import FuncAnimation
@@ -20,6 +21,15 @@ __all__ = ["animate_sticks", "draw_angles"]
 MOST_FRAMES = 300
 _STYLES = ("-", "--", ":", "-.")
 _COLUMNS = 4
+
+
+class ShownFigure(Figure):
+    """A figure that a notebook shows, whether or not pyplot is at work in it."""
+
+    def _repr_png_(self) -> bytes:
+        with BytesIO() as file:
+            self.savefig(file, format="png", dpi=100)
+            return file.getvalue()
 
 
 def draw_angles(table: Mapping[str, np.ndarray], names: Sequence[str] | None = None) -> Figure:
@@ -40,7 +50,7 @@ def draw_angles(table: Mapping[str, np.ndarray], names: Sequence[str] | None = N
     panels = _panels(table, names)
     rows = -(-len(panels) // _COLUMNS)
     across = min(len(panels), _COLUMNS)
-    figure = Figure(figsize=(3.6 * across, 2.2 * rows + 0.4), layout="constrained")
+    figure = ShownFigure(figsize=(3.6 * across, 2.2 * rows + 0.4), layout="constrained")
     FigureCanvasAgg(figure)
     persons = np.unique(table["person"]).tolist()
     for place, (title, columns) in enumerate(panels.items()):

@@ -109,7 +109,10 @@ def test_caliscopes_first_form(tmp_path, rng):
     (tmp_path / "config.toml").write_text(text + "[charuco]\nrows = 5\n")
     assert_same_pixels(read_calibration(tmp_path), rig)
     (tmp_path / "config.toml").write_text("[project]\nframe_rate = 60\n")
-    with pytest.raises(InputError, match=r"no calibration found here or in calibration/ \(config.toml: not of a known form\); what can be read is Anipose, .*_par\.txt"):
+    with pytest.raises(
+        InputError,
+        match=r"no calibration found here or in calibration/ \(config.toml: not of a known form\); what can be read is Anip.*_par\.txt",
+    ):
         read_calibration(tmp_path)
 
 

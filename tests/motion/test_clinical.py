@@ -3,6 +3,7 @@
 from dataclasses import replace
 from xml.etree import ElementTree
 
+import cv2
 import numpy as np
 import pandas as pd
 import pytest
@@ -229,6 +230,8 @@ def test_plots_and_animations_of_a_notebook():
     drawn = [line.get_ydata() for line in figure.axes[1].get_lines()[:2]]
     own = frame[frame["person"] == 0]
     assert np.allclose(drawn[0], own["l_knee_flexion_deg"]) and np.allclose(drawn[1], own["r_knee_flexion_deg"])
+    shown = cv2.imdecode(np.frombuffer(figure._repr_png_(), np.uint8), cv2.IMREAD_COLOR)  # a notebook without pyplot asks for this
+    assert shown.std() > 5
     with pytest.raises(InputError, match="no angle 'nose'"):
         people.plot_angles(["nose"])
 
@@ -251,8 +254,10 @@ def test_plots_and_animations_of_a_notebook():
 
 def test_a_small_table_is_shown():
     people = people_with_views()
+    people = replace(people, costs=np.full(len(people.costs), 8.437e-5))
     heads, *rows = [[cell.text for cell in row] for row in ElementTree.fromstring(people._repr_html_())]
     table = pd.DataFrame(rows, columns=heads)
     assert table["person"].tolist() == ["0", "1"] and table["with a pose"].tolist() == ["12", "12"]
     assert table["frames"].tolist() == ["5–16", "5–16"] and table["stature (m)"].tolist() == ["1.71", "1.71"]
+    assert table["mean cost"].tolist() == ["8.44e-05", "8.44e-05"]
     assert table["mean views"].tolist() == ["3.98", "4.00"] and table["mean trust"].tolist() == ["–", "–"]

@@ -31,8 +31,8 @@ def read_cal(path: Path) -> CalibrationEntry:
     values = as_numbers(words)
     if values is None or len(values) not in (N_HUMANEVA, N_BODYTRACK) or not np.all(np.isfinite(values)):
         raise InputError(
-            f"{path}: a .cal file holds {N_HUMANEVA} numbers (HumanEva) or {N_BODYTRACK} (bodytrack), all finite; found {len(words)} words; "
-            "one of OptiTrack's Motive: export it as .mcal (Motive 3.2 or later)"
+            f"{path}: a .cal file holds {N_HUMANEVA} numbers (HumanEva) or {N_BODYTRACK} (bodytrack), all finite; found {len(words)} "
+            "words; one of OptiTrack's Motive: export it as .mcal (Motive 3.2 or later)"
         )
     fx, fy, cx, cy, skew = values[:5]
     matrix = np.array([[fx, skew * fx, cx], [0, fy, cy], [0, 0, 1]])
