@@ -17,7 +17,8 @@ from hmc.pose.methods import pso, smd
 from hmc.pose.recovery import Recovery
 from hmc.pose.registry import METHODS, pose_method
 from hmc.pose.starts import templates
-from hmc.pose.starts.window import StartSettings, WindowStart
+from hmc.pose.starts.candidates import StartSettings
+from hmc.pose.starts.window import WindowStart
 from hmc.pose.steps import marker_filter, presets
 from hmc.pose.steps.limb_search import SearchSettings
 from hmc.pose.steps.swarm.fit import FitSettings

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 __all__ = ["SHELLS", "CompletedCommand", "CompletedOption"]
@@ -45,6 +45,14 @@ def _cases(commands: Sequence[CompletedCommand], indent: str) -> str:
     return "\n".join(lines)
 
 
+def _with_values(commands: Sequence[CompletedCommand]) -> Iterator[tuple[str, CompletedOption]]:
+    """Options that a value follows, each with the pattern of a `case` on the command and the option's names, in bash and zsh."""
+    for one in commands:
+        for option in one.options:
+            if option.takes_value:
+                yield "|".join(shlex.quote(f"{' '.join(one.path)}:{name}") for name in option.names), option
+
+
 def bash(commands: Sequence[CompletedCommand]) -> str:
     """The script for bash.
 
@@ -54,14 +62,12 @@ def bash(commands: Sequence[CompletedCommand]) -> str:
         The program itself, with an empty path, and all commands.
     """
     values, arguments = [], []
+    for patterns, option in _with_values(commands):
+        given = f"words={shlex.quote(' '.join(option.values))}" if option.values else ""
+        files = "files=1" if option.files else ""
+        values.append(f"    {patterns}) {'; '.join(filter(None, (given, files))) or ':'} ;;")
     for one in commands:
         at = " ".join(one.path)
-        for option in one.options:
-            if option.takes_value:
-                patterns = "|".join(shlex.quote(f"{at}:{name}") for name in option.names)
-                given = f"words={shlex.quote(' '.join(option.values))}" if option.values else ""
-                files = "files=1" if option.files else ""
-                values.append(f"    {patterns}) {'; '.join(filter(None, (given, files))) or ':'} ;;")
         names = " ".join(name for option in one.options for name in option.names)
         words = " ".join([*(child.path[-1] for child in _below(commands, one.path)), *one.words])
         files = " files=1;" if one.files else ""
@@ -102,13 +108,11 @@ def _described(pairs: Sequence[tuple[str, str]]) -> str:
 def zsh(commands: Sequence[CompletedCommand]) -> str:
     """The script for zsh; `commands` as for `bash`."""
     values, arguments = [], []
+    for patterns, option in _with_values(commands):
+        files = "files=1;" if option.files else ""
+        values.append(f"    {patterns}) found=({_described([(word, '') for word in option.values])}); {files} ;;")
     for one in commands:
         at = " ".join(one.path)
-        for option in one.options:
-            if option.takes_value:
-                patterns = "|".join(shlex.quote(f"{at}:{name}") for name in option.names)
-                files = "files=1;" if option.files else ""
-                values.append(f"    {patterns}) found=({_described([(word, '') for word in option.values])}); {files} ;;")
         options = _described([(name, option.help) for option in one.options for name in option.names])
         words = _described([*((child.path[-1], child.help) for child in _below(commands, one.path)), *((word, "") for word in one.words)])
         files = " files=1;" if one.files else ""

@@ -18,7 +18,7 @@ from hmc.body.joints import DOF_NAMES
 from hmc.body.model import BodyModel
 from hmc.pose.legs import choose_legs, limb_points, no_alternatives
 from hmc.pose.method import Alternatives, Capture, PoseMethod, StepInfo, StepResult, Subject, Tracked, begin_tracking
-from hmc.pose.starts.window import walk
+from hmc.pose.starts.walk import walk
 from hmc.pose.views.person_view import PersonView
 from hmc.processes import share_out
 
@@ -231,7 +231,7 @@ def _start(task: PoseTask, person: PersonTrack, state: PersonState) -> PersonSta
         return None
     subject = method.equip(started.subject.body, task.capture)
     begun, workers = begin_tracking(subject, started.state, memory=started.memory), task.capture.workers
-    path = walk(frame_rng, method.step, subject, begun, started.anchor, views, workers=workers)
+    path = walk(frame_rng, method.step, begun, started.anchor, views, workers=workers)
     if method.recover is not None:
         usual = method.recover.first(np.array([info.cost for _, info in path]))
         path = [(replace(tracked, memory={**tracked.memory, **usual}), info) for tracked, info in path]

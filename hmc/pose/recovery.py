@@ -19,7 +19,7 @@ import numpy as np
 from hmc.body.exchange import swapped_pose
 from hmc.pose.method import StepInfo, StepResult, Tracked, other_rng
 from hmc.pose.objectives.objective import cost_at
-from hmc.pose.starts.window import StartSettings, candidates, search_all, walk_factor
+from hmc.pose.starts.candidates import StartSettings, candidates, search_all, walk_factor
 from hmc.pose.steps.polish import fine_objective
 from hmc.pose.steps.presets import PosePreset
 from hmc.pose.steps.refine import refine

@@ -31,7 +31,8 @@ import numpy as np
 
 from hmc.pose.method import PoseMethod, StepInfo, Tracked, unseen
 from hmc.pose.registry import register_method
-from hmc.pose.starts.window import StartSettings, WindowStart
+from hmc.pose.starts.candidates import StartSettings
+from hmc.pose.starts.window import WindowStart
 from hmc.pose.steps.polish import fine_objective
 from hmc.pose.steps.presets import PRESETS
 

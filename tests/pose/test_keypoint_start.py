@@ -11,7 +11,8 @@ from hmc.body.exchange import swapped_pose
 from hmc.body.keypoint_places import BODY_KEYPOINTS, keypoint_places, place_keypoints
 from hmc.body.kinematics import segment_transforms
 from hmc.camera.model import project
-from hmc.pose.starts.window import StartSettings, WindowStart, candidates
+from hmc.pose.starts.candidates import StartSettings, candidates
+from hmc.pose.starts.window import WindowStart
 from hmc.pose.steps.limb_search import SearchSettings
 from hmc.pose.steps.presets import PRESETS
 from hmc.pose.views.keypoints import see_keypoints

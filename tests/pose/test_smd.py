@@ -551,7 +551,7 @@ def test_who_does_not_stand_like_da_vinci_is_found_by_the_spectral_route(monkeyp
         asked.append(args[2])
         return spectral_poses(*args, **kwargs)
 
-    monkeypatch.setattr("hmc.pose.starts.window.spectral_poses", spy)
+    monkeypatch.setattr("hmc.pose.starts.candidates.spectral_poses", spy)
     found = follow(recording, tracks, smd_method(SMD_PRESETS["default"]), FollowOptions(0.04, height_m=1.76))
     assert asked
     assert found.notes == ()

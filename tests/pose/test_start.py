@@ -13,7 +13,10 @@ from hmc.body.kinematics import landmarks
 from hmc.body.model import BodyModel
 from hmc.pose.method import Capture, StartPose, StepInfo, begin_tracking
 from hmc.pose.methods.annealed import annealed_method
-from hmc.pose.starts.window import StartSettings, WindowStart, estimate_height, possible_heights, walk
+from hmc.pose.starts.candidates import StartSettings
+from hmc.pose.starts.stature import estimate_height, possible_heights
+from hmc.pose.starts.walk import walk
+from hmc.pose.starts.window import WindowStart
 from hmc.pose.steps.limb_search import SearchSettings
 from hmc.pose.steps.presets import PRESETS
 from hmc.search.filters import AnnealedSettings
@@ -41,7 +44,7 @@ def start_person(rng, preset, views, capture, height_m=None, settings=None) -> B
         return None
     method = annealed_method(preset)
     subject = method.equip(started.subject.body, capture)
-    path = walk(rng, method.step, subject, started.state, started.anchor, views)
+    path = walk(rng, method.step, begin_tracking(subject, started.state), started.anchor, views)
     return Begun(started, subject.body, np.array([tracked.state for tracked, _ in path]), [info for _, info in path])
 
 
@@ -227,7 +230,7 @@ def test_following_visits_every_frame_once_from_the_anchor_outwards():
         return replace(tracked, state=tracked.state + 0.1, velocity=np.full(N_DOF, 0.1)), StepInfo(cost=view.frame)
 
     start = true_state(subject.body, acted, 3)
-    path = walk(rng_of(0), step, subject, start, 3, views)
+    path = walk(rng_of(0), step, begin_tracking(subject, start), 3, views)
     assert visited == [3, 4, 5, 6, 7, 2, 1, 0] and [info.cost for _, info in path] == list(range(8))
     distance = [round((tracked.state - start)[5] / 0.1) for tracked, _ in path]
     assert distance == [4, 3, 2, 1, 2, 3, 4, 5]
@@ -242,7 +245,7 @@ def test_both_ways_from_the_anchor_begin_at_rest_and_with_what_it_remembers():
         return replace(tracked, velocity=np.ones(N_DOF), memory=memory), StepInfo()
 
     start = begin_tracking(subject, np.zeros(N_DOF), np.ones(N_DOF), {"visited": np.array([-1])})
-    walk(rng_of(0), step, subject, start, 1, [view_of(None, frame=k) for k in range(4)])
+    walk(rng_of(0), step, start, 1, [view_of(None, frame=k) for k in range(4)])
     assert given[1].velocity.all() and given[3].velocity.all()
     assert not given[0].velocity.any() and not given[2].velocity.any()
     assert [given[k].memory["visited"].tolist() for k in range(4)] == [[-1, 1], [-1], [-1, 1], [-1, 1, 2]]

@@ -17,7 +17,8 @@ from hmc.pose.spectral.reading import ReadingSettings
 from hmc.pose.spectral.segmentation import printed_segmentation
 from hmc.pose.spectral.skeleton import SkeletonSettings
 from hmc.pose.starts.spectral import body_state
-from hmc.pose.starts.window import WindowStart, estimate_height
+from hmc.pose.starts.stature import estimate_height
+from hmc.pose.starts.window import WindowStart
 from hmc.pose.steps.polish import polished
 from hmc.pose.steps.presets import PosePreset
 from hmc.pose.steps.proposal import as_proposed

@@ -8,7 +8,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -16,122 +16,30 @@ import numpy as np
 
 from hmc.body.exchange import swapped_poses
 from hmc.body.kinematics import landmarks
-from hmc.body.limbs import LIMBS
 from hmc.body.model import BodyModel, neutral_state
 from hmc.body.proportions import canton_body, default_body, stiff_body
-from hmc.pose.method import Capture, FrameRng, PoseStep, StartPose, StepInfo, Subject, Tracked, begin_tracking
-from hmc.pose.objectives.objective import Objective, cost_at
+from hmc.pose.method import Capture, FrameRng, StartPose, StepInfo, Subject, Tracked, begin_tracking
+from hmc.pose.starts.candidates import StartSettings, candidates, search_all, walk_factor
 from hmc.pose.starts.fit_body import with_known_stature
 from hmc.pose.starts.own_body import choose_frames, own_body
-from hmc.pose.starts.spectral import spectral_poses
-from hmc.pose.starts.templates import first_poses
-from hmc.pose.steps.annealed import annealed, annealed_subject
-from hmc.pose.steps.limb_search import search_limbs
-from hmc.pose.steps.polish import PolishSettings, fine_objective, polished
+from hmc.pose.starts.stature import possible_heights, usable_frames
+from hmc.pose.starts.walk import quick_step, walk
+from hmc.pose.steps.annealed import annealed_subject
+from hmc.pose.steps.polish import fine_objective
 from hmc.pose.steps.presets import PosePreset
-from hmc.pose.steps.proposal import as_proposed
 from hmc.pose.steps.refine import refine
 from hmc.pose.views.hull_target import HullTarget
-from hmc.pose.views.keypoint_pose import keypoint_pose
 from hmc.pose.views.person_view import PersonView
 from hmc.processes import share_out
-from hmc.search.filters import AnnealedSettings
 
-__all__ = [
-    "StartSettings", "WindowStart", "candidates", "estimate_height", "possible_heights", "quick_step", "search_all", "walk", "walk_factor",
-]  # fmt: skip
+__all__ = ["WindowStart"]
 
 #: Frames of a window and how a pose was followed through them.
 _Path = dict[int, tuple[Tracked, StepInfo]]
-#: Fewer surface voxels are too little of a person to start from.
-LEAST_START_SURFACE = 50
 #: The window's frames are thinned out to about so many a second before body and first pose are decided.
 DECIDE_FPS = 30.0
-#: A hull that ends lower than this is no adult who stands, metres; below the second, it is no child either.
-ADULT_M, CHILD_M = 1.45, 0.9
-#: An adult's mean stature, metres.
-ADULT_MEAN_M = 1.7
 #: A child is believed where its cost is below this share of an adult's who sits, kneels or bends.
 CHILD_GAIN = 0.9
-#: With which candidates are followed.
-QUICK = AnnealedSettings(layers=2, particles=60, survival_rate=0.1, spread=0.5)
-
-
-@dataclass(frozen=True)
-class StartSettings:
-    """How the first pose is found.
-
-    Parameters
-    ----------
-    anchors : int
-        Frames of the window from which candidates are taken.
-    candidates : int
-        Candidates followed.
-    trials_s, follow_s : tuple of float, float
-        How long each is followed, to both sides, seconds: all for a first trial, longer those that are left after it, and to the end those
-        that are left after the last. Left are those whose cost is not ...
-    behind : float
-        ... more than so many times the least, ...
-    same_m : float
-        ... and of those that have come to the same pose at both ends (no landmark farther apart than this, metres) the cheapest.
-    walk_speed_m_s : float
-        Above this speed of the track, a body is taken to face where it goes.
-    walk_penalty : float
-        Share by which facing straight backwards raises the cost.
-    body_frames : int
-        Frames to which the body's dimensions are fitted.
-    """
-
-    anchors: int = 3
-    candidates: int = 5
-    trials_s: tuple[float, ...] = (0.07, 0.13)
-    follow_s: float = 0.4
-    behind: float = 1.25
-    same_m: float = 0.04
-    walk_speed_m_s: float = 0.5
-    walk_penalty: float = 2.0
-    body_frames: int = 12
-
-
-def estimate_height(targets: Sequence[HullTarget | None], floor_z: float = 0.0) -> float:
-    """Stature from the tracked volume: how high the top of the hull commonly comes, if that is as high as an adult who stands.
-
-    The first of `possible_heights`.
-
-    Parameters
-    ----------
-    targets : sequence of HullTarget or None
-        A person's hulls in some frames.
-    floor_z : float
-        Height of the floor, metres.
-
-    Returns
-    -------
-    float
-        Metres; an adult's mean stature where the person never stood up.
-    """
-    return possible_heights(targets, floor_z)[0]
-
-
-def possible_heights(targets: Sequence[HullTarget | None], floor_z: float = 0.0) -> tuple[float, ...]:
-    """Statures that the tracked volume allows: an adult's, and where its top is low, also that of a child who stands.
-
-    Parameters
-    ----------
-    targets, floor_z
-        As for `estimate_height`.
-
-    Returns
-    -------
-    tuple of float
-        One or two, metres, the likelier first.
-    """
-    tops = [np.quantile(t.surface[:, 2], 0.995) - floor_z for t in targets if t is not None and len(t.surface) >= LEAST_START_SURFACE]
-    # Arms held up, hats and stray voxels reach above the crown: the median of the frames resists all that does not last.
-    top = float(np.median(tops)) if tops else 0.0
-    if top > ADULT_M:
-        return (min(top, 2.0),)
-    return (ADULT_MEAN_M, top) if top > CHILD_M else (ADULT_MEAN_M,)
 
 
 @dataclass(frozen=True)
@@ -170,9 +78,9 @@ class WindowStart:
         """
         # Of a fast recording, every so many frames decide, as many as of a slow one; then all are followed.
         stride = max(1, round(capture.fps / DECIDE_FPS))
-        if not _usable(views[::stride]):
+        if not usable_frames(views[::stride]):
             stride = 1
-        usable = _usable(views[::stride])
+        usable = usable_frames(views[::stride])
         if not usable:
             return None
         window = _Window(lambda k: frame_rng(k * stride), views[::stride], usable, replace(capture, fps=capture.fps / stride))
@@ -196,8 +104,8 @@ class WindowStart:
         if preset.fit_body is None:
             return started
         # What the body's dimensions are fitted to need not be the last word on the poses.
-        frames = window.frame_rng, quick_step(preset), started.subject, started.state, started.anchor, window.views
-        path = walk(*frames, known, capture.workers)
+        begun = begin_tracking(started.subject, started.state)
+        path = walk(window.frame_rng, quick_step(preset), begun, started.anchor, window.views, known, capture.workers)
         subject = _fit(started.subject, window, path, self, height_m is not None)
         return replace(started, subject=subject, state=path[started.anchor][0].state)
 
@@ -224,65 +132,6 @@ class _Window:
         return target
 
 
-def _usable(views: Sequence[PersonView]) -> list[int]:
-    """Frames with enough of a person to start from."""
-    return [k for k, view in enumerate(views) if view.target is not None and len(view.target.surface) >= LEAST_START_SURFACE]
-
-
-def walk(
-    frame_rng: FrameRng,
-    step: PoseStep,
-    subject: Subject,
-    state: np.ndarray | Tracked,
-    anchor: int,
-    views: Sequence[PersonView],
-    known: Mapping[int, tuple[Tracked, StepInfo]] | None = None,
-    workers: int = 1,
-) -> list[tuple[Tracked, StepInfo]]:
-    """A pose tracked from one frame backwards to the first and forwards to the last.
-
-    Parameters
-    ----------
-    frame_rng : callable
-    step : callable
-        `PoseStep`.
-    subject : Subject
-    state : ndarray, shape (37,), or Tracked
-        Pose in the frame `anchor`.
-    anchor : int
-    views : sequence of PersonView
-    known : mapping of int to (Tracked, StepInfo), optional
-        Frames around the anchor that were followed before, from the same pose with the same step and random numbers.
-    workers : int
-        With two or more, forwards and backwards at once.
-
-    Returns
-    -------
-    list of (Tracked, StepInfo)
-        One a frame.
-    """
-    n, known = len(views), known or {}
-    start = state if isinstance(state, Tracked) else begin_tracking(subject, state)
-    first = known[anchor] if anchor in known else step(frame_rng(anchor), start, views[anchor])
-
-    def onwards(order: Iterable[int]) -> list[tuple[Tracked, StepInfo]]:
-        found, current = [], replace(first[0], velocity=np.zeros_like(start.state))
-        for k in order:
-            found.append(known[k] if k in known else step(frame_rng(k), current, views[k]))
-            current = found[-1][0]
-        return found
-
-    # Backwards, the velocity is that of time reversed; only the last frame's is used again, and that one is forward.
-    after, before = share_out([partial(onwards, order) for order in (range(anchor + 1, n), range(anchor - 1, -1, -1))], workers)
-    return [*before[::-1], first, *after]
-
-
-def quick_step(preset: PosePreset) -> PoseStep:
-    """The plain annealed step of a preset with a fraction of the work a frame, and without search."""
-    quick = replace(preset, annealed=QUICK, search=None)
-    return as_proposed(annealed(quick)) if quick.refine is None else polished(annealed(quick), quick.polish)
-
-
 def _neutral_start(body: BodyModel, window: _Window) -> np.ndarray:
     """Canton (2009), section 6.3.3: root under the centroid, heading of the walk, all else neutral."""
     velocity = window.velocities[: max(2, int(0.5 * window.capture.fps))].mean(0)
@@ -291,32 +140,6 @@ def _neutral_start(body: BodyModel, window: _Window) -> np.ndarray:
     state[:3] = (*window.target(window.usable[0]).surface.mean(0)[:2], window.capture.floor_z + legs)
     state[3] = np.arctan2(velocity[1], velocity[0])
     return state
-
-
-def candidates(rng: np.random.Generator, subject: Subject, view: PersonView, preset: PosePreset) -> tuple[np.ndarray, np.ndarray]:
-    """Candidate poses of one frame, best first, and their costs: from typical poses, or from the skeleton in the voxels too.
-
-    Where a detector's keypoints are seen, what they show is one of them, and they have a say in the order.
-
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-    subject : Subject
-    view : PersonView
-        With hulls.
-    preset : PosePreset
-    """
-    find = spectral_poses if preset.start == "spectral" else first_poses
-    if view.target is None:
-        raise ValueError("the frame has no hulls of this person")
-    states, costs = find(rng, subject, view.target, preset.symmetric, subject.capture.floor_z)
-    if view.keypoints is None:
-        return states, costs
-    objective = fine_objective(rng, subject, view, preset.polish)
-    trials = [*states, *keypoint_pose(subject.body, view.keypoints, states[0])]
-    refined = [refine(objective, trial, preset.polish.refine) for trial in trials]
-    refined.sort(key=lambda pair: pair[1].cost_after)
-    return np.array([state for state, _ in refined]), np.array([info.cost_after for _, info in refined])
 
 
 def _best_hypothesis(subject: Subject, window: _Window, preset: PosePreset, settings: StartSettings) -> tuple[StartPose, _Path]:
@@ -366,7 +189,7 @@ def _followed(subject, window, preset, settings, anchor, chosen) -> tuple[list[f
         def follow(k: int, part: range) -> list[tuple[Tracked, StepInfo]]:
             begin, views = part[0], window.views[part[0] : part[-1] + 1]
             known = {frame - begin: one for frame, one in paths[k].items()}
-            return walk(lambda frame: frame_rng(begin + frame), step, subject, chosen[k], anchor - begin, views, known)
+            return walk(lambda frame: frame_rng(begin + frame), step, begin_tracking(subject, chosen[k]), anchor - begin, views, known)
 
         halves = range(first, anchor + 1), range(anchor, last)
         found = share_out([partial(follow, k, half) for k in left for half in halves], window.capture.workers)
@@ -392,43 +215,6 @@ def _going_on(body: BodyModel, scores: np.ndarray, paths: Sequence[_Path], setti
             going.append(k)
             ends.append(here)
     return sorted(going)
-
-
-def search_all(rng: np.random.Generator, objective: Objective, state: np.ndarray, settings: PolishSettings) -> tuple[np.ndarray, float]:
-    """A pose with each limb where it fits the hulls best, and its cost; as it is where nothing is to be searched.
-
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-    objective : Objective
-    state : ndarray, shape (37,)
-    settings : PolishSettings
-    """
-    cost = cost_at(objective, state)
-    if settings.search is None:
-        return state, cost
-    return search_limbs(rng, objective, (state, cost), list(LIMBS), settings.refine, settings.search)[:2]
-
-
-def walk_factor(headings: np.ndarray, velocities: np.ndarray, settings: StartSettings) -> np.ndarray:
-    """By how much walking backwards raises a cost.
-
-    Parameters
-    ----------
-    headings : ndarray, shape (n,)
-        Radians about Z.
-    velocities : ndarray, shape (n, 3) or (3,)
-        Of the track, metres a second.
-    settings : StartSettings
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        1 for forwards or hardly moving, 1 + walk_penalty for straight back.
-    """
-    speed = np.hypot(velocities[..., 0], velocities[..., 1])
-    forwards = (np.cos(headings) * velocities[..., 0] + np.sin(headings) * velocities[..., 1]) / np.maximum(speed, 1e-9)
-    return np.where(speed > settings.walk_speed_m_s, 1 + settings.walk_penalty * (1 - forwards) / 2, 1.0)
 
 
 def _fit(subject: Subject, window: _Window, path: Sequence[tuple[Tracked, StepInfo]], start: WindowStart, height_known: bool) -> Subject:
