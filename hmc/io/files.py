@@ -4,15 +4,22 @@ from __future__ import annotations
 
 import json
 import os
+import platform
+import re
+import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, is_dataclass
+from functools import cache
 from pathlib import Path
 from typing import IO, Any
 
 from hmc.errors import InputError
 
 __all__ = ["atomic_write", "real_path", "sibling", "to_toml", "write_toml"]
+
+#: Names of files that are being written: of which machine and process.
+_PART = re.compile(r"\..*\.([0-9a-f]{8})-(\d+)\.part(\..*)?")
 
 
 def real_path(path: str | Path) -> Path:
@@ -58,10 +65,11 @@ def sibling(path: str | Path) -> Iterator[Path]:
         As for `atomic_write`.
     """
     path = Path(path)
-    temporary = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
+    temporary = path.with_name(f".{path.stem}.{_machine()}-{os.getpid()}.part{path.suffix}")
     try:
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
+            _sweep(path.parent)
             yield temporary
             os.replace(temporary, path)
         finally:
@@ -69,6 +77,34 @@ def sibling(path: str | Path) -> Iterator[Path]:
                 temporary.unlink()
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror or error})") from error
+
+
+@cache
+def _machine() -> str:
+    """Eight letters for this machine: others that write into the same folder have processes of the same numbers."""
+    return f"{zlib.crc32(platform.node().encode()):08x}"
+
+
+@cache
+def _sweep(folder: Path) -> None:
+    """Remove what killed processes of this machine left half-written in a folder; once a process."""
+    for one in folder.iterdir():
+        made = _PART.fullmatch(one.name)
+        if made and made[1] == _machine() and not _alive(int(made[2])):
+            with suppress(OSError):
+                one.unlink()
+
+
+def _alive(pid: int) -> bool:
+    if os.name == "nt":
+        return True  # a signal of 0 would end the process there
+    try:
+        os.kill(pid, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except OSError:
+        return True  # another user's
+    return True
 
 
 def write_toml(path: str | Path, values: Mapping[str, Any]) -> None:

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import pickle
+import re
+import subprocess
+import sys
 import tomllib
 from dataclasses import dataclass, replace
 
@@ -284,3 +288,19 @@ def test_real_paths_are_resolved_but_for_links_to_themselves(tmp_path):
     for name in (".", "link", "link/../x", "there/none", "there/./a"):
         assert real_path(tmp_path / name) == (tmp_path / name).resolve()
     assert real_path(tmp_path / "loop") == tmp_path.resolve() / "loop"
+
+
+def test_what_a_killed_process_left_half_written_is_removed_by_the_next(tmp_path):
+    work = tmp_path / "a"
+    program = (
+        "import os, sys; from hmc.io.files import sibling\nwith sibling(sys.argv[1]) as part: part.write_text('x'); os.kill(os.getpid(), 9)"
+    )
+    subprocess.run([sys.executable, "-c", program, str(work / "t.csv")], check=False)
+    (left,) = work.iterdir()
+    mine = left.with_name(re.sub(r"-\d+\.part", f"-{os.getppid()}.part", left.name))
+    elsewhere = left.with_name(re.sub(r"[0-9a-f]{8}-", "00000000-", left.name))
+    for other in (mine, elsewhere):  # of a process that is alive, and of another machine
+        other.write_text("x")
+    with atomic_write(work / "u.csv") as file:
+        file.write("y")
+    assert {one.name for one in work.iterdir()} == {"u.csv", mine.name, elsewhere.name}
