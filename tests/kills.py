@@ -5,7 +5,7 @@
 nothing disturbs it. Then it runs the command, ends it at a moment that is drawn over the time that it took, by SIGKILL, SIGINT or SIGTERM, in every
 third trial twice, and starts it again until it is done. Counted are kills that met a run at work, and trials that ended
 
-- same: all files as without a kill but for the times that were measured (`TIMES`), and no others
+- same: all files as without a kill but for the times that were measured (`TIMES`, `TIMED`), and no others
 - other: some file differs, is missing or is left over
 - bad: a traceback, or the run that was started again did not end with exit code 0
 """
@@ -35,6 +35,8 @@ SIGNALS = (signal.SIGKILL, signal.SIGINT, signal.SIGTERM)
 #: Lines of tables and cells that say how long something took.
 TIMES = re.compile(rb'(?m)^ *"?(seconds|\w+_s|\w*real_time_factor)"?( =|:) [0-9.e-]+,?$')
 TWO = ("--workers", "2")
+#: Files of `hmc run` that say so in between.
+TIMED = ("report.html", "trial.toml")
 #: Commands, and what of the folder they leave results in.
 COMMANDS = {
     "track": (("track", "rec", "--out", "new", "--voxel", "0.1", *QUICK), "new"),
@@ -84,7 +86,7 @@ def ended(pid: int, after_s: float, by: int) -> bool:
 
 def files_in(folder: Path) -> dict[str, bytes]:
     """All files' bytes, by their names, without `TIMES`."""
-    files = [one for one in sorted(folder.rglob("*")) if one.is_file()] if folder.is_dir() else []
+    files = [one for one in sorted(folder.rglob("*")) if one.is_file() and one.name not in TIMED] if folder.is_dir() else []
     return {
         str(one.relative_to(folder)): TIMES.sub(b"", one.read_bytes()) if one.suffix in (".toml", ".json") else one.read_bytes()
         for one in files

@@ -6,6 +6,7 @@ import json
 import os
 import platform
 import re
+import shutil
 import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -16,7 +17,7 @@ from typing import IO, Any
 
 from hmc.errors import InputError
 
-__all__ = ["atomic_write", "real_path", "sibling", "to_toml", "write_toml"]
+__all__ = ["atomic_write", "part_path", "real_path", "sibling", "sweep", "to_toml", "write_toml"]
 
 #: Names of files that are being written: of which machine and process.
 _PART = re.compile(r"\..*\.([0-9a-f]{8})-(\d+)\.part(\..*)?")
@@ -65,11 +66,11 @@ def sibling(path: str | Path) -> Iterator[Path]:
         As for `atomic_write`.
     """
     path = Path(path)
-    temporary = path.with_name(f".{path.stem}.{_machine()}-{os.getpid()}.part{path.suffix}")
+    temporary = part_path(path)
     try:
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            _sweep(path.parent)
+            sweep(path.parent)
             yield temporary
             os.replace(temporary, path)
         finally:
@@ -85,14 +86,25 @@ def _machine() -> str:
     return f"{zlib.crc32(platform.node().encode()):08x}"
 
 
+def part_path(path: Path) -> Path:
+    """Beside a file or folder, the name under which this process makes it."""
+    return path.with_name(f".{path.stem}.{_machine()}-{os.getpid()}.part{path.suffix}")
+
+
 @cache
-def _sweep(folder: Path) -> None:
-    """Remove what killed processes of this machine left half-written in a folder; once a process."""
+def sweep(folder: Path) -> None:
+    """Remove what killed processes of this machine left half-made (`part_path`) in a folder; once a process.
+
+    Raises
+    ------
+    OSError
+        When the folder cannot be read.
+    """
     for one in folder.iterdir():
         made = _PART.fullmatch(one.name)
         if made and made[1] == _machine() and not _alive(int(made[2])):
             with suppress(OSError):
-                one.unlink()
+                shutil.rmtree(one) if one.is_dir() else one.unlink()
 
 
 def _alive(pid: int) -> bool:

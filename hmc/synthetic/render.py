@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import multiprocessing
-import os
 import shutil
 import signal
 from collections.abc import Callable, Iterator
@@ -17,7 +16,7 @@ from threadpoolctl import threadpool_limits
 
 from hmc.errors import InputError
 from hmc.io.calibration import write_calibration
-from hmc.io.files import write_toml
+from hmc.io.files import part_path, sweep, write_toml
 from hmc.io.results import PoseTable, TrackTable, write_joints, write_tracks
 from hmc.landmarks import FOOT_POINTS, LANDMARKS
 from hmc.synthetic.actor import PARTS
@@ -75,7 +74,8 @@ def render_recording(
         raise InputError(f"{out}: exists and is no rendered recording; choose another folder or remove it")
     scene = build_scene(recipe, seed)
     out.parent.mkdir(parents=True, exist_ok=True)
-    part = out.with_name(f".{out.name}.{os.getpid()}.part")
+    sweep(out.parent)
+    part = part_path(out)
     try:
         _write_tables(scene, part)
         _write_pictures(scene, part, workers, on_progress)

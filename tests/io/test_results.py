@@ -299,6 +299,9 @@ def test_what_a_killed_process_left_half_written_is_removed_by_the_next(tmp_path
     (left,) = work.iterdir()
     mine = left.with_name(re.sub(r"-\d+\.part", f"-{os.getppid()}.part", left.name))
     elsewhere = left.with_name(re.sub(r"[0-9a-f]{8}-", "00000000-", left.name))
+    folder = left.with_name(left.name.removesuffix(".csv"))
+    folder.mkdir()
+    (folder / "x").write_text("x")
     for other in (mine, elsewhere):  # of a process that is alive, and of another machine
         other.write_text("x")
     with atomic_write(work / "u.csv") as file:
