@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -85,10 +86,14 @@ def read_cell(path: Path) -> Cell | None:
         return None
     try:
         content = read_json_file(path)
-        return Cell(content["parameters"], content["results"], content.get("made", {}))
+        made = content.get("made", {})
+        seconds = made.get("seconds", 0.0)
+        if isinstance(seconds, bool) or not (isinstance(seconds, int | float) and 0 <= seconds < math.inf):
+            raise TypeError(f"`seconds` must be a number, 0 or more; got {seconds!r:.40}")
+        return Cell(content["parameters"], content["results"], made)
     except InputError as error:
         raise InputError(f"{error}; delete the file to compute it again") from None
-    except (KeyError, TypeError) as error:
+    except (AttributeError, KeyError, TypeError) as error:
         raise InputError(f"{path}: not a cell of an experiment ({error}); delete the file to compute it again") from error
 
 
