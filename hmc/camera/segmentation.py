@@ -20,10 +20,21 @@ import numpy as np
 
 from hmc.camera.image_signs import is_dark
 from hmc.camera.noise import blur_for, blurred, is_grey, noise_floor
-from hmc.camera.silhouettes import GapRules, cut_halo, evidence, fill_gaps, filled_for_darkness, in_planes
+from hmc.camera.segmentation_settings import SegmentationSettings
+from hmc.camera.shade import default_net, person_chance, shade_features
+from hmc.camera.silhouettes import GapRules, cut_halo, evidence, fill_gaps, filled_for_darkness, in_planes, without_specks
 from hmc.errors import InputError
 
-__all__ = ["BackgroundModel", "SegmentationSettings", "empty_image", "light_gain", "segment", "segment_views", "train_background"]
+__all__ = [
+    "BackgroundModel",
+    "SegmentationSettings",
+    "empty_image",
+    "light_gain",
+    "segment",
+    "segment_views",
+    "shades_of",
+    "train_background",
+]
 
 #: Gaussians a pixel. OpenCV's five take 100 bytes a pixel and camera; an indoor scene needs no more than three (Stauffer and
 #: Grimson 1999 take three to five).
@@ -61,65 +72,8 @@ OVEREXPOSED = 250
 SWITCH_RATE = 0.5
 SETTLING_RATE = 0.2
 SETTLING_FRAMES = 10
-
-
-@dataclass(frozen=True)
-class SegmentationSettings:
-    """Parameters of the segmentation. Sizes in pixels are for 640 x 480 and scale with the image.
-
-    "Measured" means: overlap of masks and strict hulls with the true ones, on four rendered recordings of people in easy and in hard
-    clothes (pale before pale walls, grey on a grey floor).
-
-    Attributes
-    ----------
-    variance_threshold : float
-        Squared distance to a mixture's Gaussian, in variances, beyond which a pixel is foreground. OpenCV's default is 16;
-        9 loses fewer pale limbs (measured).
-    shadow_factor : float
-        A pixel is shadow where it is the background, darkened to no less than this share. OpenCV's default is .5; .6 keeps more dark
-        clothes (measured).
-    gap_threshold, gap_shadow_factor : float
-        Standard deviations, and shadow factor, of the weaker evidence that fills gaps and bays of what the mixture found (measured).
-    grey_shadow_factor, grey_gap_shadow_factor : float
-        Shadow factors for images without color. There a shadow looks like anything darker: most shadows are lighter than .7, and
-        with the factors for color a third of the people goes with them (measured).
-    reach_threshold : float
-        Standard deviations of the evidence that lets a silhouette grow outwards a little (measured).
-    halo_share : float
-        A pixel of the outline stays where its contrast is at least this share of the person's beside it; 0 cuts nothing (measured).
-    least_blob_px : int
-        Pieces in which the mixture found fewer pixels are specks.
-    learning_rate, learn_every : float, int
-        Share of a new image in the background each time it learns, and frames from one time to the next. At 30 frames a second the
-        defaults follow the light with a time constant of 7 s.
-    keep_out_px : int
-        Nothing is learnt this near to a person, nor in shadows.
-    max_foreground : float
-        Share of the image beyond which the foreground cannot be people: a light was switched.
-    """
-
-    variance_threshold: float = 9.0
-    shadow_factor: float = 0.6
-    gap_threshold: float = 4.0
-    gap_shadow_factor: float = 0.7
-    grey_shadow_factor: float = 0.7
-    grey_gap_shadow_factor: float = 0.85
-    reach_threshold: float = 5.0
-    halo_share: float = 0.4
-    least_blob_px: int = 40
-    learning_rate: float = 0.05
-    learn_every: int = 10
-    keep_out_px: int = 12
-    max_foreground: float = 0.5
-
-    def __post_init__(self) -> None:
-        factors = ("shadow_factor", "gap_shadow_factor", "grey_shadow_factor", "grey_gap_shadow_factor")
-        for name in (*factors, "halo_share", "learning_rate", "max_foreground"):
-            if not 0 <= getattr(self, name) <= 1:
-                raise InputError(f"segmentation: `{name}` must lie between 0 and 1; got {getattr(self, name)}")
-        for name in ("variance_threshold", "gap_threshold", "reach_threshold", "learn_every"):
-            if not getattr(self, name) > 0:
-                raise InputError(f"segmentation: `{name}` must be positive; got {getattr(self, name)}")
+#: From this chance on a pixel that may be a shadow needs no other camera's word (`BackgroundModel.filled`).
+SURE_CHANCE = 0.6
 
 
 @dataclass(frozen=True)
@@ -154,6 +108,8 @@ class BackgroundModel:
         Images are smoothed first by a Gaussian of this side, pixels, since this camera is noisy; 0: they are not.
     grey : bool
         The empty scene has no color: images without any may come from a monochrome camera.
+    floor : ndarray of bool, shape (height, width), or None
+        Which pixels look at the floor of the room, where that is known (`hmc.camera.shade.floor_pixels`).
     changes : int
         How often the mean has changed.
     """
@@ -170,11 +126,15 @@ class BackgroundModel:
     unseen: np.ndarray | None = None
     blur: int = 0
     grey: bool = False
+    floor: np.ndarray | None = None
     changes: int = 0
 
 
 def train_background(
-    frames: Iterable[np.ndarray], settings: SegmentationSettings | None = None, unseen: np.ndarray | None = None
+    frames: Iterable[np.ndarray],
+    settings: SegmentationSettings | None = None,
+    unseen: np.ndarray | None = None,
+    floor: np.ndarray | None = None,
 ) -> BackgroundModel:
     """Learn the empty scene.
 
@@ -185,6 +145,8 @@ def train_background(
     settings : SegmentationSettings, optional
     unseen : ndarray of bool, shape (height, width), optional
         Where a person stood in all frames.
+    floor : ndarray of bool, shape (height, width), optional
+        Which pixels look at the floor (`hmc.camera.shade.floor_pixels`).
 
     Returns
     -------
@@ -224,15 +186,24 @@ def train_background(
         variance = cv2.blur(square / (count - 1), (9, 9))
         variance = np.stack([variance[..., 0], variance[..., 1:].mean(axis=2)], axis=-1)
         deviation = np.sqrt(variance)
-        floor = noise_floor(deviation)
-        deviation = np.maximum(np.maximum(deviation, floor.deviation), np.array(LEAST_DEVIATION, np.float32))
-        mixture.setVarMin(floor.variance)
-        mixture.setVarMax(max(MOST_VARIANCE, VARIANCE_RANGE * floor.variance))
+        noise = noise_floor(deviation)
+        deviation = np.maximum(np.maximum(deviation, noise.deviation), np.array(LEAST_DEVIATION, np.float32))
+        mixture.setVarMin(noise.variance)
+        mixture.setVarMax(max(MOST_VARIANCE, VARIANCE_RANGE * noise.variance))
         mixture.apply(_as_image(mean), learningRate=0)  # raises the variances that are smaller, and changes nothing else
     mean[..., 0] = np.maximum(mean[..., 0], 1)
     people = np.zeros(mean.shape[:2], bool)
     grey = is_grey(_as_image(mean))
-    return BackgroundModel(mixture, in_planes(mean), in_planes(deviation), people, unseen=unseen, blur=blur, grey=grey)
+    return BackgroundModel(mixture, in_planes(mean), in_planes(deviation), people, unseen=unseen, blur=blur, grey=grey, floor=floor)
+
+
+def shades_of(model: BackgroundModel, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The pixels of an image that may be shadows or people, flat, and what tells of each (`hmc.camera.shade.shade_features`)."""
+    _, found = _apply(model, image)
+    seeds = cv2.morphologyEx(found, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+    seen = evidence(image, model.mean, model.deviation)
+    scale = max(image.shape[:2]) / 640
+    return shade_features(image, model.mean, model.deviation, seen, seeds, scale, model.floor)
 
 
 def segment(
@@ -409,8 +380,21 @@ def _complete(
         sure=SURE,
     )
     part = cut_halo(fill_gaps(seeds, seen, rules, scale * zoom), seen, settings.halo_share, scale * zoom)
+    dark = filled_for_darkness(part, seeds, seen, rules)
+    # The network has learnt from sharp images in color of 640 x 480.
+    if settings.least_chance > 0 and zoom == 1 and not model.blur and not model.grey:
+        floor = None if model.floor is None else model.floor[rows, columns]
+        deviation = model.deviation[rows, columns]
+        pixels, features = shade_features(image[rows, columns], mean, deviation, seen, seeds, scale, floor)
+        shade, chance = np.zeros((2, *part.shape), np.float32)
+        shade.ravel()[pixels], chance.ravel()[pixels] = 1, person_chance(default_net(), features)
+        chance = cv2.GaussianBlur(chance, (5, 5), 0) / np.maximum(cv2.GaussianBlur(shade, (5, 5), 0), 0.2)
+        part = np.where(shade > 0, (chance > settings.least_chance).view(np.uint8), part)
+        part = without_specks(cv2.morphologyEx(part, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)), seeds, seen, rules, scale)
+        part = cut_halo(part, seen, settings.halo_share, scale)
+        dark = part & ((shade > 0) & (chance < SURE_CHANCE)).view(np.uint8)
     mask[rows, columns] = _reduced_mask(part, zoom)
-    filled[rows, columns] = mask[rows, columns] & _reduced_mask(filled_for_darkness(part, seeds, seen, rules), zoom)
+    filled[rows, columns] = mask[rows, columns] & _reduced_mask(dark, zoom)
     doubtful[rows, columns] |= _reduced_mask(((seen.chroma2 > DOUBT**2) | (np.abs(seen.luma) > DOUBT)).view(np.uint8), zoom)
     return mask, filled, cv2.morphologyEx(doubtful, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
 

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-__all__ = ["Evidence", "GapRules", "cut_halo", "evidence", "fill_gaps", "filled_for_darkness", "in_planes"]
+__all__ = ["Evidence", "GapRules", "cut_halo", "evidence", "fill_gaps", "filled_for_darkness", "in_planes", "without_specks"]
 
 
 @dataclass(frozen=True)
@@ -142,6 +142,22 @@ def fill_gaps(seeds: np.ndarray, seen: Evidence, rules: GapRules, scale: float) 
     differs = ((seen.chroma2 > CUT_THRESHOLD**2) | (seen.luma > CUT_THRESHOLD)).view(np.uint8)
     cuts = cv2.bitwise_and(cv2.morphologyEx(mask, cv2.MORPH_CLOSE, _disc(CLOSE_PX, scale)), differs)
     mask = cv2.bitwise_or(mask, cuts)
+    return without_specks(mask, seeds, seen, rules, scale)
+
+
+def without_specks(mask: np.ndarray, seeds: np.ndarray, seen: Evidence, rules: GapRules, scale: float) -> np.ndarray:
+    """A mask with its slits closed, of those pieces that hold `rules.least` pixels of the seeds.
+
+    Parameters
+    ----------
+    mask, seeds : ndarray of uint8, shape (height, width)
+    seen, rules, scale
+        As for `fill_gaps`.
+
+    Returns
+    -------
+    ndarray of uint8, shape (height, width)
+    """
     mask = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, _disc(SLIT_PX, scale))
     n, labels = cv2.connectedComponents(mask, connectivity=8)
     told = np.flatnonzero(seeds.view(bool))

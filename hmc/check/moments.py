@@ -8,6 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from hmc.camera.segmentation import BackgroundModel, segment, train_background
+from hmc.camera.shade import floor_pixels
 from hmc.io.recording import Frame, Recording, background_frames, iterate_frames
 
 __all__ = ["Masks", "learn_background", "moments", "probe_masks"]
@@ -68,7 +69,8 @@ def moments(recording: Recording, n: int) -> list[Masks]:
 def learn_background(recording: Recording, index: int, frames: Sequence[Frame]) -> BackgroundModel | None:
     """The empty scene of one camera: of its own frames, or else the median of some of the recording's, if there are three or more."""
     if recording.n_background_frames[index]:
-        return train_background(background_frames(recording, index, LEARNT_FRAMES))
+        floor = floor_pixels(recording.rig.cameras[index], recording.room)
+        return train_background(background_frames(recording, index, LEARNT_FRAMES), floor=floor)
     images = [image for frame in frames if (image := frame.images[index]) is not None]
     if len(images) < 3:
         return None

@@ -12,6 +12,7 @@ import numpy as np
 from hmc.camera.coverage import estimate_room
 from hmc.camera.model import Rig
 from hmc.camera.segmentation import train_background
+from hmc.camera.shade import floor_pixels
 from hmc.errors import InputError
 from hmc.io.recording import Recording, for_voxels
 from hmc.pose.method import Capture, PoseMethod
@@ -184,5 +185,5 @@ def begin_session(settings: SessionSettings, background: Background) -> SessionS
     models = []
     for camera, images, factor in zip(rig, background, settings.scene.factors, strict=True):
         seen = background_images(camera, images, settings.frontend.background_frames, factor)
-        models.append(train_background(seen, settings.frontend.segmentation))
+        models.append(train_background(seen, settings.frontend.segmentation, floor=floor_pixels(camera, settings.scene.room)))
     return SessionState(tuple(models), init(settings.scene.fps, settings.scene.persons))

@@ -19,6 +19,7 @@ from hmc.camera.empty_scene import add_bodies, cut_samples, replace_people, scen
 from hmc.camera.model import Rig
 from hmc.camera.people_cut import PeopleColors, View, cut_people, disc
 from hmc.camera.segmentation import BackgroundModel, SegmentationSettings, train_background
+from hmc.camera.shade import floor_pixels
 from hmc.camera.standing import Standing
 from hmc.errors import InputError
 from hmc.io.recording import Recording, iterate_frames, whole_recording
@@ -109,7 +110,7 @@ def learn_from_people(
     for i, c in enumerate(cameras):
         # Each image is let go once it is learnt from: large ones and the growing models would not fit side by side.
         images = (replace_people(image, scenes[i].image) for image in _take(samples, i) if image is not None)
-        models[c] = train_background(images, settings, scenes[i].unseen)
+        models[c] = train_background(images, settings, scenes[i].unseen, floor_pixels(recording.rig.cameras[c], recording.room))
     unseen = tuple(scene.unseen for scene in scenes)
     small_unseen = tuple(_resize(mask, camera.size) for mask, camera in zip(unseen, rig, strict=True))
     colors = tuple(scene.colors for scene in scenes)

@@ -15,6 +15,7 @@ from typing import TypeVar
 import numpy as np
 
 from hmc.camera.segmentation import BackgroundModel, SegmentationSettings, segment_views, train_background
+from hmc.camera.shade import floor_pixels
 from hmc.io.recording import Frame, Recording, background_frames, iterate_frames, only_cameras
 from hmc.processes import arrays_ahead
 from hmc.voxels.floor_shadows import Scene
@@ -191,7 +192,9 @@ def _look(
     lines: list[str] = []
     known = dict(models)
     for c in sorted(background):
-        known[c] = train_background(background_frames(recording, c, settings.background_frames), settings.segmentation)
+        empty = background_frames(recording, c, settings.background_frames)
+        floor = floor_pixels(recording.rig.cameras[c], recording.room)
+        known[c] = train_background(empty, settings.segmentation, floor=floor)
     with ExitStack() as stack:
         frames: Iterable = iterate_frames(recording, first, last, lines.append)
         if pool is not None:

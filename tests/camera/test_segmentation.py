@@ -10,6 +10,7 @@ import pytest
 
 from hmc.camera.background import stable_background
 from hmc.camera.segmentation import SegmentationSettings, light_gain, segment, segment_views, train_background
+from hmc.camera.shade import floor_pixels
 from hmc.camera.silhouettes import cut_halo, evidence
 from hmc.errors import InputError
 from hmc.io.recording import background_frames, iterate_frames, open_recording
@@ -307,7 +308,7 @@ def test_bad_input():
 def test_true_silhouettes_of_rendered_recordings(shared_data, name, camera, least_overlap, least_recall):
     """Another program's renderings, video compression included: the first 61 frames in order, as in a run."""
     recording = open_recording(shared_data / "rendered" / name, cameras=[f"cam_{camera:02d}"], frames=61)
-    model = train_background(background_frames(recording, 0))
+    model = train_background(background_frames(recording, 0), floor=floor_pixels(recording.rig.cameras[0], recording.room))
     both = either = true = 0
     for frame in iterate_frames(recording):
         mask, model = segment(model, frame.images[0])
