@@ -123,7 +123,7 @@ def test_lines_of_sight_are_the_same_through_smaller_images(clip):
 def test_keypoints_go_with_images_that_are_made_smaller(clip, tmp_path, monkeypatch, halved_images):
     given = []
 
-    def learn(rig, tracks, source, fps):
+    def learn(rig, tracks, source, fps, workers=1):
         given.append((rig[0].size, source.factors))
         raise hmc.InputError("enough")
 
