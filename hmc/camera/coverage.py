@@ -1,4 +1,4 @@
-"""What a rig sees of the world: points in view, the point looked at, and a room where none is given."""
+"""What a rig sees of the world: points in view, the floor under pixels, the point looked at, and a room where none is given."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from hmc.camera.model import Camera, Rig, project
+from hmc.camera.model import Camera, Rig, project, undistort
 
-__all__ = ["estimate_room", "in_view", "inside_image", "point_looked_at"]
+__all__ = ["estimate_room", "floor_points", "in_view", "inside_image", "point_looked_at"]
 
 #: Height of an estimated room, metres: a tall person with raised arms.
 ROOM_HEIGHT_M = 2.4
@@ -45,6 +45,28 @@ def estimate_room(rig: Rig) -> np.ndarray:
     low, high = np.percentile(places, (2, 98), axis=0)
     middle, half = (low + high) / 2, np.maximum((high - low) / 2, 0.75)
     return np.array([[*(middle - half), 0.0], [*(middle + half), ROOM_HEIGHT_M]])
+
+
+def floor_points(camera: Camera, uv: np.ndarray, floor_z: float) -> np.ndarray:
+    """Where the rays of pixels meet the floor.
+
+    Parameters
+    ----------
+    camera : Camera
+    uv : ndarray, shape (..., 2)
+        Pixels, with distortion.
+    floor_z : float
+        Height of the floor, metres.
+
+    Returns
+    -------
+    ndarray, shape (..., 2)
+        x and y, world, metres; NaN where they do not.
+    """
+    rays = np.concatenate([undistort(camera, uv), np.ones((*uv.shape[:-1], 1))], axis=-1) @ camera.rotation
+    with np.errstate(divide="ignore", invalid="ignore"):
+        far = (floor_z - camera.centre[2]) / rays[..., 2]
+    return camera.centre[:2] + np.where(far > 0, far, np.nan)[..., None] * rays[..., :2]
 
 
 def in_view(camera: Camera, points: np.ndarray) -> np.ndarray:

@@ -21,7 +21,7 @@ import numpy as np
 from hmc.camera.image_signs import is_dark
 from hmc.camera.noise import blur_for, blurred, is_grey, noise_floor
 from hmc.camera.segmentation_settings import SegmentationSettings
-from hmc.camera.shade import default_net, person_chance, shade_features
+from hmc.camera.shade import shade_features, told_by_chance
 from hmc.camera.silhouettes import GapRules, cut_halo, evidence, fill_gaps, filled_for_darkness, in_planes, without_specks
 from hmc.errors import InputError
 
@@ -72,8 +72,6 @@ OVEREXPOSED = 250
 SWITCH_RATE = 0.5
 SETTLING_RATE = 0.2
 SETTLING_FRAMES = 10
-#: From this chance on a pixel that may be a shadow needs no other camera's word (`BackgroundModel.filled`).
-SURE_CHANCE = 0.6
 
 
 @dataclass(frozen=True)
@@ -380,19 +378,15 @@ def _complete(
         sure=SURE,
     )
     part = cut_halo(fill_gaps(seeds, seen, rules, scale * zoom), seen, settings.halo_share, scale * zoom)
-    dark = filled_for_darkness(part, seeds, seen, rules)
     # The network has learnt from sharp images in color of 640 x 480.
     if settings.least_chance > 0 and zoom == 1 and not model.blur and not model.grey:
         floor = None if model.floor is None else model.floor[rows, columns]
-        deviation = model.deviation[rows, columns]
-        pixels, features = shade_features(image[rows, columns], mean, deviation, seen, seeds, scale, floor)
-        shade, chance = np.zeros((2, *part.shape), np.float32)
-        shade.ravel()[pixels], chance.ravel()[pixels] = 1, person_chance(default_net(), features)
-        chance = cv2.GaussianBlur(chance, (5, 5), 0) / np.maximum(cv2.GaussianBlur(shade, (5, 5), 0), 0.2)
-        part = np.where(shade > 0, (chance > settings.least_chance).view(np.uint8), part)
-        part = without_specks(cv2.morphologyEx(part, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)), seeds, seen, rules, scale)
-        part = cut_halo(part, seen, settings.halo_share, scale)
-        dark = part & ((shade > 0) & (chance < SURE_CHANCE)).view(np.uint8)
+        shades = shade_features(image[rows, columns], mean, model.deviation[rows, columns], seen, seeds, scale, floor)
+        part, dark = told_by_chance(part, *shades, settings.least_chance)
+        part = cut_halo(without_specks(part, seeds, seen, rules, scale), seen, settings.halo_share, scale)
+        dark &= part
+    else:
+        dark = filled_for_darkness(part, seeds, seen, rules)
     mask[rows, columns] = _reduced_mask(part, zoom)
     filled[rows, columns] = mask[rows, columns] & _reduced_mask(dark, zoom)
     doubtful[rows, columns] |= _reduced_mask(((seen.chroma2 > DOUBT**2) | (np.abs(seen.luma) > DOUBT)).view(np.uint8), zoom)

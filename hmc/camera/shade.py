@@ -19,11 +19,22 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from hmc.camera.model import Camera, undistort
+from hmc.camera.coverage import floor_points
+from hmc.camera.model import Camera
 from hmc.camera.silhouettes import Evidence
 from hmc.errors import InputError
 
-__all__ = ["FEATURES", "ShadeNet", "default_net", "floor_pixels", "is_shade", "person_chance", "read_net", "shade_features"]
+__all__ = [
+    "FEATURES",
+    "ShadeNet",
+    "default_net",
+    "floor_pixels",
+    "is_shade",
+    "person_chance",
+    "read_net",
+    "shade_features",
+    "told_by_chance",
+]
 
 #: Per pixel: light that is lost (share), luma in deviations, chroma that a shadow would not have in deviations (distance, and along both
 #: axes), the empty scene's luma (share of 255), what a shadow's one gain leaves of the texture, and how much texture there is (logarithms
@@ -39,6 +50,8 @@ FEATURES = (
 LEAST_LUMA, LOST, MOST_CHROMA, REACH_PX = 4.0, (0.02, 0.65), 8.0, 60
 #: Surely a person: found by the mixture, and off by so many deviations in chroma or brighter, or darker than any shadow.
 SURE, DARKEST = 6.0, 0.45
+#: From this chance on a shade needs no other camera's word (`hmc.camera.segmentation.BackgroundModel.filled`).
+SURE_CHANCE = 0.6
 #: Where it is not known whether a pixel looks at the floor.
 FLOOR_UNKNOWN = 0.5
 #: The floor is looked up at every so manieth pixel, and so far beyond the room, metres.
@@ -81,10 +94,7 @@ def floor_pixels(camera: Camera, room: np.ndarray) -> np.ndarray:
     """
     width, height = camera.size
     uv = np.stack(np.meshgrid(np.arange(0, width, FLOOR_STEP), np.arange(0, height, FLOOR_STEP)), axis=-1).astype(float)
-    rays = np.concatenate([undistort(camera, uv), np.ones((*uv.shape[:2], 1))], axis=-1) @ camera.rotation
-    with np.errstate(divide="ignore", invalid="ignore"):
-        far = (room[0, 2] - camera.centre[2]) / rays[..., 2]
-    places = camera.centre[:2] + np.where(far > 0, far, np.nan)[..., None] * rays[..., :2]
+    places = floor_points(camera, uv, room[0, 2])
     inside = np.all((places > room[0, :2] - FLOOR_MARGIN_M) & (places < room[1, :2] + FLOOR_MARGIN_M), axis=-1)  # NaN compares as false
     return np.ascontiguousarray(inside.repeat(FLOOR_STEP, axis=0).repeat(FLOOR_STEP, axis=1)[:height, :width])
 
@@ -196,6 +206,32 @@ def person_chance(net: ShadeNet, features: np.ndarray) -> np.ndarray:
     """How likely each of some shades is a person: float32, shape (n,), from features of shape (n, 23)."""
     hidden = np.tanh(((features - net.middle) / net.spread) @ net.inner + net.inner_bias)
     return np.asarray(1 / (1 + np.exp(-(hidden @ net.outer + net.outer_bias))), np.float32)
+
+
+def told_by_chance(mask: np.ndarray, pixels: np.ndarray, features: np.ndarray, least: float) -> tuple[np.ndarray, np.ndarray]:
+    """A silhouette in which each shade is what its chance says, averaged over the shades around it.
+
+    Parameters
+    ----------
+    mask : ndarray of uint8, shape (height, width)
+    pixels, features
+        As `shade_features` returns them.
+    least : float
+        Chance from which on a shade is a person.
+
+    Returns
+    -------
+    mask : ndarray of uint8, shape (height, width)
+        Without specks and whiskers.
+    unsure : ndarray of uint8, shape (height, width)
+        Shades that may be shadows all the same.
+    """
+    shade, chance = np.zeros((2, *mask.shape), np.float32)
+    shade.ravel()[pixels], chance.ravel()[pixels] = 1, person_chance(default_net(), features)
+    chance = cv2.GaussianBlur(chance, (5, 5), 0) / np.maximum(cv2.GaussianBlur(shade, (5, 5), 0), 0.2)
+    told = np.where(shade > 0, (chance > least).view(np.uint8), mask)
+    unsure = ((shade > 0) & (chance < SURE_CHANCE)).view(np.uint8)
+    return cv2.morphologyEx(told, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)), unsure
 
 
 @functools.cache

@@ -47,11 +47,12 @@ _NO_GAPS = {"gap_threshold": 1e9, "reach_threshold": 1e9}
 #: What is left out, as changes of `SegmentationSettings` and of `FrontendSettings`.
 WITHOUT: dict[str, tuple[Mapping[str, Any], Mapping[str, Any]]] = {
     ALL: ({}, {}),
+    "chances of shades": ({"least_chance": 0.0}, {}),
     "filling of gaps": (_NO_GAPS, {}),
     "cutting of halos": ({"halo_share": 0.0}, {}),
     "completion by other cameras": ({}, {"complete": False}),
     "cutting of shadows": ({}, {"cut_shadows": False}),
-    "all of these": (_NO_GAPS | {"halo_share": 0.0}, {"complete": False, "cut_shadows": False}),
+    "all of these": (_NO_GAPS | {"halo_share": 0.0, "least_chance": 0.0}, {"complete": False, "cut_shadows": False}),
 }
 #: A repair may cost so much overlap on a recording, and is to add as much on so many.
 MOST_HARM, LEAST_GAIN, LEAST_CLIPS = 0.01, 0.01, 2

@@ -24,7 +24,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from hmc.camera.model import Camera, Rig, undistort
+from hmc.camera.coverage import floor_points
+from hmc.camera.model import Camera, Rig
 from hmc.voxels.carving import CarvingTables, carve, make_tables, pixel_of_voxel, pixels_at
 from hmc.voxels.grid import VoxelGrid
 
@@ -116,7 +117,8 @@ def make_completion_tables(room: np.ndarray, rig: Rig) -> CompletionTables:
         pixel_cells.append(np.full((height, width), nx * ny, np.int32))
         for top in range(0, height, BAND_PX):  # large images would need much memory at once
             band = slice(top, min(top + BAND_PX, height))
-            place = np.floor((_floor_points(camera, band, floor_z) - first) / CELL_M)
+            uv = np.stack(np.meshgrid(np.arange(width), np.arange(band.start, band.stop)), axis=-1).astype(float)
+            place = np.floor((floor_points(camera, uv, floor_z) - first) / CELL_M)
             inside = np.all((place >= 0) & (place < (nx, ny)), axis=-1)  # NaN compares as false
             pixel_cells[-1][band][inside] = place[inside] @ (ny, 1)
     voxel_size_m = max(VOXEL_M, float(np.prod(room[1] - room[0]) / MOST_VOXELS) ** (1 / 3))
@@ -318,15 +320,6 @@ def _join(
     out = mask.copy()
     out[box] |= cv2.morphologyEx(grown, cv2.MORPH_CLOSE, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (5, 5)))
     return out, cv2.countNonZero(sure) / max(1, cv2.countNonZero(old))
-
-
-def _floor_points(camera: Camera, rows: slice, floor_z: float) -> np.ndarray:
-    """Where the rays of some rows' pixels meet the floor, (n_rows, width, 2), world, metres; NaN where they do not."""
-    uv = np.stack(np.meshgrid(np.arange(camera.size[0]), np.arange(rows.start, rows.stop)), axis=-1).astype(float)
-    rays = np.concatenate([undistort(camera, uv), np.ones((*uv.shape[:2], 1))], axis=-1) @ camera.rotation
-    with np.errstate(divide="ignore", invalid="ignore"):
-        far = (floor_z - camera.centre[2]) / rays[..., 2]
-    return camera.centre[:2] + np.where(far > 0, far, np.nan)[..., None] * rays[..., :2]
 
 
 def _square(reach: float) -> np.ndarray:
