@@ -56,8 +56,8 @@ AROUND = 3
 LEAST_HIDDEN = 5
 #: ... and these are more than this share of them and of those that were shown farther off.
 HIDDEN_SHARE = 0.8
-#: What hides a body stands somewhere before it. So far before, at most, the view counts as blocked, metres, and not where a body was shown.
-BEFORE_M = 0.3
+#: Of the cameras that see a hidden place one may deny it, as of the tolerant hull, where so many show it.
+LEAST_SHOWN = 2
 
 
 @dataclass(frozen=True)
@@ -221,10 +221,11 @@ def blocked_from(sightings: Sightings) -> BlockedView:
     farther[..., :-1] = np.cumsum(shown[..., :0:-1], axis=-1)[..., ::-1]
     blocked = (nearer >= LEAST_HIDDEN) & (nearer > HIDDEN_SHARE * (nearer + farther))
     first = blocked.argmax(axis=-1)
+    # What hides a body stands somewhere before it, and behind what the patch itself has shown: what those around it show, they may show
+    # past the edge of a table. In between a camera that shows nothing says nothing.
     n_steps = shown.shape[-1]
-    free_to = np.where(shown.any(axis=-1), n_steps - (shown[..., ::-1] > 0).argmax(axis=-1), 0)
-    first = np.minimum(first, np.maximum(first - round(BEFORE_M / STEP_M), free_to))
-    return BlockedView(sightings.side, np.where(blocked.any(axis=-1), first * STEP_M, np.inf))
+    free_to = np.where(sightings.shown.any(axis=-1), n_steps - (sightings.shown[..., ::-1] > 0).argmax(axis=-1), 0)
+    return BlockedView(sightings.side, np.where(blocked.any(axis=-1), np.minimum(first, free_to) * STEP_M, np.inf))
 
 
 def _with_around(counts: np.ndarray) -> np.ndarray:
@@ -281,7 +282,7 @@ def _hidden_from(camera: Camera, blocked: BlockedView, points: np.ndarray) -> tu
 
 
 def unseen_voxels(places: HiddenPlaces, masks: Sequence[np.ndarray | None]) -> np.ndarray:
-    """The hidden voxels in which somebody may be: a camera or several show people there, and those that do not do not see the place.
+    """The hidden voxels in which somebody may be, by the cameras that see the place: all of them show people there, or all but one.
 
     Parameters
     ----------
@@ -293,10 +294,10 @@ def unseen_voxels(places: HiddenPlaces, masks: Sequence[np.ndarray | None]) -> n
     -------
     ndarray of int32, shape (m, 3)
     """
-    may_be, shown = np.ones(len(places.voxels), bool), np.zeros(len(places.voxels), bool)
+    shown, denied = np.zeros((2, len(places.voxels)), np.uint8)
     for mask, pixels in zip(masks, places.pixels, strict=True):
         if mask is not None:
-            there = mask.ravel()[np.maximum(pixels, 0)]
-            may_be &= there | (pixels < 0)
-            shown |= there & (pixels >= 0)
-    return places.voxels[may_be & shown]
+            there, seen = mask.ravel()[np.maximum(pixels, 0)], pixels >= 0
+            shown += there & seen
+            denied += ~there & seen
+    return places.voxels[((denied == 0) & (shown > 0)) | ((denied == 1) & (shown >= LEAST_SHOWN))]

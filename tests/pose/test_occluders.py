@@ -18,6 +18,7 @@ from hmc.io.masks import MaskStep, keep_masks
 from hmc.io.results import PoseStates
 from hmc.pose.backward import with_own_rays
 from hmc.pose.occluders import (
+    HiddenPlaces,
     Sightings,
     blocked_from,
     learn_hidden_places,
@@ -114,6 +115,40 @@ def test_a_view_is_free_as_far_as_bodies_are_shown_again_and_again(seed):
     assert (depth >= to * 0.1 - 1e-9).all()
     assert np.isinf(blocked_from(Sightings(4, shown, np.zeros_like(hidden))).depth).all()
     assert (blocked_from(Sightings(4, np.zeros_like(shown), hidden)).depth <= depth).all()
+
+
+def test_a_patch_that_shows_nobody_tells_nothing_before_what_it_hides():
+    """A table hides legs a metre behind it: a hand before the legs is behind the table too, though trunks show right above its edge."""
+    shown, hidden = np.zeros((2, 20, 20, 40), np.uint16)
+    hidden[10:, :, 30] = 3
+    shown[:10, :, 30] = 3
+    depth = blocked_from(Sightings(4, shown, hidden)).depth
+    assert np.isinf(depth[:10]).sum() >= 7 * 20
+    assert (depth[11:] == 0).all()
+    # What the patch itself has shown is before whatever hides the rest.
+    shown[15, 10, 18] = 1
+    assert blocked_from(Sightings(4, shown, hidden)).depth[15, 10] == pytest.approx(1.9)
+
+
+@pytest.mark.parametrize(
+    ("shows", "counts"),
+    [
+        ((1, 1), True),
+        ((1, 0), False),
+        ((0, 0), False),
+        ((1, 1, 0), True),
+        ((1, 0, 0), False),
+        ((1, 1, 0, 0), False),
+        ((1,), True),
+        ((), False),
+    ],
+)
+def test_one_camera_that_sees_a_hidden_place_may_deny_it(shows, counts):
+    """As of the tolerant hull, of the cameras that see: a hand before wood of its color is missing in one of them."""
+    places = HiddenPlaces(np.array([[1, 2, 3]], np.int32), np.array([[-1], *([0] for _ in shows)], np.int32))
+    masks = [np.zeros((2, 2), bool), *(np.full((2, 2), bool(one)) for one in shows)]
+    assert len(unseen_voxels(places, masks)) == counts
+    assert len(unseen_voxels(places, [np.ones((2, 2), bool), *masks[1:]])) == counts  # the first one does not see it, whatever it shows
 
 
 def test_a_body_may_be_where_nothing_is_known():
