@@ -89,6 +89,9 @@ def make_parser(prog: str = "python -m hmc.experiments") -> argparse.ArgumentPar
         action.add_argument(
             "--set", action="append", default=[], metavar="KEY=VALUE", help="a parameter that all cells are to have, as layers=6"
         )
+        action.add_argument(
+            "--keep", action="append", default=[], metavar="KEY=VALUE", help="of the grid the cells with this value, or one of [A, B]"
+        )
     dataset = actions.add_parser("humaneva", help="make recordings of a copy of HumanEva-I")
     dataset.add_argument("root", type=Path, metavar="FOLDER", help="the dataset, with S1, S2 and so on in it, or one of these")
     dataset.add_argument("--out", type=Path, default=Path("recordings"), metavar="DIR", help="where the recordings go")
@@ -230,7 +233,8 @@ def _left(done: list[Cell], total: int) -> str:
 def _plan(args: argparse.Namespace) -> Plan:
     """The plan that the options ask for."""
     frames, cameras = (None if value is None else (name, value) for name, value in (("frames", args.frames), ("cameras", args.cameras)))
-    return changed_plan(plan_of(args.quick, args.recordings), args.seeds, args.actions, (frames, cameras, *read_settings(args.set)))
+    plan = plan_of(args.quick, args.recordings)
+    return changed_plan(plan, args.seeds, args.actions, (frames, cameras, *read_settings(args.set)), read_settings(args.keep))
 
 
 def _cells(n: int) -> str:

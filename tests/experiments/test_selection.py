@@ -62,6 +62,15 @@ def test_cells_that_are_stored_under_one_name_are_one():
     assert len(grid_of(one, changed_plan(Plan(), settings=(("layers", 4),)))) == 1
 
 
+def test_cells_with_some_values_alone_are_a_part_of_the_grid():
+    kept = grid_of(TOY, changed_plan(Plan(), kept=(("layers", 2), ("repeat", [0, 1]))))
+    assert kept == [cell for cell in TOY.grid(Plan()) if cell["layers"] == 2]
+    beside = Experiment(
+        "beside", "", "", lambda plan: [{"layers": 1}, {"layers": 2}, {"method": "a"}], lambda *given: {}, lambda *given: None
+    )
+    assert grid_of(beside, changed_plan(Plan(), kept=(("layers", [2]),))) == [{"layers": 2}, {"method": "a"}]
+
+
 def test_actions_are_whole_words():
     assert {cell["recording"] for cell in grid_of(TOY, changed_plan(Plan(), actions=("walk",)))} == {"walk_man@12", "walk_woman@12"}
     assert {cell["recording"] for cell in grid_of(TOY, changed_plan(Plan(), actions=("box", "walker")))} == {"box_man@12", "walker@12"}
@@ -77,6 +86,8 @@ def test_values_are_toml_or_words():
     ("changes", "message"),
     [
         ({"settings": (("particle", 9),)}, "toy has no parameter 'particle'; its cells have recording, layers"),
+        ({"kept": (("particle", 9),)}, "toy has no parameter 'particle'; its cells have recording, layers"),
+        ({"kept": (("layers", [1, 3]),)}, "toy has no cell with layers = 3; there are 1, 2"),
         ({"actions": ("jog",)}, "no recording of the action 'jog'; there are walk_man"),
     ],
 )

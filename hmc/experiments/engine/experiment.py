@@ -57,6 +57,8 @@ class Plan:
         Of the rendered recordings those of these actions alone; empty: all.
     settings : tuple of (str, value)
         Parameters that all cells have otherwise, as ``("frames", 60)``.
+    kept : tuple of (str, value)
+        Of the grid the cells that have this value, or one of a list of values, as ``("layers", [1, 3])``.
     """
 
     quick: bool = False
@@ -64,11 +66,12 @@ class Plan:
     seeds: int | None = None
     actions: tuple[str, ...] = ()
     settings: tuple[tuple[str, Any], ...] = ()
+    kept: tuple[tuple[str, Any], ...] = ()
 
     @property
     def changed(self) -> bool:
-        """Whether other seeds, actions or parameters are asked for than the experiment has by itself."""
-        return self.seeds is not None or bool(self.actions or self.settings)
+        """Whether other seeds, actions, parameters or fewer cells are asked for than the experiment has by itself."""
+        return self.seeds is not None or bool(self.actions or self.settings or self.kept)
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ def read_settings(pairs: Iterable[str]) -> tuple[tuple[str, Any], ...]:
     for pair in pairs:
         name, equal, text = pair.partition("=")
         if not (name.strip() and equal and text.strip()):
-            raise InputError(f"--set {pair}: write a parameter and its value, as layers=6")
+            raise InputError(f"{pair}: write a parameter and its value, as layers=6")
         try:
             value = tomllib.loads(f"value = {text}")["value"]
         except tomllib.TOMLDecodeError:
@@ -39,10 +39,15 @@ def read_settings(pairs: Iterable[str]) -> tuple[tuple[str, Any], ...]:
 
 
 def changed_plan(
-    plan: Plan, seeds: int | None = None, actions: Sequence[str] = (), settings: Iterable[tuple[str, Any] | None] = ()
+    plan: Plan,
+    seeds: int | None = None,
+    actions: Sequence[str] = (),
+    settings: Iterable[tuple[str, Any] | None] = (),
+    kept: Iterable[tuple[str, Any]] = (),
 ) -> Plan:
-    """A plan with other seeds, actions and parameters; what is None is left as the experiment has it."""
-    return replace(plan, seeds=seeds, actions=tuple(actions), settings=tuple(pair for pair in settings if pair is not None))
+    """A plan with other seeds, actions and parameters, or fewer cells; what is None is left as the experiment has it."""
+    others = tuple(pair for pair in settings if pair is not None)
+    return replace(plan, seeds=seeds, actions=tuple(actions), settings=others, kept=tuple(kept))
 
 
 def grid_of(experiment: Experiment, plan: Plan) -> list[dict[str, Any]]:
@@ -56,16 +61,15 @@ def grid_of(experiment: Experiment, plan: Plan) -> list[dict[str, Any]]:
     Raises
     ------
     InputError
-        When the experiment has no such parameter, no cell with such an action, or no seeds.
+        When the experiment has no such parameter or value, no cell with such an action, or no seeds.
     """
     grid = experiment.grid(plan)
     if plan.actions:
         grid = _of_actions(experiment, grid, plan.actions)
+    for name, values in plan.kept:
+        grid = _of_values(experiment, grid, name, values if isinstance(values, list) else [values])
     for name, value in plan.settings:
-        if not any(name in cell for cell in grid):
-            raise InputError(
-                f"{experiment.id} has no parameter {name!r}; its cells have {', '.join(dict.fromkeys(k for c in grid for k in c))}"
-            )
+        _values_of(experiment, grid, name)
         grid = _once(cell | {name: value} if name in cell else cell for cell in grid)
     if plan.seeds is not None:
         if not any(REPEAT in cell for cell in grid):
@@ -87,6 +91,25 @@ def _with_seeds(grid: list[dict[str, Any]], n: int) -> list[dict[str, Any]]:
         for cell in grid
         for one in ([cell | {REPEAT: seed} for seed in seeds[digest(cell | {REPEAT: 0})][:n]] if REPEAT in cell else [cell])
     )
+
+
+def _values_of(experiment: Experiment, grid: list[dict[str, Any]], name: str) -> list[Any]:
+    """The values that cells have of a parameter, which some must have."""
+    values = [cell[name] for cell in grid if name in cell]
+    if not values:
+        raise InputError(
+            f"{experiment.id} has no parameter {name!r}; its cells have {', '.join(dict.fromkeys(k for c in grid for k in c))}"
+        )
+    return values
+
+
+def _of_values(experiment: Experiment, grid: list[dict[str, Any]], name: str, values: list[Any]) -> list[dict[str, Any]]:
+    """The cells that have one of the values, each of which there must be; those without the parameter stay."""
+    own = _values_of(experiment, grid, name)
+    for value in values:
+        if value not in own:
+            raise InputError(f"{experiment.id} has no cell with {name} = {value!r}; there are {', '.join(dict.fromkeys(map(str, own)))}")
+    return [cell for cell in grid if name not in cell or cell[name] in values]
 
 
 def _of_actions(experiment: Experiment, grid: list[dict[str, Any]], actions: Sequence[str]) -> list[dict[str, Any]]:

@@ -91,9 +91,9 @@ def _axes(grid: Sequence[Mapping[str, Any]]) -> dict[str, list]:
 
 def _changes(experiment: Experiment, plan: Plan, keys: Iterable[str]) -> dict[str, Any]:
     """What was asked for otherwise than the experiment has it, and how much of its own grid that is."""
-    own = {cell_key(experiment, cell) for cell in experiment.grid(replace(plan, seeds=None, actions=(), settings=()))}
+    own = {cell_key(experiment, cell) for cell in experiment.grid(replace(plan, seeds=None, actions=(), settings=(), kept=()))}
     asked = ({"seeds": plan.seeds} if plan.seeds else {}) | ({"actions": list(plan.actions)} if plan.actions else {})
-    return {"asked": asked | dict(plan.settings), "own_cells": len(own), "of_own": len(own.intersection(keys))}
+    return {"asked": asked | dict(plan.kept) | dict(plan.settings), "own_cells": len(own), "of_own": len(own.intersection(keys))}
 
 
 def to_latex(table: Table) -> str:
