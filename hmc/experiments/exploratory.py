@@ -23,7 +23,7 @@ from hmc.synthetic.recipe import ActorRecipe
 from hmc.synthetic.scene import build_scene
 from hmc.synthetic.skeleton import landmark_positions
 
-__all__ = ["action_drift", "largest_variation", "measured_truth"]
+__all__ = ["action_drift", "largest_variation", "measured_truth", "turned"]
 
 #: Who shows the action for the exploratory part, for how long, and from which of the scene's random numbers.
 THIRD = ActorRecipe(height_m=1.73, build="average", sex="woman")
@@ -83,8 +83,7 @@ def largest_variation(body: BodyModel, positions: np.ndarray) -> np.ndarray:
     for one in positions:
         state, _ = fit_landmarks(body, one, state)
         states.append(state)
-    change = np.diff(states, axis=0)
-    change[:, 3:] = (change[:, 3:] + np.pi) % (2 * np.pi) - np.pi
+    change = turned(np.diff(states, axis=0))
     return 0.5 * np.maximum(np.quantile(np.abs(change), USUAL_SHARE, axis=0), LEAST_VARIATION)
 
 
@@ -101,3 +100,8 @@ def _third_person(action: str, fps: float) -> np.ndarray:
     motion = scene.motions[0]
     positions = landmark_positions(scene.actors[0].skeleton, motion.root, motion.orientations)
     return largest_variation(canton_body(THIRD.height_m), positions)
+
+
+def turned(change: np.ndarray) -> np.ndarray:
+    """Changes of states, shape (..., 37), with their angles the short way round."""
+    return np.concatenate([change[..., :3], (change[..., 3:] + np.pi) % (2 * np.pi) - np.pi], axis=-1)

@@ -44,11 +44,11 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
     parameters : mapping
         ``recording``, ``frames`` (0: all), ``start`` (``found`` from the markers, or ``true``), ``detection_rate``, ``false_positives``,
         ``variance_px2``, ``preset``, ``reprojection`` (share of that score; 0 is the thesis's likelihood), ``layers``, ``particles``,
-        ``repeat``.
+        ``repeat``; and, where they differ from the preset's, ``drift_scale`` and ``spread``.
     inputs : Inputs
     rng : numpy.random.Generator
     """
-    recording = as_detected(inputs.recording(parameters["recording"]))
+    recording = as_detected(inputs.unseen_recording(parameters["recording"]))
     truth = measured_truth(recording, parameters["recording"])
     if parameters["frames"]:
         truth = truth.where(truth.frames < truth.frames[0] + parameters["frames"])
@@ -89,8 +89,10 @@ def _from_the_truth(
 
 def _preset(parameters: Parameters) -> MarkerPreset:
     preset = MARKER_PRESETS[parameters["preset"]]
+    annealed, chosen = preset.annealed, {name: parameters[name] for name in ("layers", "particles")}
     return replace(
         preset,
         likelihood=replace(preset.likelihood, reprojection=parameters["reprojection"]),
-        annealed=replace(preset.annealed, layers=parameters["layers"], particles=parameters["particles"]),
+        annealed=replace(annealed, spread=parameters.get("spread", annealed.spread), **chosen),
+        drift_scale=parameters.get("drift_scale", preset.drift_scale),
     )

@@ -19,7 +19,7 @@ from hmc.experiments.engine.style import COLORS
 from hmc.experiments.five_actions import action_title
 from hmc.experiments.pose_intervals import score_interval
 
-__all__ = ["BAR_COLORS", "action_bars", "draw_lines", "draw_maps", "runs_of", "score_table", "table_of"]
+__all__ = ["BAR_COLORS", "action_bars", "change_of", "draw_lines", "draw_maps", "runs_of", "score_table", "table_of"]
 
 BAR_COLORS = (COLORS["particle"], COLORS["sparse"], COLORS["person"], COLORS["other"], COLORS["naive"])
 
@@ -28,6 +28,12 @@ def runs_of(cells: Sequence[Cell]) -> pd.DataFrame:
     """A row a run: its parameters, its ``action`` as the thesis calls it, and under ``run`` the cell."""
     frame = pd.DataFrame([dict(one.parameters) for one in cells])
     return frame.assign(action=[action_title(one.parameters["recording"]) for one in cells], run=list(cells))
+
+
+def change_of(one: Cell, changes: Mapping[str, Mapping[str, Any]]) -> str:
+    """The most specific of some changes, by name, that a cell has: the one of the most parameters among those whose values are all its."""
+    fitting = [name for name, changed in changes.items() if all(one.parameters.get(key) == value for key, value in changed.items())]
+    return max(fitting, key=lambda name: len(changes[name]))
 
 
 def score_table(runs: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:

@@ -14,7 +14,7 @@ import matplotlib.pyplot as plt
 from hmc.experiments import filter_study as runs
 from hmc.experiments.engine.experiment import Cell, Experiment, Plan, Report
 from hmc.experiments.pose_intervals import ahead
-from hmc.experiments.study import runs_of, score_table, table_of
+from hmc.experiments.study import change_of, runs_of, score_table, table_of
 
 __all__ = ["CHANGES", "EXPERIMENT"]
 
@@ -45,7 +45,7 @@ def grid(plan: Plan) -> list[dict]:
 def report(cells: Sequence[Cell], plan: Plan) -> Report:
     """MMTA by action and change; of who walks and jogs, what each change adds."""
     frame = runs_of(cells)
-    frame["change"] = [_change(one) for one in cells]
+    frame["change"] = [change_of(one, CHANGES) for one in cells]
     table = score_table(frame, ("action", "change"))
     figure, axes = plt.subplots(figsize=(7.5, 0.34 * len(CHANGES) + 0.9))
     for action, own in table.groupby("action", sort=False):
@@ -62,12 +62,6 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     )
     caption = "The thesis's filter with single changes, from the true first pose: MMTA at 100 mm by action."
     return Report((table_of("why-lost", caption, table),), {"why-lost": figure}, claims)
-
-
-def _change(one: Cell) -> str:
-    """The most specific change that a cell has."""
-    fitting = [name for name, changed in CHANGES.items() if all(one.parameters.get(key) == value for key, value in changed.items())]
-    return max(fitting, key=lambda name: len(CHANGES[name]))
 
 
 EXPERIMENT = Experiment("why-lost", "why the printed filter loses who walks", "ours", grid, runs.cell, report, runs.FAMILY, runs.VERSION)

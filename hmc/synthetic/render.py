@@ -39,6 +39,7 @@ def render_recording(
     seed: int | None = None,
     workers: int = 1,
     on_progress: Callable[[int, int], None] | None = None,
+    pictures: bool = True,
 ) -> Path:
     """Render a recipe into a recording with truth.
 
@@ -55,6 +56,8 @@ def render_recording(
         Processes. A script that asks for more than one must keep its top level behind ``if __name__ == "__main__":``.
     on_progress : callable, optional
         Called with the number of frames done and their total, once a frame.
+    pictures : bool
+        With videos and silhouettes; without, calibration, settings and truth alone, which take a fraction of the time.
 
     Returns
     -------
@@ -78,7 +81,8 @@ def render_recording(
     part = part_path(out)
     try:
         _write_tables(scene, part)
-        _write_pictures(scene, part, workers, on_progress)
+        if pictures:
+            _write_pictures(scene, part, workers, on_progress)
         if out.exists():
             shutil.rmtree(out)
         part.rename(out)

@@ -30,6 +30,7 @@ from hmc.experiments.kehl_4 import THRESHOLDS
 from hmc.experiments.kehl_9 import METHODS as SAMPLINGS
 from hmc.experiments.toy_likelihood import BOUNDS, drawn_peaks
 from hmc.experiments.tracking_runs import REFERENCES
+from hmc.experiments.why_slow import PLACES
 from hmc.landmarks import LANDMARKS
 from hmc.pose.spectral.parts import PART_NAMES
 from hmc.tracking.person_tree import LEAF, default_tree
@@ -75,6 +76,12 @@ def filtered(rng, parameters, noise):
         return marked(rng, parameters, noise)
     times = {} if parameters["method"] in CHAINS else {"filter_s_per_frame": float(amount(rng, noise, 0.1))}
     return pose(rng, parameters, noise) | times
+
+
+def too_fast(rng, parameters, noise):
+    if parameters["seen"] != PLACES:
+        return marked(rng, parameters, noise)
+    return pose(rng, parameters, noise) | {"motion_p0": amount(rng, noise, 3.0, FRAMES)}
 
 
 def timed(rng, parameters, noise):
@@ -318,7 +325,7 @@ RESULTS = {
     "fig-4.7": ellipsoid, "fig-4.9": samples, "tracking": tracks, "fig-4.12": crossing, "why-behind": behind, "pose": pose,
     "fig-6.11": maps, "markers": marked, "filters": filtered, "markerless": pose, "fig-7.8": schedule, "fig-7.15": behind_furniture,
     "lost-arm": lost_arm, "over-time": unseen, "all-methods": timed, "fig-B.1": square, "hsiao-3.8": ghosts, "hsiao-parts": parts,
-    "hsiao-4": swarmed, "why-hsiao": swarmed, "hsiao-pso": optimised, "repairs": overlaps, "body-bias": pulled_off,
+    "hsiao-4": swarmed, "why-hsiao": swarmed, "why-slow": too_fast, "hsiao-pso": optimised, "repairs": overlaps, "body-bias": pulled_off,
     "chain": chained, "cues": cued, "trust": doubted,
     "kehl-1": carved, "kehl-4": edges, "kehl-9": displaced, "kehl": descended,
 }  # fmt: skip

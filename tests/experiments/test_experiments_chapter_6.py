@@ -11,15 +11,18 @@ from hmc.body.joints import N_DOF, dof_index
 from hmc.body.kinematics import landmarks
 from hmc.body.model import neutral_state
 from hmc.body.proportions import canton_body, default_body
-from hmc.experiments import Inputs, Plan, exploratory, fig_6_11, filter_study, find_experiment, marker_runs, markerless_runs
+from hmc.experiments import Inputs, Plan, exploratory, fig_6_11, filter_study, find_experiment, marker_runs, markerless_runs, why_slow
 from hmc.experiments.by_action import AVERAGE, COLUMNS, action_rows, pose_scores
+from hmc.experiments.engine import inputs as inputs_of_cells
 from hmc.experiments.engine.experiment import Cell
 from hmc.experiments.engine.inputs import rendered
 from hmc.experiments.engine.style import house_style
 from hmc.experiments.five_actions import ACTIONS, ACTORS, action_name, action_recipes, action_title
-from hmc.experiments.truth import estimate_of, standing_state
+from hmc.experiments.truth import estimate_of, first_truth, standing_state
 from hmc.io.results import PoseTable
 from hmc.pose.steps.presets import PRESETS
+from hmc.search.filters import AnnealedSettings
+from hmc.synthetic.recipe import load_recipe
 
 N = 12
 
@@ -238,3 +241,38 @@ def test_the_likelihood_map_is_best_near_the_truth_with_all_scores(small, monkey
     rows = {row["scores"]: row for row in report.tables[0].rows}
     assert list(rows) == list(fig_6_11.PANELS) and rows["all"]["best_off_truth_deg"] < 30
     assert rows["all"]["width_percent"] < rows["out and occupancy"]["width_percent"]
+
+
+def test_what_no_image_is_read_of_is_the_same_without_pictures(tmp_path, monkeypatch):
+    """Calibration, room, rate and truth of a recording that is not rendered are those of the rendered one."""
+    short = replace(load_recipe("tiny"), seconds=0.2, background_frames=1)
+    monkeypatch.setattr(inputs_of_cells, "_recipe_of", lambda name: (short, False))
+    inputs, label = Inputs(tmp_path), rendered("tiny").label
+    unseen = inputs.unseen_recording(label)
+    assert not (tmp_path / label / "recording").exists()
+    seen = inputs.recording(label)
+    assert [(one.fps, one.n_frames, one.name, one.persons, one.subject_height_m) for one in (seen, unseen)].count(
+        (short.fps, short.n_frames, "tiny", 1, unseen.subject_height_m)
+    ) == 2
+    np.testing.assert_array_equal(seen.room, unseen.room)
+    for one, other in zip(seen.rig, unseen.rig, strict=True):
+        np.testing.assert_array_equal(one.projection, other.projection)
+    assert first_truth(seen).positions.tolist() == first_truth(unseen).positions.tolist()
+    assert inputs.unseen_recording(label).path == seen.path  # what is there whole is taken
+
+
+def test_the_printed_annealing_follows_small_steps_and_loses_large_ones(rng):
+    """Of a likelihood that knows every place: a motion of a tenth of P0 a variable is followed, one of three P0 is not."""
+    body = canton_body(1.75)
+    state = neutral_state("down", body.limits)
+    state[2] = 0.95
+    free = np.flatnonzero(body.limits.high > body.limits.low)
+    sd = np.zeros(N_DOF)
+    sd[free] = np.r_[np.full(3, 0.02), np.full(len(free) - 3, np.radians(2))]
+    errors = {}
+    for size in (0.1, 3.0):
+        states = state + size * np.arange(15)[:, None] * sd * np.where(np.arange(N_DOF) < 3, 1, 0)
+        true = landmarks(body, states)
+        found = why_slow._follow(rng, body, states[0], true, sd, AnnealedSettings(3, 200))
+        errors[size] = np.linalg.norm(landmarks(body, np.array(found)) - true[1:], axis=2)[-1].mean()
+    assert errors[0.1] < 0.04 < 0.15 < errors[3.0], errors

@@ -24,7 +24,8 @@ from hmc.experiments.five_actions import action_recipes
 from hmc.experiments.nine_actions import nine_recipes
 from hmc.experiments.person_data import render_brought_in, training_recipes
 from hmc.io.files import real_path
-from hmc.io.recording import Recording, open_recording
+from hmc.io.recording import Recording, open_recording, read_rig
+from hmc.io.settings import read_settings
 from hmc.synthetic.recipe import Recipe, load_recipe
 from hmc.synthetic.render import render_recording
 from hmc.voxels.grid import VoxelGrid
@@ -122,6 +123,14 @@ def once(path: Path, make: Callable[[Path], object]) -> Path:
     return path
 
 
+def _rendered_name(label: str) -> str:
+    """The recipe's name of a label, which must be of the recipe as it is."""
+    name = label.rpartition("@")[0]
+    if rendered(name).label != label:
+        raise InputError(f"the recording {label} is neither among --recordings nor a shipped recipe as it is now")
+    return name
+
+
 @dataclass(frozen=True)
 class Inputs:
     """Shared inputs of cells.
@@ -152,16 +161,23 @@ class Inputs:
         """
         if label in self.recordings:
             return self.recordings[label]
-        name = label.rpartition("@")[0]
-        if rendered(name).label != label:
-            raise InputError(f"the recording {label} is neither among --recordings nor a shipped recipe as it is now")
-        recipe, brought_in = _recipe_of(name)
+        recipe, brought_in = _recipe_of(_rendered_name(label))
         render = render_brought_in if brought_in else render_recording
         return once(self.folder / label / "recording", lambda part: render(recipe, part))
 
     def recording(self, label: str) -> Recording:
         """A recording, opened."""
         return open_recording(self.recording_folder(label))
+
+    def unseen_recording(self, label: str) -> Recording:
+        """A recording of which no image is read: of a shipped recipe calibration and truth alone, where it is not there whole."""
+        if label in self.recordings or (self.folder / label / "recording").is_dir():
+            return self.recording(label)
+        recipe = recipe_of(_rendered_name(label))
+        folder = once(self.folder / label / "tables", lambda part: render_recording(recipe, part, pictures=False))
+        told = read_settings(folder)
+        room, heights = np.asarray(told["room"], float), tuple(told["subject_height_m"])
+        return Recording(folder, told["name"], float(told["fps"]), read_rig(folder), room, told["frames"], 0, told["persons"], heights)
 
     def truth(self, label: str) -> Path:
         """The file of true centroids of a recording.

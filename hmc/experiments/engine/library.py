@@ -30,6 +30,7 @@ EXPERIMENTS = {
     "fig-4.14": "fig_4_14",
     "why-behind": "why_behind",
     "why-lost": "why_lost",
+    "why-slow": "why_slow",
     "fig-5.3": "fig_5_3",
     "fig-5.4": "fig_5_4",
     "fig-5.5": "fig_5_5",
