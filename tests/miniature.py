@@ -20,7 +20,7 @@ from hmc.io.calibration import read_calibration
 RECIPE = """name = "mini"
 seed = 3
 fps = 15
-seconds = 0.4
+seconds = 0.27
 background_frames = 3
 silhouette_every = 1
 [rig]
@@ -202,7 +202,7 @@ def _recording(folder: Path) -> None:
             capture.release()
             video.unlink()
     rng = np.random.default_rng(0)
-    people = [[[*rng.uniform(10, 50, 2).round(2).tolist(), 0.9] for _ in range(25)] for _ in range(6)]
+    people = [[[*rng.uniform(10, 50, 2).round(2).tolist(), 0.9] for _ in range(25)] for _ in range(4)]
     (folder / "keypoints" / names[0]).mkdir(parents=True)
     for k, points in enumerate(people):
         flat = [value for point in points for value in point]
@@ -219,7 +219,7 @@ def _recording(folder: Path) -> None:
     (folder / "keypoints" / f"{names[2]}.csv").write_text("\n".join(["frame,person,keypoint,x,y,confidence", *lines]) + "\n")
     (folder / "times").mkdir()
     for name in names:
-        (folder / "times" / f"{name}.csv").write_text("frame,time_s\n" + "".join(f"{k},{k / 15:.4f}\n" for k in range(6)))
+        (folder / "times" / f"{name}.csv").write_text("frame,time_s\n" + "".join(f"{k},{k / 15:.4f}\n" for k in range(4)))
 
 
 def _floor_points(path: Path) -> None:

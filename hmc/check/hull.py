@@ -23,6 +23,8 @@ Places = tuple[np.ndarray, np.ndarray, np.ndarray]
 AROUND_M = 0.3
 #: Sides of the coarse voxels (wider in a hall that would need more than `MOST_POINTS`) and of the fine ones, metres.
 COARSE_M, FINE_M, MOST_POINTS = 0.06, 0.015, 400_000
+#: Fine voxels are no smaller than half of what a pixel spans, and so many are looked at in one go.
+AT_ONCE = 200_000
 #: Half the diagonal of a cube against its side: what a voxel's centre stands for.
 HALF_DIAGONAL = 0.87
 #: Silhouettes are moved this far in search of a better fit, and a camera is off from that many pixels on; both for a width of 640.
@@ -81,11 +83,14 @@ class CoarseGrid:
     voxel_m : float
     places : tuple of (column, row, seen), ndarrays of shape (n,), one a camera
         As of `pixel_of_voxel`.
+    pixel_m : tuple of float, one a camera
+        What a pixel spans at the points' middle depth, metres.
     """
 
     points: np.ndarray
     voxel_m: float
     places: tuple[Places, ...]
+    pixel_m: tuple[float, ...]
 
 
 def coarse_grid(rig: Rig, room: np.ndarray) -> CoarseGrid:
@@ -105,7 +110,8 @@ def coarse_grid(rig: Rig, room: np.ndarray) -> CoarseGrid:
     voxel_m = max(COARSE_M, float(np.prod(high - low) / MOST_POINTS) ** (1 / 3))
     axes = [np.arange(a, b, voxel_m) + voxel_m / 2 for a, b in zip(low, high, strict=True)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    return CoarseGrid(points, voxel_m, tuple(pixel_of_voxel(camera, points) for camera in rig))
+    places = tuple(pixel_of_voxel(camera, points) for camera in rig)
+    return CoarseGrid(points, voxel_m, places, tuple(_pixel_m(camera, points) for camera in rig))
 
 
 def fine_hull(rig: Rig, masks: Masks, grid: CoarseGrid) -> Hull:
@@ -123,17 +129,28 @@ def fine_hull(rig: Rig, masks: Masks, grid: CoarseGrid) -> Hull:
     Hull
     """
     coarse, coarse_m = grid.points, grid.voxel_m
-    wide = [None if mask is None else _dilate(mask, _reach(camera, coarse, coarse_m)) for camera, mask in zip(rig, masks, strict=True)]
+    wide = [None if mask is None else _dilate(mask, _reach(pixel_m, coarse_m)) for pixel_m, mask in zip(grid.pixel_m, masks, strict=True)]
     seen, missed = _look(wide, grid.places)
-    n = round(coarse_m / FINE_M)
-    steps = ((np.indices((n, n, n)).reshape(3, -1).T + 0.5) / n - 0.5) * coarse_m
     kept = coarse[(seen.sum(axis=0) >= 3) & (missed.sum(axis=0) <= 1)]
-    points = (kept[:, None] + steps).reshape(-1, 3)
-    places = [pixel_of_voxel(camera, points) for camera in rig]
-    seen, missed = _look(masks, places)
-    near = missed.sum(axis=0) <= 1
-    pixels = tuple(np.stack([row[near], column[near]]) for column, row, _ in places)
-    return Hull(points[near], coarse_m / n, seen[:, near], missed[:, near], pixels, tuple(masks))
+    n = max(1, round(coarse_m / max(FINE_M, min(grid.pixel_m) / 2)))
+    steps = ((np.indices((n, n, n)).reshape(3, -1).T + 0.5) / n - 0.5) * coarse_m
+    parts = [_near(rig, masks, (some[:, None] + steps).reshape(-1, 3)) for some in np.array_split(kept, len(kept) * n**3 // AT_ONCE + 1)]
+    points, looks = np.concatenate([points for points, _ in parts]), np.concatenate([looks for _, looks in parts], axis=-1)
+    seen, missed = looks[:, 2:].astype(bool).swapaxes(0, 1)
+    return Hull(points, coarse_m / n, seen, missed, tuple(looks[:, :2]), tuple(masks))
+
+
+def _near(rig: Rig, masks: Masks, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The points that at most one camera misses; of each camera their row, column, whether it sees and misses them, (n_cameras, 4, m)."""
+    looks = np.zeros((0, 4, len(points)), np.int32)
+    for camera, mask in zip(rig, masks, strict=True):
+        column, row, inside = pixel_of_voxel(camera, points)
+        (seen,), (missed,) = _look([mask], [(column, row, inside)])
+        looks = np.concatenate([looks, np.stack([row, column, seen, missed])[None]])
+        near = looks[:, 3].sum(axis=0) <= 1
+        if not near.all():  # what two cameras miss, the others need not look at
+            points, looks = points[near], looks[:, :, near]
+    return points, looks
 
 
 def misfit(rig: Rig, hulls: Sequence[Hull], members: Sequence[int]) -> np.ndarray:
@@ -165,7 +182,7 @@ def misfit(rig: Rig, hulls: Sequence[Hull], members: Sequence[int]) -> np.ndarra
                 continue
             view = np.zeros(mask.shape, bool)
             view[tuple(hull.pixels[c][:, inside])] = True
-            view = _dilate(view, _reach(rig[c], hull.points[inside], hull.voxel_m))
+            view = _dilate(view, _reach(_pixel_m(rig[c], hull.points[inside]), hull.voxel_m))
             view = cv2.copyMakeBorder(view.astype(np.float32), *(reach,) * 4, cv2.BORDER_REPLICATE)
             left, top, width, height = cv2.boundingRect(mask.view(np.uint8))
             shape = mask[top : top + height, left : left + width].astype(np.float32)
@@ -282,10 +299,15 @@ def _look(masks: Masks, places: Sequence[Places]) -> tuple[np.ndarray, np.ndarra
     return seen, missed
 
 
-def _reach(camera: Camera, points: np.ndarray, voxel_m: float) -> int:
-    """Pixels from a voxel's centre to its corner, at the points' middle depth."""
+def _reach(pixel_m: float, voxel_m: float) -> int:
+    """Pixels from a voxel's centre to its corner."""
+    return int(np.ceil(voxel_m * HALF_DIAGONAL / pixel_m))
+
+
+def _pixel_m(camera: Camera, points: np.ndarray) -> float:
+    """What a pixel spans at the points' middle depth, metres."""
     depth = float(np.median(points @ camera.rotation[2] + camera.translation[2]))
-    return int(np.ceil(camera.matrix[0, 0] * voxel_m * HALF_DIAGONAL / max(depth, 0.5)))
+    return max(depth, 0.5) / float(camera.matrix[0, 0])
 
 
 def _dilate(mask: np.ndarray, reach: int) -> np.ndarray:

@@ -102,8 +102,8 @@ def hull_findings(recording: Recording, masks: Sequence[Sequence[np.ndarray | No
     """
     rig, room = recording.rig, recording.room
     moments = [frame for frame in masks if sum(mask is not None and mask.any() for mask in frame) >= LEAST_VIEWS]
-    grid = coarse_grid(rig, room)
-    hulls = [hull for hull in (fine_hull(rig, frame, grid) for frame in moments) if len(hull.strict)]
+    grid = coarse_grid(rig, room) if moments else None
+    hulls = [hull for frame in moments if grid and len((hull := fine_hull(rig, frame, grid)).strict)]
     cut = [
         f"people reach {reach:.1f} m beyond the room's limit {'xyz'[axis]} = {room[end, axis]:g} m, where {share:.0%} of their volume is "
         "cut off; widen `room` in recording.toml"
