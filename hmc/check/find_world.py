@@ -108,6 +108,8 @@ def find_world(rig: Rig, ground: Ground | None, points: GroundPoints | None, kno
     if isinstance(shown, Ground):
         doubt_deg, how = shown.up_deg, f"up and the floor by {shown.standing} hulls of people who stand, and the cameras' mounting"
         lines: tuple[str, ...] = (f"{how}, to about {doubt_deg:.1f} deg",)
+        if shown.by:
+            lines += (f"something hides legs from other cameras: the floor and statures are by {', '.join(shown.by)} alone",)
     else:
         doubt_deg, lines = POINTS_DEG, shown.lines
     axis = np.eye(3)[np.abs(up).argmax()] * np.sign(up[np.abs(up).argmax()])

@@ -1,4 +1,7 @@
-"""Whether people reach further down in some images than their hulls do: what hides legs from other cameras makes hulls end too high."""
+"""Whether people reach further down in some images than their hulls do: what hides legs from other cameras makes hulls end too high.
+
+Where three cameras or more see the legs, hulls of these alone reach the floor.
+"""
 
 from __future__ import annotations
 
@@ -8,9 +11,9 @@ import numpy as np
 
 from hmc.camera.model import Camera, Rig, project
 from hmc.check.moments import Masks
-from hmc.check.upright import ELONGATED, STANDING_DEG, Figure
+from hmc.check.upright import ELONGATED, STANDING_DEG, Figure, Ground, find_figures, ground_below
 
-__all__ = ["hidden_below", "shown_below"]
+__all__ = ["find_legs", "hidden_below", "shown_below"]
 
 #: Silhouettes that reach below the hull by this share of it, in so many cameras, show what others do not.
 LEAST_BELOW, LEAST_CAMERAS = 0.15, 2
@@ -71,3 +74,35 @@ def hidden_below(rig: Rig, figures: Sequence[Figure], moments: Sequence[Masks], 
     below = shown_below(rig, figures, moments, up)
     names = tuple(camera.name for camera, share in zip(rig, below, strict=True) if share >= LEAST_BELOW)
     return names if len(names) >= LEAST_CAMERAS else ()
+
+
+def find_legs(
+    rig: Rig, figures: Sequence[Figure], moments: Sequence[Masks], ground: Ground | None
+) -> tuple[Sequence[Figure], Ground | None, tuple[str, ...]]:
+    """Floor and stature by the cameras that see the legs, where furniture hides them from others.
+
+    Parameters
+    ----------
+    rig : Rig
+    figures : sequence of Figure
+    moments : sequence (moments) of sequence (cameras) of ndarray of bool, shape (h, w), or None
+    ground : Ground or None
+        By all cameras; None where nobody stands.
+
+    Returns
+    -------
+    figures : sequence of Figure
+    ground : Ground or None
+        By fewer cameras, or as they were given.
+    hidden : tuple of str
+        Cameras that still show people further down than hulls reach: then floor and stature are those of what is seen of people.
+    """
+    by = () if ground is None else hidden_below(rig, figures, moments, ground.up)
+    if ground is None or not by:
+        return figures, ground, ()
+    fewer = [[mask if camera.name in by else None for camera, mask in zip(rig, frame, strict=True)] for frame in moments]
+    lower = find_figures(rig, fewer)  # none of fewer than three cameras
+    found = ground_below(lower, ground, by)
+    if found is None or hidden_below(rig, lower, moments, ground.up):
+        return figures, ground, by
+    return lower, found, ()

@@ -8,7 +8,7 @@ its recording says.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import ndimage
@@ -20,7 +20,7 @@ from hmc.camera.world import World, in_world
 from hmc.check.hull import coarse_grid, fine_hull
 from hmc.check.moments import Masks
 
-__all__ = ["Figure", "Ground", "find_figures", "find_ground", "level_share"]
+__all__ = ["Figure", "Ground", "find_figures", "find_ground", "ground_below", "level_share"]
 
 #: Cameras are put so far from the point they look at, on the median; people are looked for so far around it. Of no unit.
 DISTANCE, REACH = 3.0, 2.5
@@ -86,6 +86,8 @@ class Ground:
         Figures that stand.
     figures : int
         All figures.
+    by : tuple of str
+        The cameras whose hulls tell floor and stature, where it is not all of them.
     """
 
     up: np.ndarray
@@ -95,6 +97,7 @@ class Ground:
     middle: np.ndarray
     standing: int
     figures: int
+    by: tuple[str, ...] = ()
 
 
 def find_figures(rig: Rig, moments: Sequence[Masks]) -> list[Figure]:
@@ -162,23 +165,50 @@ def find_ground(rig: Rig, figures: Sequence[Figure]) -> Ground | None:
         None where nobody stands.
     """
     up = _first_up(rig, figures)
-    close = np.cos(np.deg2rad(STANDING_DEG))
-    standing = [one for one in figures if one.elongation >= ELONGATED and abs(one.axis @ up) > close]
+    standing = _standing(figures, up)
     if not standing:
         return None
-    lengths = [np.ptp(one.points @ up) for one in standing]
-    # Who stands is as long as others who do: what is far shorter is a part of somebody.
-    standing = [one for one, length in zip(standing, lengths, strict=True) if length > LEAST_LENGTH * np.quantile(lengths, TALL)]
     if _looks_down(rig, standing, up):
         up = -up
     up, tilt = _plane(rig, standing, up)
+    return _ground(standing, up, float(np.rad2deg(tilt)), len(figures))
+
+
+def ground_below(figures: Sequence[Figure], ground: Ground, by: tuple[str, ...]) -> Ground | None:
+    """Floor and stature by other hulls, with the same up.
+
+    Parameters
+    ----------
+    figures : sequence of Figure
+    ground : Ground
+    by : tuple of str
+        The cameras that these hulls are of.
+
+    Returns
+    -------
+    Ground or None
+        None where none of these stands.
+    """
+    standing = _standing(figures, ground.up)
+    return replace(_ground(standing, ground.up, ground.up_deg, len(figures)), by=by) if standing else None
+
+
+def _standing(figures: Sequence[Figure], up: np.ndarray) -> list[Figure]:
+    """Who stands along `up`, either way, and is as long as others who do: what is far shorter is a part of somebody."""
+    close = np.cos(np.deg2rad(STANDING_DEG))
+    standing = [one for one in figures if one.elongation >= ELONGATED and abs(one.axis @ up) > close]
+    lengths = [np.ptp(one.points @ up) for one in standing]
+    return [one for one, length in zip(standing, lengths, strict=True) if length > LEAST_LENGTH * np.quantile(lengths, TALL)]
+
+
+def _ground(standing: Sequence[Figure], up: np.ndarray, up_deg: float, n_figures: int) -> Ground:
     metre = float(np.median([np.ptp(one.points @ up) for one in standing])) / STATURE_M
     floors = [_feet(one.points @ up, metre) for one in standing]
     floor = float(np.median(floors))
     tops = [np.quantile(one.points @ up, 1 - ENDS) for one in standing]
     middle = np.median([one.points.mean(axis=0) for one in standing], axis=0)
     middle = middle + (floor - middle @ up) * up
-    return Ground(up, float(np.rad2deg(tilt)), floor, float(np.quantile(tops, TALL)) - floor, middle, len(standing), len(figures))
+    return Ground(up, up_deg, floor, float(np.quantile(tops, TALL)) - floor, middle, len(standing), n_figures)
 
 
 def _first_up(rig: Rig, figures: Sequence[Figure]) -> np.ndarray:

@@ -74,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
     from hmc.camera.world import in_world
     from hmc.check.find_world import Known, find_world
     from hmc.check.given_points import board_points, read_points
-    from hmc.check.hidden import hidden_below
+    from hmc.check.hidden import find_legs
     from hmc.check.moments import moments
     from hmc.check.upright import find_figures, find_ground
     from hmc.check.world_picture import save_world_picture
@@ -97,7 +97,7 @@ def run(args: argparse.Namespace) -> int:
     masks = moments(recording, MOMENTS)
     figures = find_figures(rig, masks)
     ground = find_ground(rig, figures)
-    hidden = () if ground is None else hidden_below(rig, figures, masks, ground.up)
+    shown, ground, hidden = find_legs(rig, figures, masks, ground)
     heights = recording.subject_height_m
     known = Known(args.unit, args.distance, args.height or (heights[0] if len(heights) == 1 else None))
     try:
@@ -108,7 +108,7 @@ def run(args: argparse.Namespace) -> int:
         print(line)
     name = real_path(args.recording).name
     picture = args.out or Path(f"{name}_world.png")
-    save_world_picture(picture, rig, found.world, figures, first.images, name)
+    save_world_picture(picture, rig, found.world, shown, first.images, name)
     print(f"picture: {picture}")
     if found.as_it_was:
         print(f"{name}: the calibration is in metres with z up and the floor at 0 already; nothing is written")

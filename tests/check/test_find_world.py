@@ -16,7 +16,7 @@ from hmc.camera.world import World, in_world
 from hmc.check import check_recording
 from hmc.check.find_world import Known, find_world
 from hmc.check.given_points import board_points, read_points
-from hmc.check.hidden import hidden_below, shown_below
+from hmc.check.hidden import find_legs, hidden_below, shown_below
 from hmc.check.upright import find_figures, find_ground
 from hmc.cli import main
 from hmc.errors import InputError
@@ -65,14 +65,44 @@ def test_cameras_upside_down_and_on_their_sides_do_not_turn_the_world(ring, mome
     assert tilt_deg(find_ground(rig, find_figures(rig, masks)).up, [0, 0, 1]) < 2.5
 
 
-def test_legs_that_furniture_hides_are_noticed(ring, moments):
-    """Two of five cameras see nothing below the thighs: hulls end there, and a stature must not tell the scale."""
+def without_legs(moments, n_cameras):
+    """So many cameras see nothing below the thighs."""
     cut = []
     for masks in moments:
         cut.append([mask.copy() for mask in masks])
-        for mask in cut[-1][:2]:
+        for mask in cut[-1][:n_cameras]:
             rows = np.flatnonzero(mask.any(axis=1))
             mask[(rows[0] + 3 * rows[-1]) // 4 :] = False
+    return cut
+
+
+@pytest.mark.parametrize("name", WORLDS)
+def test_legs_that_furniture_hides_are_found_by_the_cameras_that_see_them(ring, moments, name):
+    world = WORLDS[name]
+    rig, cut = in_world(ring, world), without_legs(moments, 2)
+    figures = find_figures(rig, cut)
+    lower, ground, hidden = find_legs(rig, figures, cut, find_ground(rig, figures))
+    assert hidden == () and ground.by == ring.names[2:] and len(lower) == len(figures)
+    assert abs(world.old_points(ground.middle)[2]) < 0.06
+    assert ground.stature / world.scale == pytest.approx(HEIGHT_M, abs=0.08)
+    said = find_world(rig, ground, None, Known(height_m=HEIGHT_M))
+    assert said.world.scale * world.scale == pytest.approx(1.0, abs=0.05)
+    assert "cam_02, cam_03, cam_04 alone" in " ".join(said.lines)
+
+
+def test_legs_that_two_cameras_alone_see_are_told(ring, moments):
+    """Hulls end at the thighs, and a stature must not tell the scale."""
+    cut = without_legs(moments, 3)
+    figures = find_figures(ring, cut)
+    ground = find_ground(ring, figures)
+    assert find_legs(ring, figures, cut, ground) == (figures, ground, ring.names[3:])
+    with pytest.raises(InputError, match="tells no scale"):
+        find_world(ring, ground, None, Known(height_m=HEIGHT_M), ring.names[3:])
+
+
+def test_legs_that_furniture_hides_are_noticed(ring, moments):
+    """Two of five cameras see nothing below the thighs: hulls end there, and a stature must not tell the scale."""
+    cut = without_legs(moments, 2)
     figures = find_figures(ring, cut)
     ground = find_ground(ring, figures)
     assert ground.floor > 0.25
