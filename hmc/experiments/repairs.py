@@ -1,6 +1,7 @@
 """What each repair of a silhouette is for: overlap with the true silhouettes with all of them, and without one after the other. Ours.
 
-A repair is worth its place where it adds on two recordings, and is wrong where it takes more than a hundredth on any. Each camera's
+A repair is worth its place where it adds a hundredth on two recordings more than it takes one from, and is wrong where it takes more than
+that on any. Each camera's
 overlap (intersection over union) in the frames of which the truth is there, on their mean over cameras and frames; and the same of the
 strict hulls that all cameras' silhouettes leave, in voxels of 4 cm, against those of the true ones.
 """
@@ -54,7 +55,8 @@ WITHOUT: dict[str, tuple[Mapping[str, Any], Mapping[str, Any]]] = {
     "cutting of shadows": ({}, {"cut_shadows": False}),
     "all of these": (_NO_GAPS | {"halo_share": 0.0, "least_chance": 0.0}, {"complete": False, "cut_shadows": False}),
 }
-#: A repair may cost so much overlap on a recording, and is to add as much on so many.
+#: A repair may cost so much overlap on a recording, and is to add as much on so many more than it takes as much from: of many recordings
+#: some gain by chance, and as many lose.
 MOST_HARM, LEAST_GAIN, LEAST_CLIPS = 0.01, 0.01, 2
 
 
@@ -126,14 +128,18 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
 
 def _claims(repair: str, added: np.ndarray, names: Sequence[str]) -> list[Claim]:
     worst = int(np.argmin(added))
-    helped = int((added >= LEAST_GAIN).sum())
+    helped, harmed = int((added >= LEAST_GAIN).sum()), int((added <= -LEAST_GAIN).sum())
     return [
         Claim(
             f"{repair}: takes no more than {MOST_HARM} of overlap on any recording",
             bool(added[worst] >= -MOST_HARM),
             f"least {added[worst]:+.3f} on {names[worst].rpartition('@')[0]}",
         ),
-        Claim(f"{repair}: adds {LEAST_GAIN} on {LEAST_CLIPS} recordings or more", helped >= LEAST_CLIPS, f"on {helped} of {len(names)}"),
+        Claim(
+            f"{repair}: adds {LEAST_GAIN} on {LEAST_CLIPS} recordings at least beyond those it takes that from",
+            helped - harmed >= LEAST_CLIPS,
+            f"adds on {helped} of {len(names)}, takes on {harmed}",
+        ),
     ]
 
 

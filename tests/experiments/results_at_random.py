@@ -347,7 +347,7 @@ def held_always(name, draw, quick=True, seeds=(1, 2, 3)):
     return set.intersection(*({claim.text for claim in claims_on(name, draw, seed, quick) if claim.holds} for seed in seeds))
 
 
-def claims_at_random(name, seed, noise):
-    """The claims of an experiment's quick report on results that are drawn at random."""
+def claims_at_random(name, seed, noise, quick=True):
+    """The claims of an experiment's report, quick or in full, on results that are drawn at random."""
     draw = RESULTS[find_experiment(name).store_name]
-    return claims_on(name, lambda rng, parameters: draw(rng, parameters, noise), seed)
+    return claims_on(name, lambda rng, parameters: draw(rng, parameters, noise), seed, quick)
