@@ -63,11 +63,12 @@ COMPLETION_PX = 640
 SURE = 6.0
 #: How far around those squares the image is looked at, pixels of a 640 x 480 image.
 MARGIN_PX = 24
-#: From this share of the image in the foreground on, all of it may have become brighter or darker; by less than that factor is none.
-#: Every so many pixels of each row and column tell. Brought back, it must leave no more than that share in the foreground.
-SUSPECT_SHARE, LEAST_GAIN, GAIN_STEP, MOST_LEFT = 0.03, 1.02, 16, 0.2
-#: Grey level from which on a pixel may be brighter than it looks.
-OVEREXPOSED = 250
+#: All of an image may have become brighter, darker or of another tinge; by less than this factor in each channel is none. Every so many
+#: pixels of each row and column tell. Brought back, it leaves less in the foreground than as it is, unless that is less than this share
+#: anyway, and never more than that share.
+LEAST_GAIN, GAIN_STEP, SUSPECT_SHARE, MOST_LEFT = 1.01, 16, 0.03, 0.2
+#: Grey levels from which on a pixel may be brighter than it looks, and below which a channel tells of no factor.
+OVEREXPOSED, TOO_DARK = 250, 20
 #: Share of the new image when everything changed at once, and in the frames after that.
 SWITCH_RATE = 0.5
 SETTLING_RATE = 0.2
@@ -165,6 +166,8 @@ def train_background(
     count = 0
     for count, frame in enumerate(chain(first, frames), start=1):
         frame = blurred(frame, blur)
+        if mean is not None and frame.shape == mean.shape:
+            frame = _in_light_of(frame, mean, np.zeros(mean.shape[:2], bool))
         mixture.apply(frame, learningRate=1.0 / count)
         color = cv2.cvtColor(frame, cv2.COLOR_BGR2YCrCb).astype(np.float32)
         if mean is None or square is None:
@@ -223,7 +226,7 @@ def segment(
     mask : ndarray of bool, shape (height, width), or None
         ``None`` where there is no image or a dark one, and where more than `max_foreground` of it changed at once: the camera does not vote
         in this frame, and, but for dark ones, the background is learnt anew around where people were last. An image that as a whole is
-        brighter or darker by one factor (automatic exposure, flicker) is brought back first.
+        brighter or darker by one factor in each channel (automatic exposure and white balance, flicker) is brought back first.
     model : BackgroundModel
 
     Raises
@@ -248,9 +251,7 @@ def segment(
     if model.before is not None and _nearer(image, model.before, model.mean):  # it was a flash
         model.mean[...] = model.before
         model = replace(model, before=None, changes=model.changes + 1)
-    answer, found = _apply(model, image)
-    if cv2.countNonZero(found) > SUSPECT_SHARE * found.size:
-        image, answer, found = _level(model, image, answer, found)
+    image, answer, found = _level(model, image)
     if cv2.countNonZero(found) > settings.max_foreground * found.size:
         return None, _adapt_to_switch(model, image, settings)
     mask, filled, doubtful = _complete(found, cv2.threshold(answer, SHADOW - 1, 1, cv2.THRESH_BINARY)[1], image, model, settings)
@@ -321,24 +322,59 @@ def light_gain(image: np.ndarray, mean: np.ndarray, people: np.ndarray) -> float
     return float(np.median(luma[told] / mean[few][told, 0])) if told.any() else 1.0
 
 
+def color_gains(image: np.ndarray, mean: np.ndarray, people: np.ndarray) -> np.ndarray:
+    """By which factor an image as a whole is brighter than the empty scene in each channel, beside people: exposure and white balance.
+
+    Parameters
+    ----------
+    image : ndarray of uint8, shape (height, width, 3)
+        BGR.
+    mean : ndarray of float32, shape (height, width, 3)
+        The empty scene (`BackgroundModel.mean`).
+    people : ndarray of bool, shape (height, width)
+
+    Returns
+    -------
+    ndarray, shape (3,)
+        Blue, green, red; 1 where nothing tells.
+    """
+    few = slice(None, None, GAIN_STEP), slice(None, None, GAIN_STEP)
+    seen, empty = image[few], _as_image(np.ascontiguousarray(mean[few]))
+    gains = np.ones(3)
+    for channel in range(3):
+        now, before = seen[..., channel], empty[..., channel]
+        told = (now < OVEREXPOSED) & (before >= TOO_DARK) & ~people[few]
+        if told.any():
+            gains[channel] = np.median(now[told] / before[told])
+    return gains
+
+
 def _apply(model: BackgroundModel, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """What the mixture says of an image, and where that is foreground, 1 or 0."""
     answer = model.mixture.apply(image, learningRate=0)
     return answer, cv2.threshold(answer, FOREGROUND - 1, 1, cv2.THRESH_BINARY)[1]
 
 
-def _level(model: BackgroundModel, image: np.ndarray, answer: np.ndarray, found: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The image as bright as the background, with the mixture's answer to it, where that accounts for most of the foreground."""
-    gain = light_gain(image, model.mean, model.people)
-    if 1 / LEAST_GAIN < gain < LEAST_GAIN:
-        return image, answer, found
-    level = cv2.convertScaleAbs(image, alpha=1 / gain)
+def _in_light_of(image: np.ndarray, mean: np.ndarray, people: np.ndarray) -> np.ndarray:
+    """An image brought to the light of the empty scene (`color_gains`); itself where that is its own."""
+    gains = color_gains(image, mean, people)
+    if np.all((gains > 1 / LEAST_GAIN) & (gains < LEAST_GAIN)):
+        return image
+    level = cv2.transform(image, np.diag(1 / gains))
     # What is overexposed may have been as bright as the scene is.
-    np.maximum(level, _as_image(model.mean), out=level, where=image >= OVEREXPOSED)
-    level_answer, level_found = _apply(model, level)
-    left = cv2.countNonZero(level_found)
-    better = left < cv2.countNonZero(found) and left < MOST_LEFT * found.size
-    return (level, level_answer, level_found) if better else (image, answer, found)
+    return np.maximum(level, _as_image(mean), out=level, where=image >= OVEREXPOSED)
+
+
+def _level(model: BackgroundModel, image: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The image in the light of the empty scene, or as it is where that accounts for no less of it; with `_apply` of it."""
+    level = _in_light_of(image, model.mean, model.people)
+    answer, found = _apply(model, level)
+    left = cv2.countNonZero(found)
+    if level is not image and left > SUSPECT_SHARE * found.size:
+        answer_as_is, found_as_is = _apply(model, image)
+        if left > MOST_LEFT * found.size or left >= cv2.countNonZero(found_as_is):
+            return image, answer_as_is, found_as_is
+    return level, answer, found
 
 
 def _nearer(image: np.ndarray, one: np.ndarray, other: np.ndarray) -> bool:

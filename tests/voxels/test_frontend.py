@@ -68,7 +68,9 @@ def test_a_light_switch_is_reported_once_and_survived(tmp_path, ring):
     for camera in ring:
         for index in (4, 5):
             file = path / "images" / camera.name / f"{index:06d}.png"
-            cv2.imwrite(str(file), np.clip(cv2.imread(str(file)).astype(int) + (120, 70, 0), 0, 255).astype(np.uint8))
+            image = cv2.imread(str(file)).astype(float)
+            light = np.linspace(0, 160, image.shape[1])[:, None]  # from one side: of exposure or tinge it could be told
+            cv2.imwrite(str(file), np.clip(image + light, 0, 255).astype(np.uint8))
     recording = open_recording(path)
     problems = []
     steps = list(stream_hulls(recording, VoxelGrid.from_room(recording.room, 0.1), on_problem=problems.append))
