@@ -1,8 +1,9 @@
 """Table 6.3: the marker-based filter, action by action.
 
 Source: Canton (2009), section 6.6.1: detection rate .9, 20 false positives a view, variance 4, 3 layers of 700 particles. The preset
-`canton2009` has the thesis's body and likelihood, `default` is our own. The thesis does not say how its first pose comes about:
-`canton2009` is there once with a pose found from the markers alone, as in `default`, and once with the true one.
+`canton2009` has the thesis's body and likelihood, `default` is our own. The thesis starts in a neutral
+pose where the person was tracked, headed as they walk (6.3.3): `canton2009` is there once with a pose found from the markers alone, as in
+`default`, and once with the true one, which is more than the thesis had.
 The true start has the action's P0, from data on which nothing is measured (`hmc.experiments.exploratory`).
 Both have its likelihood as printed, which asks only whether the nearest detections agree with one another; with the reprojection score it
 asks too whether they are where the body has its markers.

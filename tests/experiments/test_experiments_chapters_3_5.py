@@ -11,9 +11,18 @@ from hmc.body.proportions import canton_body, default_body
 from hmc.experiments import Plan, find_experiment, pose_runs
 from hmc.experiments.engine.experiment import Cell
 from hmc.experiments.engine.style import house_style
+from hmc.experiments.fig_4_2 import peaks_of
 from hmc.experiments.fig_5_3 import misplaced
 from hmc.experiments.fig_b_1 import rotated_pixels
 from hmc.experiments.toy_likelihood import DISTRACTOR_FRAMES, log_mixture, moving_log_likelihood, target_path
+
+
+def test_a_peak_of_tops_is_more_than_the_flank_of_another():
+    rng = np.random.default_rng(0)
+    standing, sitting = rng.normal(1.7, 0.07, 4000), rng.normal(1.2, 0.06, 600)
+    np.testing.assert_allclose(sorted(peaks_of(np.concatenate([standing, sitting]))), [1.2, 1.7], atol=0.06)
+    (only,) = peaks_of(standing)
+    assert abs(only - 1.7) < 0.06
 
 
 def test_without_rotation_every_pixel_stays_and_oversampling_fills_the_holes():

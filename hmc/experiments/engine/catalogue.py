@@ -78,7 +78,8 @@ CATALOGUE = (
     Entry(
         "fig-4.2", CANTON, "features of blobs, with figure 4.3",
         "tops of people peak near 1.2 m (sitting) and 1.7 m (standing); histograms at 2, 5, 10 and 15 cm overlap (over .95)", _CLEAR,
-        "The coefficient at the coarsest voxels is .942 for the shorter side: a bin is as wide as the voxels.",
+        "The coefficient at the coarsest voxels is .942 for the shorter side: a bin is as wide as the voxels. Who sits upright on our "
+        "chairs has the top at 1.27 to 1.42 m, by stature, and in four of the six recordings nobody sits.",
     ),
     Entry(
         "table-4.2", CANTON, "seven person classifiers",
