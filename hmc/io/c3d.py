@@ -3,10 +3,12 @@
 Source: the C3D file format specification (c3d.org). Integer and floating-point files of all three processor types are read; analogue
 channels are passed over.
 
-Files are written through `ezc3d` (`hmc.io.export.c3d`), and would be read through it, but that a file cut off within its parameters makes
-it run on without an end (1.7.2; tests/io/test_c3d.py has such files), and that it is no dependency. The package `c3d` (0.6.0) refuses the
-file in tests/io/test_c3d.py that another program wrote, with a single analogue channel: its group ANALOG has a scalar where it asserts an
-array. So this reader stays, and tests hold it against ezc3d's files.
+Files are written through `ezc3d` (`hmc.io.export.c3d`), and would be read through it, but that a file cut off within its
+parameters makes it run on without an end (1.7.2; tests/io/test_c3d.py has such files), that a few changed bytes in its parameters
+can end the whole process by a segmentation fault or make it ask for any amount of memory, and that it is no dependency. Counts in
+the header held against the file's size tell the first of these only; the others would need a process of their own for every file.
+The package `c3d` (0.6.0) refuses the file in tests/io/test_c3d.py that another program wrote, with a single analogue channel: its
+group ANALOG has a scalar where it asserts an array. So this reader stays, and tests hold it against ezc3d's files.
 """
 
 from __future__ import annotations

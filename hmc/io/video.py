@@ -113,13 +113,18 @@ def _by_opencv(path: Path, temporary: Path, pictures: Iterator[np.ndarray], fps:
     first = _even(next(pictures))
     size = first.shape[1], first.shape[0]
     writer = None
-    for codec in ("avc1", "mp4v") if path.suffix.lower() == ".mp4" else ("MJPG",):
-        writer = cv2.VideoWriter(str(temporary), cv2.VideoWriter.fourcc(*codec), fps, size)
-        if writer.isOpened():
-            break
-        writer.release()
-    else:
-        raise InputError(f"{path}: cannot be written as a video")
+    level = cv2.utils.logging.getLogLevel()
+    cv2.utils.logging.setLogLevel(0)  # an encoder that is not there is told in words of ours
+    try:
+        for codec in ("avc1", "mp4v") if path.suffix.lower() == ".mp4" else ("MJPG",):
+            writer = cv2.VideoWriter(str(temporary), cv2.VideoWriter.fourcc(*codec), fps, size)
+            if writer.isOpened():
+                break
+            writer.release()
+        else:
+            raise InputError(f"{path}: cannot be written as a video")
+    finally:
+        cv2.utils.logging.setLogLevel(level)
     if codec == "mp4v" and on_problem is not None:
         on_problem(f"{path}: {NO_ENCODER}")
     try:

@@ -57,7 +57,7 @@ def test_its_colors_are_stored_as_browsers_want_them(tmp_path):
     assert told.strip() == "h264,yuv420p,12"
 
 
-def test_without_an_encoder_there_is_a_video_and_a_line_that_says_so(tmp_path, monkeypatch):
+def test_without_an_encoder_there_is_a_video_and_a_line_that_says_so(tmp_path, monkeypatch, capfd):
     monkeypatch.setattr(video, "ffmpeg_path", lambda: None)
     said = []
     write_video(tmp_path / "a.mp4", pictures(), 25, said.append)
@@ -65,6 +65,7 @@ def test_without_an_encoder_there_is_a_video_and_a_line_that_says_so(tmp_path, m
     assert len(frames) == 12
     if codec not in ("avc1", "h264"):  # OpenCV's own build may have an encoder
         assert len(said) == 1 and "imageio-ffmpeg" in said[0]
+    assert "cap_ffmpeg" not in capfd.readouterr().err  # OpenCV's words on the codec are not ours
 
 
 def test_a_program_that_is_none_is_as_good_as_no_program(tmp_path, monkeypatch):
