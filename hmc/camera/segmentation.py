@@ -19,6 +19,7 @@ import cv2
 import numpy as np
 
 from hmc.camera.image_signs import is_dark
+from hmc.camera.light import FEW, as_image, in_light_of, luma_chroma
 from hmc.camera.noise import blur_for, blurred, is_grey, noise_floor
 from hmc.camera.segmentation_settings import SegmentationSettings
 from hmc.camera.shade import shade_features, told_by_chance
@@ -29,7 +30,6 @@ __all__ = [
     "BackgroundModel",
     "SegmentationSettings",
     "empty_image",
-    "light_gain",
     "segment",
     "segment_views",
     "shades_of",
@@ -63,12 +63,9 @@ COMPLETION_PX = 640
 SURE = 6.0
 #: How far around those squares the image is looked at, pixels of a 640 x 480 image.
 MARGIN_PX = 24
-#: All of an image may have become brighter, darker or of another tinge; by less than this factor in each channel is none. Every so many
-#: pixels of each row and column tell. Brought back, it leaves less in the foreground than as it is, unless that is less than this share
-#: anyway, and never more than that share.
-LEAST_GAIN, GAIN_STEP, SUSPECT_SHARE, MOST_LEFT = 1.01, 16, 0.03, 0.2
-#: Grey levels from which on a pixel may be brighter than it looks, and below which a channel tells of no factor.
-OVEREXPOSED, TOO_DARK = 250, 20
+#: In the light of the empty scene an image leaves less in the foreground than as it is, unless that is less than this share anyway, and
+#: never more than that share.
+SUSPECT_SHARE, MOST_LEFT = 0.03, 0.2
 #: Share of the new image when everything changed at once, and in the frames after that.
 SWITCH_RATE = 0.5
 SETTLING_RATE = 0.2
@@ -167,7 +164,7 @@ def train_background(
     for count, frame in enumerate(chain(first, frames), start=1):
         frame = blurred(frame, blur)
         if mean is not None and frame.shape == mean.shape:
-            frame = _in_light_of(frame, mean, np.zeros(mean.shape[:2], bool))
+            frame = in_light_of(frame, mean, np.zeros(mean.shape[:2], bool))
         mixture.apply(frame, learningRate=1.0 / count)
         color = cv2.cvtColor(frame, cv2.COLOR_BGR2YCrCb).astype(np.float32)
         if mean is None or square is None:
@@ -191,10 +188,10 @@ def train_background(
         deviation = np.maximum(np.maximum(deviation, noise.deviation), np.array(LEAST_DEVIATION, np.float32))
         mixture.setVarMin(noise.variance)
         mixture.setVarMax(max(MOST_VARIANCE, VARIANCE_RANGE * noise.variance))
-        mixture.apply(_as_image(mean), learningRate=0)  # raises the variances that are smaller, and changes nothing else
+        mixture.apply(as_image(mean), learningRate=0)  # raises the variances that are smaller, and changes nothing else
     mean[..., 0] = np.maximum(mean[..., 0], 1)
     people = np.zeros(mean.shape[:2], bool)
-    grey = is_grey(_as_image(mean))
+    grey = is_grey(as_image(mean))
     return BackgroundModel(mixture, in_planes(mean), in_planes(deviation), people, unseen=unseen, blur=blur, grey=grey, floor=floor)
 
 
@@ -241,8 +238,7 @@ def segment(
         raise InputError(
             f"the image is {image.shape[1]} x {image.shape[0]} pixels, the background {model.mean.shape[1]} x {model.mean.shape[0]}"
         )
-    few = slice(None, None, GAIN_STEP), slice(None, None, GAIN_STEP)
-    if is_dark(image[few], model.mean[few][..., 0]):  # nothing is learnt of it
+    if is_dark(image[FEW], model.mean[FEW][..., 0]):  # nothing is learnt of it
         return None, model
     image = blurred(image, model.blur)
     if model.grey and is_grey(image):
@@ -273,7 +269,7 @@ def segment(
 
 def empty_image(model: BackgroundModel) -> np.ndarray:
     """The empty scene as an image, BGR, uint8, (h, w, 3)."""
-    return _as_image(model.mean)
+    return as_image(model.mean)
 
 
 def segment_views(
@@ -301,73 +297,15 @@ def segment_views(
     return tuple(mask for mask, _ in results), tuple(model for _, model in results)
 
 
-def light_gain(image: np.ndarray, mean: np.ndarray, people: np.ndarray) -> float:
-    """How bright an image is as a whole, against the empty scene beside people; 1 where nothing tells.
-
-    Parameters
-    ----------
-    image : ndarray of uint8, shape (height, width, 3)
-        BGR.
-    mean : ndarray of float32, shape (height, width, 3)
-        The empty scene (`BackgroundModel.mean`).
-    people : ndarray of bool, shape (height, width)
-
-    Returns
-    -------
-    float
-    """
-    few = slice(None, None, GAIN_STEP), slice(None, None, GAIN_STEP)
-    luma = _luma_chroma(image[few])[..., 0]
-    told: np.ndarray = (luma < OVEREXPOSED) & ~people[few]
-    return float(np.median(luma[told] / mean[few][told, 0])) if told.any() else 1.0
-
-
-def color_gains(image: np.ndarray, mean: np.ndarray, people: np.ndarray) -> np.ndarray:
-    """By which factor an image as a whole is brighter than the empty scene in each channel, beside people: exposure and white balance.
-
-    Parameters
-    ----------
-    image : ndarray of uint8, shape (height, width, 3)
-        BGR.
-    mean : ndarray of float32, shape (height, width, 3)
-        The empty scene (`BackgroundModel.mean`).
-    people : ndarray of bool, shape (height, width)
-
-    Returns
-    -------
-    ndarray, shape (3,)
-        Blue, green, red; 1 where nothing tells.
-    """
-    few = slice(None, None, GAIN_STEP), slice(None, None, GAIN_STEP)
-    seen, empty = image[few], _as_image(np.ascontiguousarray(mean[few]))
-    gains = np.ones(3)
-    for channel in range(3):
-        now, before = seen[..., channel], empty[..., channel]
-        told = (now < OVEREXPOSED) & (before >= TOO_DARK) & ~people[few]
-        if told.any():
-            gains[channel] = np.median(now[told] / before[told])
-    return gains
-
-
 def _apply(model: BackgroundModel, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """What the mixture says of an image, and where that is foreground, 1 or 0."""
     answer = model.mixture.apply(image, learningRate=0)
     return answer, cv2.threshold(answer, FOREGROUND - 1, 1, cv2.THRESH_BINARY)[1]
 
 
-def _in_light_of(image: np.ndarray, mean: np.ndarray, people: np.ndarray) -> np.ndarray:
-    """An image brought to the light of the empty scene (`color_gains`); itself where that is its own."""
-    gains = color_gains(image, mean, people)
-    if np.all((gains > 1 / LEAST_GAIN) & (gains < LEAST_GAIN)):
-        return image
-    level = cv2.transform(image, np.diag(1 / gains))
-    # What is overexposed may have been as bright as the scene is.
-    return np.maximum(level, _as_image(mean), out=level, where=image >= OVEREXPOSED)
-
-
 def _level(model: BackgroundModel, image: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The image in the light of the empty scene, or as it is where that accounts for no less of it; with `_apply` of it."""
-    level = _in_light_of(image, model.mean, model.people)
+    level = in_light_of(image, model.mean, model.people)
     answer, found = _apply(model, level)
     left = cv2.countNonZero(found)
     if level is not image and left > SUSPECT_SHARE * found.size:
@@ -379,9 +317,8 @@ def _level(model: BackgroundModel, image: np.ndarray) -> tuple[np.ndarray, np.nd
 
 def _nearer(image: np.ndarray, one: np.ndarray, other: np.ndarray) -> bool:
     """Whether most of an image is nearer to one background than to another."""
-    few = slice(None, None, GAIN_STEP), slice(None, None, GAIN_STEP)
-    luma = _luma_chroma(image[few])[..., 0]
-    return bool(np.median(np.abs(luma - one[few][..., 0])) < np.median(np.abs(luma - other[few][..., 0])))
+    luma = luma_chroma(image[FEW])[..., 0]
+    return bool(np.median(np.abs(luma - one[FEW][..., 0])) < np.median(np.abs(luma - other[FEW][..., 0])))
 
 
 def _complete(
@@ -465,7 +402,7 @@ def _learn(model: BackgroundModel, image: np.ndarray, hidden: np.ndarray, rate: 
     """
     mean = model.mean
     seen = 1 - hidden
-    step = cv2.copyTo(np.subtract(_luma_chroma(image), mean, dtype=np.float32, order="C"), seen)
+    step = cv2.copyTo(np.subtract(luma_chroma(image), mean, dtype=np.float32, order="C"), seen)
     coarse = (max(1, mean.shape[1] // 8), max(1, mean.shape[0] // 8))
     window = (coarse[0] // 2 + 1, coarse[1] // 2 + 1)
     weight = cv2.blur(cv2.resize(seen.astype(np.float32), coarse, interpolation=cv2.INTER_AREA), window)
@@ -478,7 +415,7 @@ def _learn(model: BackgroundModel, image: np.ndarray, hidden: np.ndarray, rate: 
     # There the mixture is shown the mean, one deviation up and down in turns: shown no noise at all, it would come to expect none.
     turn = 1 if model.frame // settings.learn_every % 2 else -1
     luma = cv2.addWeighted(mean[..., 0], 1, model.deviation[..., 0], turn, 0)
-    empty = _as_image(cv2.merge([luma, mean[..., 1], mean[..., 2]]))
+    empty = as_image(cv2.merge([luma, mean[..., 1], mean[..., 2]]))
     cv2.copyTo(image, seen, empty)
     model.mixture.apply(empty, learningRate=rate)
 
@@ -489,22 +426,10 @@ def _adapt_to_switch(model: BackgroundModel, image: np.ndarray, settings: Segmen
     near = cv2.dilate(model.people.view(np.uint8), np.ones((side, side), np.uint8))
     outside = (1 - near)[..., None].astype(np.float32)
     before = model.mean.copy() if model.before is None else model.before
-    old = _as_image(model.mean).astype(np.float32)
+    old = as_image(model.mean).astype(np.float32)
     window = (4 * side + 1, 4 * side + 1)
     gain = (cv2.blur(image * outside, window) + 1e-3) / (cv2.blur(old * outside, window) + 1e-3)
     empty = np.where(near[..., None] > 0, np.clip(old * gain, 0, 255), image).astype(np.uint8)
-    model.mean[...] = _luma_chroma(empty)
+    model.mean[...] = luma_chroma(empty)
     model.mixture.apply(empty, learningRate=SWITCH_RATE)
     return replace(model, frame=model.frame + 1, settling=SETTLING_FRAMES, before=before, changes=model.changes + 1)
-
-
-def _luma_chroma(image: np.ndarray) -> np.ndarray:
-    """A BGR image in YCrCb, with luma 1 at least so that one may divide by it."""
-    color = cv2.cvtColor(image, cv2.COLOR_BGR2YCrCb)
-    np.maximum(color[..., 0], 1, out=color[..., 0])
-    return color
-
-
-def _as_image(mean: np.ndarray) -> np.ndarray:
-    """The background as a BGR image."""
-    return cv2.cvtColor(cv2.convertScaleAbs(mean), cv2.COLOR_YCrCb2BGR)

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from hmc.camera.segmentation import light_gain
+from hmc.camera.light import in_light_of
 from hmc.voxels.carving import carve, pixels_at
 from hmc.voxels.completion import CompletionTables, doubted_floor, shown
 
@@ -121,7 +121,7 @@ def cut_floor_shadows(
         Each within the mask it came from. With fewer than two cameras that know the empty floor, the masks as they are.
     """
     floors = {
-        c: _Floor(image, scene, light_gain(image, scene.mean, mask))
+        c: _Floor(in_light_of(image, scene.mean, mask), scene)
         for c, (image, scene, mask) in enumerate(zip(images, scenes, masks, strict=True))
         if image is not None and scene is not None and mask is not None
     }
@@ -143,11 +143,10 @@ def cut_floor_shadows(
 
 @dataclass(frozen=True)
 class _Floor:
-    """What a camera knows of the floor's light: its image, the empty scene, and how bright the image is as a whole."""
+    """What a camera knows of the floor's light: its image, in the light of the empty scene, and that scene."""
 
     image: np.ndarray
     scene: Scene
-    gain: float
 
 
 def _darkness(floor: _Floor, pixels: np.ndarray) -> np.ndarray:
@@ -159,7 +158,6 @@ def _darkness(floor: _Floor, pixels: np.ndarray) -> np.ndarray:
     color = part.reshape(-1, 3).take(places, axis=0).astype(np.float32)
     luma, *chroma = (floor.scene.mean[..., k].reshape(-1).take(pixels) for k in range(3))
     share = np.maximum(color[:, 0], 1) / luma
-    share /= floor.gain  # exposure, flicker
     lit = np.minimum(share, 1)  # chroma shrinks with the light
     tint = np.maximum(*(np.abs(color[:, k] - 128 - lit * (mean - 128)) for k, mean in enumerate(chroma, start=1)))
     dark = np.where(tint < MOST_CHROMA, np.log(share), _OTHER)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hmc.camera.background import stable_background
-from hmc.camera.segmentation import SegmentationSettings, color_gains, light_gain, segment, segment_views, train_background
+from hmc.camera.segmentation import SegmentationSettings, segment, segment_views, train_background
 from hmc.camera.shade import floor_pixels
 from hmc.camera.silhouettes import cut_halo, evidence
 from hmc.errors import InputError
@@ -59,8 +59,13 @@ def overlap(mask, truth):
 
 
 def lamp(left, right):
-    """The light of a lamp at one side of the room, from the left to the right of the image: no one factor accounts for it."""
+    """The light of a lamp at one side of the room, from the left to the right of the image."""
     return np.linspace(left, right, SIZE[0])[None, :, None]
+
+
+def hard_light(lit, dark):
+    """Light that falls in stripes, as through a window: nothing that changes smoothly over the image accounts for it."""
+    return np.where(np.arange(SIZE[0]) // 40 % 2, lit, dark)[None, :, None]
 
 
 def trained(scene, frames=30, settings=None):
@@ -136,21 +141,23 @@ def test_who_stands_still_is_never_learnt():
 
 
 def test_light_that_drifts_is_followed():
-    """A fifth brighter over four hundred frames, with somebody there; without learning all would be foreground."""
+    """A tenth brighter in stripes over four hundred frames, with somebody there; without learning these would be foreground."""
     scene = Scene(5)
     following = trained(scene)
     frozen = trained(scene)
     settings = SegmentationSettings(learn_every=2, learning_rate=0.15)
-    for light in np.linspace(1, 1.2, 400):
-        scene.light = light
+    for light in np.linspace(1, 1.1, 400):
+        scene.light = hard_light(light, 1.0)
         image, truth = scene.person(x=120)
         mask, following = segment(following, image, settings)
         assert mask is not None
     assert overlap(mask, truth) > 0.85
-    assert following.mean[..., 0].mean() > 1.1 * frozen.mean[..., 0].mean()
+    assert following.mean[..., 0].mean() > 1.025 * frozen.mean[..., 0].mean()
 
 
-@pytest.mark.parametrize("light", [1.3, 0.6, 0.96, (1.03, 1.0, 0.97), (0.95, 1.0, 1.06), (1.6, 1.4, 1.2)])
+@pytest.mark.parametrize(
+    "light", [1.3, 0.6, 0.96, (1.03, 1.0, 0.97), (0.95, 1.0, 1.06), (1.6, 1.4, 1.2), lamp(0.9, 1.1), lamp(1.3, 0.7), lamp(1.6, 0.8)]
+)
 def test_automatic_exposure_white_balance_and_flicker_cost_nothing(light):
     scene = Scene(8)
     model = trained(scene)
@@ -163,24 +170,24 @@ def test_automatic_exposure_white_balance_and_flicker_cost_nothing(light):
 
 @pytest.mark.parametrize("frames", [1, 2])
 def test_a_flash_costs_no_more_than_its_frames(frames):
-    """A flash comes from one side, so that it is no matter of exposure."""
+    """A flash is no matter of exposure: it leaves hard shadows."""
     scene = Scene(9)
     model = trained(scene)
     for i in range(14):
-        scene.light = lamp(2.0, 1.1) if 4 <= i < 4 + frames else 1.0
+        scene.light = hard_light(2.0, 1.1) if 4 <= i < 4 + frames else 1.0
         image, truth = scene.person(x=100 + 4 * i)
         mask, model = segment(model, image)
         assert (mask is None) if i == 4 else (4 < i < 4 + frames or overlap(mask, truth) > 0.85)
     assert model.before is None
 
 
-@pytest.mark.parametrize("light", [lamp(1.6, 0.8), np.array([0.3, 0.4, 0.6])], ids=["lamp", "dusk"])
+@pytest.mark.parametrize("light", [(0.4, 0.35, 0.25), (0.3, 0.4, 0.6)])
 def test_a_light_switch_costs_the_camera_one_frame(light):
     scene = Scene(6)
     model = trained(scene)
     for _ in range(5):
         mask, model = segment(model, scene.person(x=120)[0])
-    scene.light = light
+    scene.light = np.array(light)
     mask, model = segment(model, scene.person(x=121)[0])
     assert mask is None
     for x in range(122, 134):
@@ -336,24 +343,3 @@ def test_an_empty_scene_under_lamps_that_flicker_is_as_sharp_as_under_steady_lig
 
     deviation = train_background(flickering()).deviation
     assert np.median(deviation[..., 0] / steady[..., 0]) < 1.2
-
-
-@pytest.mark.parametrize("gains", [(0.9, 1.0, 1.1), (1.3, 1.2, 0.7)])
-def test_the_gain_of_each_channel_is_told_whatever_people_wear(gains):
-    scene = Scene(11)
-    model = trained(scene)
-    scene.light = np.array(gains)
-    assert color_gains(scene.person()[0], model.mean, model.people) == pytest.approx(gains, abs=0.015)
-    assert (color_gains(scene.empty(), model.mean, ~model.people) == 1).all()
-    assert (color_gains(np.full_like(scene.empty(), 255), model.mean, model.people) == 1).all()
-
-
-def test_the_gain_of_an_image_is_that_of_its_median_beside_people():
-    rng = np.random.default_rng(5)
-    mean = np.full((96, 128, 3), 128, np.float32)
-    mean[..., 0] = rng.uniform(60, 120, mean.shape[:2])
-    people = np.zeros(mean.shape[:2], bool)
-    people[:, 40:90] = True
-    image = np.where(people, 5, 0.8 * mean[..., 0])[..., None].repeat(3, axis=2).astype(np.uint8)
-    assert light_gain(image, mean, people) == pytest.approx(0.8, abs=0.01)
-    assert light_gain(image, mean, ~np.zeros_like(people)) == 1

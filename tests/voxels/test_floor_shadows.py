@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 from drawn import floor_patch, silhouette
 
-from hmc.camera.segmentation import light_gain, train_background
+from hmc.camera.light import in_light_of
+from hmc.camera.segmentation import train_background
 from hmc.voxels.carving import carve, pixels_at
 from hmc.voxels.completion import make_completion_tables, shown
 from hmc.voxels.floor_shadows import cut_filled_shadows, cut_floor_shadows
@@ -153,9 +154,9 @@ def cut_by_whole_images(tables, images, models, masks):
     """The rule pixel by pixel and cell by cell, with nothing left out: whole images, all cells of the floor, all cameras."""
     seen, cut = [], []
     for image, model, mask in zip(images, models, masks, strict=True):
-        color = cv2.GaussianBlur(cv2.cvtColor(image, cv2.COLOR_BGR2YCrCb), (3, 3), 0).astype(np.float32)
+        lit = in_light_of(image, model.mean, mask)
+        color = cv2.GaussianBlur(cv2.cvtColor(lit, cv2.COLOR_BGR2YCrCb), (3, 3), 0).astype(np.float32)
         share = np.maximum(color[..., 0], 1) / model.mean[..., 0]
-        share /= light_gain(image, model.mean, mask)
         tint = np.abs(color[..., 1:] - 128 - np.minimum(share, 1)[..., None] * (model.mean[..., 1:] - 128)).max(axis=-1)
         seen.append(np.where(tint < 6, np.log(share), np.float32(9)))
     floor = np.stack([np.append(dark, np.float32(np.nan)).take(cells) for dark, cells in zip(seen, tables.cell_pixels, strict=True)])

@@ -1,0 +1,101 @@
+"""The light of an image against that of the empty scene: exposure, flicker, white balance, a lamp at one side.
+
+An image may be brighter, darker or of another tinge than the frames of the empty scene, as a whole or more so towards one side. That is one
+factor a channel that changes smoothly over the image, and it is told beside people. Ours; that a change of the light scales each channel by
+itself is von Kries's model (1902).
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+__all__ = ["FEW", "as_image", "in_light_of", "light_gains", "luma_chroma"]
+
+#: Every so manieth pixel of each row and column tells of a whole image.
+FEW = (slice(None, None, 16),) * 2
+#: By less than this factor in each channel the light is the same.
+LEAST_GAIN = 1.01
+#: Grey levels from which on a pixel may be brighter than it looks, and below which a channel tells of no factor.
+OVEREXPOSED, TOO_DARK = 250, 20
+#: So many pixels must tell of a factor that changes over the image; of fewer it is one.
+LEAST_TOLD = 100
+#: The fit is weighted anew so many times; what is off by more than so many deviations hardly counts (Geman and McClure 1987): people.
+ROUNDS, DEVIATIONS = 6, 3.0
+
+
+def light_gains(image: np.ndarray, mean: np.ndarray, people: np.ndarray) -> np.ndarray:
+    """By which factor an image is brighter than the empty scene in each channel, and how that changes over the image.
+
+    A polynomial of second order of the logarithms, by iteratively reweighted least squares, within what the image itself shows.
+
+    Parameters
+    ----------
+    image : ndarray of uint8, shape (height, width, 3)
+        BGR.
+    mean : ndarray of float32, shape (height, width, 3)
+        The empty scene (`hmc.camera.segmentation.BackgroundModel.mean`).
+    people : ndarray of bool, shape (height, width)
+        Where nothing is told.
+
+    Returns
+    -------
+    ndarray of float32, shape (rows, columns, 3)
+        At the pixels `FEW`; blue, green, red; 1 where nothing tells.
+    """
+    seen, empty = image[FEW], as_image(np.ascontiguousarray(mean[FEW]))
+    gains = np.ones(seen.shape, np.float32)
+    y, x = (axis.ravel() for axis in np.meshgrid(*(np.linspace(-1, 1, n) for n in seen.shape[:2]), indexing="ij"))
+    terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1)
+    for channel in range(3):
+        now, before = seen[..., channel].ravel(), empty[..., channel].ravel()
+        told = (now < OVEREXPOSED) & (before >= TOO_DARK) & ~people[FEW].ravel()
+        if told.any():
+            ratios = np.log(np.maximum(now[told], 1) / before[told])
+            if _is_same(ratios, x[told], y[told]):
+                continue
+            known = terms[told] if len(ratios) >= LEAST_TOLD else terms[told, :1]
+            at = _fitted(known, ratios)
+            low, high = np.percentile(known @ at, (2, 98))
+            gains[..., channel] = np.exp(np.clip(terms[:, : len(at)] @ at, low, high)).reshape(seen.shape[:2])
+    return gains
+
+
+def _is_same(ratios: np.ndarray, x: np.ndarray, y: np.ndarray) -> bool:
+    """Whether logarithms of factors are those of the same light, in each quarter of the image."""
+    quarter = 2 * (y > 0) + (x > 0)
+    return all(abs(np.median(ratios[quarter == k])) < np.log(LEAST_GAIN) for k in np.unique(quarter))
+
+
+def _fitted(terms: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Coefficients (k,) of terms (n, k) for values (n,), of which many may be off."""
+    at = np.zeros(terms.shape[1])
+    at[0] = np.median(values)
+    for _ in range(ROUNDS if terms.shape[1] > 1 else 0):
+        left = values - terms @ at
+        spread = 1.4826 * np.median(np.abs(left)) + 1e-3
+        weighted = terms / (1 + (left / (DEVIATIONS * spread)) ** 2)[:, None] ** 2
+        at = np.linalg.lstsq(weighted.T @ terms, weighted.T @ values, rcond=None)[0]
+    return at
+
+
+def in_light_of(image: np.ndarray, mean: np.ndarray, people: np.ndarray) -> np.ndarray:
+    """An image brought to the light of the empty scene (`light_gains`); itself where that is its own."""
+    gains = light_gains(image, mean, people)
+    if np.all((gains > 1 / LEAST_GAIN) & (gains < LEAST_GAIN)):
+        return image
+    level = cv2.multiply(image, cv2.resize(1 / gains, image.shape[1::-1]), dtype=cv2.CV_8U)
+    # What is overexposed may have been as bright as the scene is.
+    return np.maximum(level, as_image(mean), out=level, where=image >= OVEREXPOSED)
+
+
+def luma_chroma(image: np.ndarray) -> np.ndarray:
+    """A BGR image in YCrCb, with luma 1 at least so that one may divide by it."""
+    color = cv2.cvtColor(image, cv2.COLOR_BGR2YCrCb)
+    np.maximum(color[..., 0], 1, out=color[..., 0])
+    return color
+
+
+def as_image(mean: np.ndarray) -> np.ndarray:
+    """The background as a BGR image."""
+    return cv2.cvtColor(cv2.convertScaleAbs(mean), cv2.COLOR_YCrCb2BGR)
