@@ -14,10 +14,10 @@ T = TypeVar("T")
 LEARNING, TRACKING, FIRST_POSE, FOLLOWING = "learning the empty scene", "tracking", "first pose", "following"
 FITTING, SECOND_PASS, VIEWS = "fitting bodies", "second pass", "counting views"
 
-#: What a frame of a stage costs beside a frame that is tracked, and a halt for each person: medians of three recordings of 1 to 3 people
-#: and 4 to 7 cameras. As soon as something is measured, these say only how the rest compares with it.
-FRAME_COSTS = {TRACKING: 1.0, FOLLOWING: 0.7, SECOND_PASS: 0.63, VIEWS: 0.1}
-HALT_COSTS = {FIRST_POSE: 92.0, FITTING: 72.0}
+#: What a frame of a stage costs beside a frame that is tracked, and a halt for each person: in the midst of five runs of 1 and 2 people, 4
+#: and 7 cameras, 1 and 2 processes. As soon as something is measured, these say only how the rest compares with it.
+FRAME_COSTS = {TRACKING: 1.0, FOLLOWING: 0.5, SECOND_PASS: 0.35, VIEWS: 0.1}
+HALT_COSTS = {FIRST_POSE: 60.0, FITTING: 18.0}
 #: Those that cost more with more people.
 OF_PEOPLE = (FOLLOWING, SECOND_PASS, VIEWS)
 #: Frames of a stage from which on its own speed is believed, and the share of a halt that is left at least while it lasts.
@@ -50,6 +50,7 @@ class RunBar:
         self._done: dict[str, int] = {}
         self._totals: dict[str, int] = {}
         self._seconds: dict[str, float] = {}
+        self._before: tuple[int, float] = (0, 0.0)
         self._bar: Any = None
 
     def stage(self, name: str, first: str | None = None) -> Callable[[Iterable[T], int], Iterator[T]]:
@@ -102,7 +103,10 @@ class RunBar:
         if stage not in FRAME_COSTS:
             return 0.0
         done = self._done.get(stage, 0)
-        rate = self._seconds.get(stage, 0.0) / done if done >= ENOUGH_FRAMES else self._cost(stage) * unit
+        # Frames of which nobody has a pose yet tell nothing of the speed at which people are followed.
+        before, seconds = self._before if stage == FOLLOWING else (0, 0.0)
+        enough = done - before >= ENOUGH_FRAMES
+        rate = (self._seconds.get(stage, 0.0) - seconds) / (done - before) if enough else self._cost(stage) * unit
         return rate * max(0, self._totals.get(stage, self._frames) - done)
 
     def _cost(self, stage: str) -> float:
@@ -128,6 +132,8 @@ class RunBar:
         """The halt that there was is over."""
         if self._name in HALT_COSTS:
             self._done[self._name] = self._done.get(self._name, 0) + (1 if self._name == FIRST_POSE else self.people)
+            if self._name == FIRST_POSE and self._done[FIRST_POSE] == 1:
+                self._before = self._done.get(FOLLOWING, 0), self._seconds.get(FOLLOWING, 0.0)
         self._name = None
 
     def _open(self, name: str, total: int | None) -> None:
