@@ -20,10 +20,12 @@ import numpy as np
 
 from hmc.camera.image_signs import is_dark
 from hmc.camera.light import FEW, as_image, in_light_of, luma_chroma
+from hmc.camera.mixture import SHADOW, ask_mixture, coarse
 from hmc.camera.noise import blur_for, blurred, is_grey, noise_floor
 from hmc.camera.segmentation_settings import SegmentationSettings
 from hmc.camera.shade import shade_features, told_by_chance
 from hmc.camera.silhouettes import GapRules, cut_halo, evidence, fill_gaps, filled_for_darkness, in_planes, without_specks
+from hmc.camera.zoom import enlarged, enlarged_mask, reduced_mask
 from hmc.errors import InputError
 
 __all__ = [
@@ -48,8 +50,6 @@ FEWEST_FRAMES = 5
 NOISE_FRAMES = 8
 #: Most variance of a pixel in the mixture: OpenCV's, and in terms of the least.
 MOST_VARIANCE, VARIANCE_RANGE = 75.0, 4.0
-#: What OpenCV's mixture answers a pixel.
-SHADOW, FOREGROUND = 127, 255
 #: Near people, differences beyond this many standard deviations are doubtful. Of points on pale people before pale walls that have no
 #: silhouette, nine in ten are doubtful, most of them as shadows (measured).
 DOUBT = 3.0
@@ -106,6 +106,8 @@ class BackgroundModel:
         The empty scene has no color: images without any may come from a monochrome camera.
     floor : ndarray of bool, shape (height, width), or None
         Which pixels look at the floor of the room, where that is known (`hmc.camera.shade.floor_pixels`).
+    coarse : ndarray of uint8, shape (height / n, width / n, 3)
+        The mean as a small image, BGR (`hmc.camera.mixture.coarse`).
     changes : int
         How often the mean has changed.
     """
@@ -114,6 +116,7 @@ class BackgroundModel:
     mean: np.ndarray
     deviation: np.ndarray
     people: np.ndarray
+    coarse: np.ndarray
     frame: int = 0
     settling: int = 0
     before: np.ndarray | None = None
@@ -159,29 +162,29 @@ def train_background(
     frames = iter(frames)
     first = list(islice(frames, NOISE_FRAMES))
     blur = blur_for(first)
-    mean = square = None
+    total = squares = None
     count = 0
     for count, frame in enumerate(chain(first, frames), start=1):
         frame = blurred(frame, blur)
-        if mean is not None and frame.shape == mean.shape:
-            frame = in_light_of(frame, mean, np.zeros(mean.shape[:2], bool))
+        if total is not None and frame.shape == total.shape:
+            frame = in_light_of(frame, total / (count - 1), np.zeros(total.shape[:2], bool))
         mixture.apply(frame, learningRate=1.0 / count)
-        color = cv2.cvtColor(frame, cv2.COLOR_BGR2YCrCb).astype(np.float32)
-        if mean is None or square is None:
-            mean, square = color, np.zeros_like(color)
-            continue
-        if color.shape != mean.shape:
-            raise InputError(f"background frames differ in size: {mean.shape[1::-1]} and {color.shape[1::-1]} pixels")
-        step = color - mean
-        mean += step / count
-        square += step * (color - mean)
-    if mean is None or square is None:
+        color = cv2.cvtColor(frame, cv2.COLOR_BGR2YCrCb)
+        if total is None or squares is None:
+            total, squares = np.zeros((2, *color.shape), np.float32)
+        if color.shape != total.shape:
+            raise InputError(f"background frames differ in size: {total.shape[1::-1]} and {color.shape[1::-1]} pixels")
+        cv2.accumulate(color, total)
+        cv2.accumulateSquare(color, squares)
+    if total is None or squares is None:
         raise InputError("there is no background frame to learn from: give some, or a median of the recording")
+    mean = (total / count).astype(np.float32)
     if count < FEWEST_FRAMES:
         deviation = np.broadcast_to(np.array(ASSUMED_DEVIATION, np.float32), (*mean.shape[:2], 2)).copy()
     else:
         # A pixel's own few samples say little of its noise; its neighbours' do.
-        variance = cv2.blur(square / (count - 1), (9, 9))
+        squares -= np.square(total, out=total) / count  # sums of whole numbers, exact for some 250 frames
+        variance = cv2.blur((squares / (count - 1)).astype(np.float32), (9, 9))
         variance = np.stack([variance[..., 0], variance[..., 1:].mean(axis=2)], axis=-1)
         deviation = np.sqrt(variance)
         noise = noise_floor(deviation)
@@ -191,13 +194,14 @@ def train_background(
         mixture.apply(as_image(mean), learningRate=0)  # raises the variances that are smaller, and changes nothing else
     mean[..., 0] = np.maximum(mean[..., 0], 1)
     people = np.zeros(mean.shape[:2], bool)
-    grey = is_grey(as_image(mean))
-    return BackgroundModel(mixture, in_planes(mean), in_planes(deviation), people, unseen=unseen, blur=blur, grey=grey, floor=floor)
+    empty = as_image(mean)
+    planes = in_planes(mean), in_planes(deviation)
+    return BackgroundModel(mixture, *planes, people, coarse(empty), unseen=unseen, blur=blur, grey=is_grey(empty), floor=floor)
 
 
 def shades_of(model: BackgroundModel, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The pixels of an image that may be shadows or people, flat, and what tells of each (`hmc.camera.shade.shade_features`)."""
-    _, found = _apply(model, image)
+    _, found = ask_mixture(model.mixture, image, model.coarse)
     seeds = cv2.morphologyEx(found, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
     seen = evidence(image, model.mean, model.deviation)
     scale = max(image.shape[:2]) / 640
@@ -246,7 +250,7 @@ def segment(
     model.mixture.setShadowThreshold(settings.shadow_factor)
     if model.before is not None and _nearer(image, model.before, model.mean):  # it was a flash
         model.mean[...] = model.before
-        model = replace(model, before=None, changes=model.changes + 1)
+        model = _with_new_mean(replace(model, before=None))
     image, answer, found = _level(model, image)
     if cv2.countNonZero(found) > settings.max_foreground * found.size:
         return None, _adapt_to_switch(model, image, settings)
@@ -263,7 +267,7 @@ def segment(
         rate = SETTLING_RATE if after.settling else settings.learning_rate
         people = mask if model.unseen is None else mask | model.unseen
         _learn(after, image, _hidden(people, answer, settings), rate, settings)
-        after = replace(after, changes=after.changes + 1)
+        after = _with_new_mean(after)
     return mask, after
 
 
@@ -297,19 +301,13 @@ def segment_views(
     return tuple(mask for mask, _ in results), tuple(model for _, model in results)
 
 
-def _apply(model: BackgroundModel, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """What the mixture says of an image, and where that is foreground, 1 or 0."""
-    answer = model.mixture.apply(image, learningRate=0)
-    return answer, cv2.threshold(answer, FOREGROUND - 1, 1, cv2.THRESH_BINARY)[1]
-
-
 def _level(model: BackgroundModel, image: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The image in the light of the empty scene, or as it is where that accounts for no less of it; with `_apply` of it."""
+    """The image in the light of the empty scene, or as it is where that accounts for no less of it; with `ask_mixture` of it."""
     level = in_light_of(image, model.mean, model.people)
-    answer, found = _apply(model, level)
+    answer, found = ask_mixture(model.mixture, level, model.coarse)
     left = cv2.countNonZero(found)
     if level is not image and left > SUSPECT_SHARE * found.size:
-        answer_as_is, found_as_is = _apply(model, image)
+        answer_as_is, found_as_is = ask_mixture(model.mixture, image, model.coarse)
         if left > MOST_LEFT * found.size or left >= cv2.countNonZero(found_as_is):
             return image, answer_as_is, found_as_is
     return level, answer, found
@@ -339,9 +337,9 @@ def _complete(
     rows = slice(max(0, top - margin), top + height + margin)
     columns = slice(max(0, left - margin), left + width + margin)
     zoom = max(1, round(COMPLETION_PX / max(image.shape[:2])))
-    seeds = cv2.morphologyEx(_enlarged_mask(found[rows, columns], zoom), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
-    mean = _enlarged(model.mean[rows, columns], zoom)
-    seen = evidence(_enlarged(image[rows, columns], zoom), mean, _enlarged(model.deviation[rows, columns], zoom))
+    seeds = cv2.morphologyEx(enlarged_mask(found[rows, columns], zoom), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+    mean = enlarged(model.mean[rows, columns], zoom)
+    seen = evidence(enlarged(image[rows, columns], zoom), mean, enlarged(model.deviation[rows, columns], zoom))
     rules = GapRules(
         threshold=settings.gap_threshold,
         reach_threshold=settings.reach_threshold,
@@ -360,28 +358,10 @@ def _complete(
         dark &= part
     else:
         dark = filled_for_darkness(part, seeds, seen, rules)
-    mask[rows, columns] = _reduced_mask(part, zoom)
-    filled[rows, columns] = mask[rows, columns] & _reduced_mask(dark, zoom)
-    doubtful[rows, columns] |= _reduced_mask(((seen.chroma2 > DOUBT**2) | (np.abs(seen.luma) > DOUBT)).view(np.uint8), zoom)
+    mask[rows, columns] = reduced_mask(part, zoom)
+    filled[rows, columns] = mask[rows, columns] & reduced_mask(dark, zoom)
+    doubtful[rows, columns] |= reduced_mask(((seen.chroma2 > DOUBT**2) | (np.abs(seen.luma) > DOUBT)).view(np.uint8), zoom)
     return mask, filled, cv2.morphologyEx(doubtful, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
-
-
-def _enlarged(array: np.ndarray, zoom: int) -> np.ndarray:
-    """An image or a map of the same values, so many times as wide and high."""
-    if zoom == 1:
-        return array
-    large = cv2.resize(array, None, fx=zoom, fy=zoom, interpolation=cv2.INTER_CUBIC)
-    return np.maximum(large, array.min())  # cubic curves swing beyond what they join
-
-
-def _enlarged_mask(mask: np.ndarray, zoom: int) -> np.ndarray:
-    """A mask of 0 and 1 with smooth outlines, so many times as wide and high."""
-    return mask if zoom == 1 else cv2.resize(mask * 255, None, fx=zoom, fy=zoom, interpolation=cv2.INTER_LINEAR) // 128
-
-
-def _reduced_mask(mask: np.ndarray, zoom: int) -> np.ndarray:
-    """The mask as it was before it was enlarged: 1 where half of a pixel is."""
-    return mask if zoom == 1 else cv2.resize(mask * 255, None, fx=1 / zoom, fy=1 / zoom, interpolation=cv2.INTER_AREA) // 128
 
 
 def _hidden(mask: np.ndarray, answer: np.ndarray, settings: SegmentationSettings) -> np.ndarray:
@@ -432,4 +412,9 @@ def _adapt_to_switch(model: BackgroundModel, image: np.ndarray, settings: Segmen
     empty = np.where(near[..., None] > 0, np.clip(old * gain, 0, 255), image).astype(np.uint8)
     model.mean[...] = luma_chroma(empty)
     model.mixture.apply(empty, learningRate=SWITCH_RATE)
-    return replace(model, frame=model.frame + 1, settling=SETTLING_FRAMES, before=before, changes=model.changes + 1)
+    return _with_new_mean(replace(model, frame=model.frame + 1, settling=SETTLING_FRAMES, before=before))
+
+
+def _with_new_mean(model: BackgroundModel) -> BackgroundModel:
+    """The model after its mean has changed."""
+    return replace(model, coarse=coarse(as_image(model.mean)), changes=model.changes + 1)

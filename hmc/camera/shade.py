@@ -137,74 +137,89 @@ def shade_features(
     features : ndarray of float32, shape (n, 23)
         In the order of `FEATURES`.
     """
-
-    def side(width: int) -> tuple[int, int]:
-        return (2 * round((width * scale - 1) / 2) + 1,) * 2
-
     told = ((seen.chroma2 > SURE**2) | (seen.luma > SURE) | (seen.lost > 1 - DARKEST)).view(np.uint8)
     sure = cv2.morphologyEx(np.bitwise_and(seeds, told), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
-    near = cv2.dilate(sure, np.ones(side(2 * REACH_PX + 1), np.uint8))
+    near = cv2.dilate(sure, np.ones(_square(2 * REACH_PX + 1, scale), np.uint8))
     pixels = np.flatnonzero(is_shade(seen) & near.view(bool))
     if not len(pixels):
         return pixels, np.zeros((0, len(FEATURES)), np.float32)
-    color = cv2.cvtColor(image, cv2.COLOR_BGR2YCrCb)
-    luma, red, blue = (cv2.GaussianBlur(cv2.extractChannel(color, channel), (3, 3), 0).astype(np.float32) for channel in range(3))
-    scene, noise = np.ascontiguousarray(mean[..., 0]), np.maximum(deviation[..., 0], 1.5)
-    light = np.log(np.clip((luma + 4) / (scene + 4), 0.05, 2))
-    small = side(7)
-    # One gain for all of the neighbourhood, as a shadow has; what it leaves is another texture.
-    by_scene, squares = cv2.blur(luma * scene, small), cv2.blur(scene * scene, small)
-    left = cv2.blur(luma * luma, small) - by_scene * by_scene / np.maximum(squares, 1)
-    texture = squares - cv2.blur(scene, small) ** 2
-    mean_light = cv2.blur(light, small)
-    rough = cv2.blur(light * light, small) - mean_light**2
-    edge = cv2.magnitude(cv2.Scharr(light, -1, 1, 0, scale=scale / 32), cv2.Scharr(light, -1, 0, 1, scale=scale / 32))
-    away, nearest = cv2.distanceTransformWithLabels(1 - sure, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
+    away, label = cv2.distanceTransformWithLabels(1 - sure, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
     # Each label is the place of one sure pixel.
-    places = np.flatnonzero(sure)
-    of_label = np.zeros(int(nearest.max()) + 1, np.intp)
-    of_label[nearest.ravel()[places]] = places
-    person = of_label[nearest.ravel()[pixels]]
-    shares = [cv2.blur(sure * 255, side(width)) for width in (9, 21, 41)]
-    doubts = ((np.abs(seen.luma) > LEAST_LUMA) | (seen.chroma2 > 9)).astype(np.float32)
-    around = cv2.blur(light * doubts, side(15)) / np.maximum(cv2.blur(doubts, side(15)), 0.05)
-    beside = light - cv2.GaussianBlur(light, (0, 0), 3 * scale)
+    places = np.flatnonzero(sure.view(bool))
+    of_label = np.zeros(len(places) + 1, np.intp)
+    of_label[label.ravel()[places]] = places
+    person = of_label[label.ravel()[pixels]]
+    rows = _neighbourhood(image, mean, deviation, seen, sure, scale, (pixels, person))
+    rows["distance"] = np.minimum(away.ravel().take(pixels) / scale, 100)
+    rows["floor"] = np.full(len(pixels), FLOOR_UNKNOWN) if floor is None else floor.ravel().take(pixels)
+    # A row a feature, as they are made: the other way round costs more than all of the network.
+    return pixels, np.array([rows[name] for name in FEATURES], np.float32).T
+
+
+def _square(width: int, scale: float) -> tuple[int, int]:
+    return (2 * round((width * scale - 1) / 2) + 1,) * 2
+
+
+def _neighbourhood(
+    image: np.ndarray,
+    mean: np.ndarray,
+    deviation: np.ndarray,
+    seen: Evidence,
+    sure: np.ndarray,
+    scale: float,
+    places: tuple[np.ndarray, np.ndarray],
+) -> dict[str, np.ndarray]:
+    """What the neighbourhood of some pixels tells, by name; `places` are theirs and that of the nearest sure pixel of each, flat."""
+    pixels, person = places
 
     def at(array: np.ndarray) -> np.ndarray:
-        return np.asarray(array.ravel()[pixels], np.float32)
+        return np.asarray(array.ravel().take(pixels), np.float32)
 
-    own_scene, own_noise, color_noise = at(scene), at(noise), at(deviation[..., 1])
-    share = np.minimum(np.exp(at(light)), 1.1)
-    reds, blues = at(red), at(blue)
-    columns = [
-        1 - np.exp(at(light)),
-        np.clip(at(seen.luma), -60, 60),
-        np.minimum(np.sqrt(at(seen.chroma2)), 20),
-        np.clip((reds - 128 - (at(mean[..., 1]) - 128) * share) / color_noise, -15, 15),
-        np.clip((blues - 128 - (at(mean[..., 2]) - 128) * share) / color_noise, -15, 15),
-        own_scene / 255,
-        np.log1p(np.maximum(at(left), 0) / own_noise**2),
-        np.log1p(np.maximum(at(texture), 0) / own_noise**2),
-        at(edge),
-        at(cv2.dilate(edge, np.ones(side(5), np.uint8))),
-        at(cv2.dilate(edge, np.ones(side(11), np.uint8))),
-        at(cv2.blur(edge, small)),
-        np.sqrt(np.maximum(at(rough), 0)) * (own_scene + 4) / own_noise,
-        np.minimum(at(away) / scale, 100),
-        at(luma) - luma.ravel()[person],
-        np.hypot(reds - red.ravel()[person], blues - blue.ravel()[person]),
-        *(at(one) / 255 for one in shares),
-        at(cv2.blur(doubts, side(9))),
-        at(around),
-        at(beside),
-        np.full(len(pixels), FLOOR_UNKNOWN) if floor is None else at(floor),
-    ]
-    return pixels, np.stack(columns, axis=1).astype(np.float32)
+    small = _square(7, scale)
+    color = cv2.cvtColor(image, cv2.COLOR_BGR2YCrCb)
+    luma, red, blue = (cv2.GaussianBlur(cv2.extractChannel(color, channel), (3, 3), 0) for channel in range(3))
+    luma, scene = luma.astype(np.float32), np.ascontiguousarray(mean[..., 0])
+    own_scene, color_noise = at(scene), at(deviation[..., 1])
+    own_noise = np.maximum(at(deviation[..., 0]), 1.5)
+    light = cv2.log(np.clip((luma + 4) / (scene + 4), 0.05, 2))
+    own_light = at(light)
+    # One gain for all of the neighbourhood, as a shadow has; what it leaves is another texture.
+    squares = at(cv2.blur(scene * scene, small))
+    left = at(cv2.blur(luma * luma, small)) - at(cv2.blur(luma * scene, small)) ** 2 / np.maximum(squares, 1)
+    texture = squares - at(cv2.blur(scene, small)) ** 2
+    rough = at(cv2.blur(light * light, small)) - at(cv2.blur(light, small)) ** 2
+    edge = cv2.magnitude(cv2.Scharr(light, -1, 1, 0, scale=scale / 32), cv2.Scharr(light, -1, 0, 1, scale=scale / 32))
+    doubts = ((np.abs(seen.luma) > LEAST_LUMA) | (seen.chroma2 > 9)).astype(np.float32)
+    share = np.exp(own_light)
+    lit = np.minimum(share, 1.1)
+    own_luma, reds, blues = at(luma), at(red), at(blue)
+    return {
+        "lost": 1 - share,
+        "luma": np.clip(at(seen.luma), -60, 60),
+        "chroma": np.minimum(np.sqrt(at(seen.chroma2)), 20),
+        "red": np.clip((reds - 128 - (at(mean[..., 1]) - 128) * lit) / color_noise, -15, 15),
+        "blue": np.clip((blues - 128 - (at(mean[..., 2]) - 128) * lit) / color_noise, -15, 15),
+        "scene": own_scene / 255,
+        "left_texture": np.log1p(np.maximum(left, 0) / own_noise**2),
+        "texture": np.log1p(np.maximum(texture, 0) / own_noise**2),
+        "edge": at(edge),
+        "edge_5": at(cv2.dilate(edge, np.ones(_square(5, scale), np.uint8))),
+        "edge_11": at(cv2.dilate(edge, np.ones(_square(11, scale), np.uint8))),
+        "edge_mean_7": at(cv2.blur(edge, small)),
+        "rough_7": np.sqrt(np.maximum(rough, 0)) * (own_scene + 4) / own_noise,
+        "luma_from_person": own_luma - luma.ravel().take(person),
+        "chroma_from_person": np.hypot(reds - red.ravel().take(person), blues - blue.ravel().take(person)),
+        **{f"sure_{width}": at(cv2.blur(sure * 255, _square(width, scale))) / 255 for width in (9, 21, 41)},
+        "doubt_9": at(cv2.blur(doubts, _square(9, scale))),
+        "light_15": at(cv2.blur(light * doubts, _square(15, scale))) / np.maximum(at(cv2.blur(doubts, _square(15, scale))), 0.05),
+        "light_beside": own_light - at(cv2.GaussianBlur(light, (0, 0), 3 * scale)),
+    }
 
 
 def person_chance(net: ShadeNet, features: np.ndarray) -> np.ndarray:
     """How likely each of some shades is a person: float32, shape (n,), from features of shape (n, 23)."""
-    hidden = np.tanh(((features - net.middle) / net.spread) @ net.inner + net.inner_bias)
+    weights = net.inner / net.spread[:, None]
+    hidden = np.tanh(features @ weights + (net.inner_bias - net.middle @ weights))
     return np.asarray(1 / (1 + np.exp(-(hidden @ net.outer + net.outer_bias))), np.float32)
 
 

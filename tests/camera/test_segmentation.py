@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
+from hmc.camera import mixture
 from hmc.camera.background import stable_background
 from hmc.camera.segmentation import SegmentationSettings, segment, segment_views, train_background
 from hmc.camera.shade import floor_pixels
@@ -343,3 +344,26 @@ def test_an_empty_scene_under_lamps_that_flicker_is_as_sharp_as_under_steady_lig
 
     deviation = train_background(flickering()).deviation
     assert np.median(deviation[..., 0] / steady[..., 0]) < 1.2
+
+
+@pytest.mark.parametrize("shirt", [(60, 40, 150), (150, 152, 154)])
+def test_where_nothing_changed_the_mixture_need_not_be_asked(monkeypatch, shirt):
+    """Asked everywhere, or by an OpenCV that cannot be told where not to look, it finds the same people."""
+    masks = []
+    for name, value in ((None, None), ("_LOOKS_AWAY", False), ("same", lambda image, scene: np.zeros(image.shape[:2], np.uint8))):
+        with monkeypatch.context() as patch:
+            if name is not None:
+                patch.setattr(mixture, name, value)
+            scene = Scene(3, noise=2.5)
+            model = trained(scene)
+            masks.append(segment(model, scene.person(shirt=shirt)[0])[0])
+    np.testing.assert_array_equal(masks[0], masks[1])
+    assert masks[0].any() and overlap(masks[0], masks[2]) > 0.999
+
+
+def test_the_mixture_is_asked_where_something_changed():
+    scene = Scene(4)
+    model = trained(scene)
+    image, truth = scene.person()
+    same = mixture.same(image, model.coarse) > 0
+    assert not (same & truth).any() and same.mean() > 0.5
