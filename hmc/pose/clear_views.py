@@ -246,16 +246,18 @@ def _seen_by(camera: Camera, mask: np.ndarray, people: Sequence[_Placed]) -> _Se
     cells.ravel()[cell[seen]] = 1
     # Outlines are a cell thick: flesh is sampled by points, and clothes are wider than it.
     wide = np.asarray(cv2.dilate(cells, np.ones((3, 3), np.uint8)))
-    height, width = mask.shape
-    bodies = wide.repeat(side, axis=0).repeat(side, axis=1)[:height, :width]
-    # Cells of which more than half is silhouette.
-    whole = np.zeros((n_rows * side, n_columns * side), np.uint8)
-    whole[:height, :width] = mask
-    by_rows = whole.reshape(n_rows, side, -1).sum(axis=1, dtype=np.uint16)
-    full = 2 * by_rows.reshape(n_rows, n_columns, side).sum(axis=2, dtype=np.int64) > side**2
+    pixels = _in_cells(mask, side, (n_rows, n_columns))
+    full = 2 * pixels > side**2
     bare = (np.argwhere(full & (wide == 0))[:, ::-1] + 0.5) * side
     bare_m2 = np.array([_bare_near(camera, one.landmarks, bare, side) for one in people])
-    return _Seen(shown, denied, bare_m2, int(np.count_nonzero(mask & (bodies > 0))))
+    return _Seen(shown, denied, bare_m2, int(pixels[wide > 0].sum()))
+
+
+def _in_cells(mask: np.ndarray, side: int, shape: tuple[int, int]) -> np.ndarray:
+    """How many pixels of a mask are in each cell."""
+    rows, columns = (np.minimum(np.arange(n + 1) * side, size) for n, size in zip(shape, mask.shape, strict=True))
+    corners = cv2.integral(mask.view(np.uint8))[rows[:, None], columns]
+    return np.asarray(np.diff(np.diff(corners, axis=0), axis=1))
 
 
 def _bare_near(camera: Camera, places: np.ndarray, bare: np.ndarray, side: int) -> np.ndarray:

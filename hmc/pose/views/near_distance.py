@@ -92,8 +92,9 @@ def _box(occupied: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _spread(squares: np.ndarray, axis: int, reach: int) -> np.ndarray:
     """The least, along an axis, of squares and the squared steps to them; longer by `reach` at either end of the axis."""
     beyond = (reach + 1) ** 2
-    pad = [(reach, reach) if k == axis else (0, 0) for k in range(squares.ndim)]
-    padded = np.pad(squares, pad, constant_values=beyond)
+    longer = [n + 2 * reach if k == axis else n for k, n in enumerate(squares.shape)]
+    padded = np.full(longer, beyond, squares.dtype)  # `numpy.pad` takes several times as long
+    padded[(slice(None),) * axis + (slice(reach, -reach),)] = squares
     before, out = padded.ravel(), padded.copy()
     after, shifted = out.ravel(), np.empty_like(before)
     stride = int(np.prod(padded.shape[axis + 1 :]))
