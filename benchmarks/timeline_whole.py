@@ -74,10 +74,10 @@ def watch_helpers(log: Path, turns: Turns) -> None:
         os.write(file, f"{json.dumps([pid, time.time(), seconds])}\n".encode())
 
     class Telling(Connection):
-        def send(self, message: Any) -> None:
+        def send_bytes(self, *message: Any) -> None:
             if os.getpid() != this:
                 tell(os.getpid(), time.process_time())
-            super().send(message)
+            super().send_bytes(*message)
 
     def telling(run):
         def told(there: Connection) -> None:

@@ -17,23 +17,28 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections import deque
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache, partial
 from multiprocessing.connection import Connection
+from multiprocessing.reduction import ForkingPickler
 from typing import Any, TypeVar
 
 import cv2
 import numpy as np
 
-__all__ = ["ahead", "arrays_ahead", "available_processors", "each_ahead", "end_with", "may_fork", "share_out"]
+__all__ = ["ahead", "arrays_ahead", "available_processors", "each_ahead", "end_with", "may_fork", "share_out", "stepped_apart"]
 
 T = TypeVar("T")
 K = TypeVar("K")
+S = TypeVar("S")
 
 #: Items of arrays that wait to be taken, at most.
 DEPTH = 3
+#: What was made and waits to be sent, in one process, bytes: where its items are asked for in bursts, it goes on meanwhile.
+WAITING_BYTES = 64 << 20
 #: Arrays begin at multiples of this, bytes.
 ALIGNED = 64
 #: How often a process looks whether its parent is still there, seconds.
@@ -240,6 +245,52 @@ def share_out(tasks: Sequence[Callable[[], T]], workers: int = 2) -> list[T]:
     return [results[k] for k in range(len(tasks))]
 
 
+def stepped_apart(step: Callable[[S, K], tuple[S, Sequence[T]]], state: S) -> Generator[list[T], K | None, None]:
+    """A state that goes from item to item in a process of its own; ask `may_fork` first.
+
+    Parameters
+    ----------
+    step : callable
+        From a state and an item to the next state and what comes out; items and what comes out must be such as can be sent.
+    state
+        The first.
+
+    Returns
+    -------
+    generator
+        Items are sent to it, and what has come out by then is given back; None stands for the end, and gives back all the rest. Sending
+        waits until the item before is done with. To be closed.
+    """
+    return _begun(_stepped(step, state))  # type: ignore[return-value]
+
+
+def _stepped(step: Callable[[S, K], tuple[S, Sequence[T]]], state: S) -> Generator[Any, Any, None]:
+    process, here = _forked(lambda there: _step_all(step, state, there))
+    found: list[T] = []
+    try:
+        item = yield None
+        while True:
+            with suppress(BrokenPipeError, ConnectionResetError):  # why it ended is told below
+                here.send(item)
+            while item is None or here.poll():
+                kind, new = _received(process, here)
+                if kind == END:
+                    break
+                found += new
+            item, found = (yield found), []
+    finally:
+        _ended(process, here)
+
+
+def _step_all(step: Callable[[S, K], tuple[S, Sequence[T]]], state: S, there: Connection) -> None:
+    with _sending(there) as send:
+        while (item := there.recv()) is not None:
+            state, found = step(state, item)
+            if found:
+                send((ITEM, found))
+        send((END, None))
+
+
 def _forked(run: Callable[[Connection], None]) -> tuple[Any, Connection]:
     """A process that runs something, and the near end of a pipe to it."""
     context = multiprocessing.get_context("fork")
@@ -278,9 +329,53 @@ def _one_thread() -> Iterator[None]:
 
 
 def _send_all(items: Iterable[Any], there: Connection) -> None:
-    for item in items:
-        there.send((ITEM, item))
-    there.send((END, None))
+    with _sending(there) as send:
+        for item in items:
+            send((ITEM, item))
+        send((END, None))
+
+
+@contextmanager
+def _sending(there: Connection) -> Iterator[Callable[[Any], None]]:
+    """What sends messages in their order while the next ones are made; it waits, or raises, where they are not taken."""
+    waiting: deque[memoryview] = deque()
+    changed = threading.Condition()
+    broken: list[OSError] = []
+    over = False
+
+    def run() -> None:
+        while True:
+            with changed:
+                changed.wait_for(lambda: waiting or over)
+                if not waiting:
+                    return
+                message = waiting[0]
+            try:
+                there.send_bytes(message)
+            except OSError as error:
+                broken.append(error)
+            with changed:
+                waiting.popleft()
+                changed.notify_all()
+
+    def send(message: Any) -> None:
+        pickled = ForkingPickler.dumps(message)
+        with changed:
+            changed.wait_for(lambda: broken or sum(map(len, waiting)) < WAITING_BYTES)
+            if broken:
+                raise broken[0]
+            waiting.append(pickled)
+            changed.notify_all()
+
+    thread = threading.Thread(target=run, daemon=True)
+    thread.start()
+    try:
+        yield send
+    finally:
+        with changed:
+            over = True
+            changed.notify_all()
+        thread.join()
 
 
 def _told(error: BaseException) -> BaseException:

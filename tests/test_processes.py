@@ -15,7 +15,7 @@ import pytest
 
 from hmc import processes
 from hmc.errors import InputError
-from hmc.processes import ahead, arrays_ahead, available_processors, each_ahead, may_fork, share_out
+from hmc.processes import ahead, arrays_ahead, available_processors, each_ahead, may_fork, share_out, stepped_apart
 
 pytestmark = pytest.mark.skipif(not may_fork(), reason="processes are forked on Linux alone")
 
@@ -214,3 +214,56 @@ def test_workers_end_when_the_process_that_asked_is_killed(tmp_path: Path):
 
 def test_as_many_processors_as_this_process_may_use():
     assert 1 <= available_processors() <= (os.cpu_count() or 1)
+
+
+def summed(state, item):
+    """Sums of what came, told at every third; who told them."""
+    total, n = state[0] + item[0], state[1] + 1
+    return (total, n), [(total, os.getpid())] if n % 3 == 0 else []
+
+
+@pytest.mark.parametrize("size", [1, 1 << 16])
+def test_a_state_goes_on_in_a_process_of_its_own(size):
+    found, state, expected = [], (np.zeros(size), 0), []
+    with closing(stepped_apart(summed, (np.zeros(size), 0))) as stepping:
+        for k in range(8):
+            found += stepping.send((np.full(size, k),))
+            state, told = summed(state, (np.full(size, k),))
+            expected += told
+        found += stepping.send(None)
+    assert len(found) == len(expected) == 2
+    for (total, there), (other, here) in zip(found, expected, strict=True):
+        assert there != here and np.array_equal(total, other)
+    assert not multiprocessing.active_children()
+
+
+def test_what_a_step_raises_is_raised_where_items_are_sent():
+    def wrong(state, item):
+        raise InputError(f"no {item}")
+
+    with closing(stepped_apart(wrong, 0)) as stepping, pytest.raises(InputError, match="no item"):
+        for _ in range(1000):
+            stepping.send("item")
+    with closing(stepped_apart(lambda state, item: os.kill(os.getpid(), signal.SIGKILL), 0)) as stepping:
+        with pytest.raises(ChildProcessError, match="exit code -9"):
+            for _ in range(1000):
+                stepping.send("item")
+    assert not multiprocessing.active_children()
+
+
+def test_what_waits_to_be_taken_does_not_keep_a_process_from_its_next_item(monkeypatch):
+    monkeypatch.setattr(processes, "WAITING_BYTES", 20 << 20)
+    made = multiprocessing.get_context("fork").Value("q", 0)
+
+    def large():
+        for k in range(50):
+            made.value = k + 1
+            yield np.full(1 << 17, k)  # a megabyte, of which a pipe takes a sixteenth
+
+    with closing(ahead(large)) as taken:
+        until = time.monotonic() + 20
+        while made.value < 18 and time.monotonic() < until:
+            time.sleep(0.01)
+        time.sleep(0.1)
+        assert 18 <= made.value <= 24
+        assert [int(values[0]) for values in taken] == list(range(50))

@@ -7,8 +7,10 @@ in memory. Records of what is decided go to a journal, so that a run that was st
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -33,7 +35,7 @@ from hmc.pose.records import keep_decided, kept_decided
 from hmc.pose.views.markers import marker_views, seen_in_frame
 from hmc.pose.views.person_view import IMAGES_FOR, PersonView, check_needs, views_of
 from hmc.pose.views.recent import RecentViews
-from hmc.processes import ahead, each_ahead
+from hmc.processes import ahead, each_ahead, may_fork, stepped_apart
 from hmc.tracking.resumable import WARM_UP_FRAMES, kept_silhouettes, person_grid
 from hmc.tracking.tracks import velocities
 from hmc.voxels.carving import shared_tables
@@ -210,24 +212,58 @@ def follow(
         states[decided.person] = resumed(task, states[decided.person], decided)
     left = {number: person.frames[person.frames > states[number].done_to] for number, person in persons.items()}
     first = min((int(frames[0]) for frames in left.values() if len(frames)), default=None)
-    for frame, views in () if first is None else _views_from(recording, tracks, method, options, run, first):
+    views = iter(()) if first is None else _kept(_views_from(recording, tracks, method, options, run, first), method, options)
+    for decided, before in _decided(task, persons, states, views, run):
+        keep_decided(run.journal, decided, before)
+        done.append(replace(decided, tracked=None))  # memories are not kept for long
+    return _posed_people(done)
+
+
+_Views = Iterator[tuple[int, dict[int, PersonView]]]
+
+
+def _kept(frames: _Views, method: PoseMethod, options: FollowOptions) -> _Views:
+    """Pass views on, and leave them for the pass backward."""
+    for frame, views in frames:
         if options.recent is not None and method.back is not None:
             options.recent.add(frame, views)
-        for number, view in views.items():
-            before = states[number].done_to
-            if view.frame <= before:
-                continue
-            view = replace(view, velocity=persons[number].velocity(view.frame))
-            starts = starts_with(task, persons[number], states[number], view.frame)
-            if starts:
-                run.say("first pose")
-            states[number], new = person_step(task, persons[number], states[number], view)
-            if starts:
-                run.say("following")
-            for decided in new:
-                keep_decided(run.journal, decided, before)
-                done.append(replace(decided, tracked=None))  # memories are not kept for long
-    return _posed_people(done)
+        yield frame, views
+
+
+def _decided(
+    task: PoseTask, persons: Mapping[int, PersonTrack], states: dict[int, PersonState], frames: _Views, run: RunOptions
+) -> Iterator[tuple[DecidedFrames, int]]:
+    """What is decided of all people, as it is, with the last frame of the person that was decided before.
+
+    Who has started beside somebody else is followed by a process of their own from then on.
+    """
+    apart: dict[int, Generator[list[tuple[DecidedFrames, int]], PersonView | None, None]] = {}
+    with ExitStack() as stack:
+        for frame, views in frames:
+            views = {number: replace(view, velocity=persons[number].velocity(frame)) for number, view in views.items()}
+            for number in apart.keys() & views:
+                yield from apart[number].send(views[number])
+            for number in [number for number in views if number not in apart and frame > states[number].done_to]:
+                starts = starts_with(task, persons[number], states[number], frame)
+                if starts:
+                    run.say("first pose")
+                states[number], new = _stepped(task, persons[number], states[number], views[number])
+                if starts:
+                    run.say("following")
+                yield from new
+                started = [one for one, state in states.items() if state.tracked is not None and one not in apart]
+                if number in started[1:] and len(apart) < run.workers and run.workers > 1 and may_fork():
+                    apart[number] = stack.enter_context(closing(stepped_apart(partial(_stepped, task, persons[number]), states[number])))
+        for one in apart.values():
+            yield from one.send(None)
+
+
+def _stepped(
+    task: PoseTask, person: PersonTrack, state: PersonState, view: PersonView
+) -> tuple[PersonState, list[tuple[DecidedFrames, int]]]:
+    """`person_step`, with the last frame that was decided before beside what is decided."""
+    after, decided = person_step(task, person, state, view)
+    return after, [(one, state.done_to) for one in decided]
 
 
 def _views_from(

@@ -17,6 +17,7 @@ import logging
 import os
 from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -89,9 +90,9 @@ def stream_hulls(
     HullStep
     """
     settings = settings or FrontendSettings()
-    tables = shared_tables(grid, recording.rig)
-    if masks is None:
+    if masks is None:  # its processes are at work while the tables are made
         masks = stream_masks(recording, settings, first=first, last=last, warm_up=warm_up, on_problem=on_problem, workers=workers)
+    tables = shared_tables(grid, recording.rig)
     for step in masks:
         yield carve_step(tables, step, settings)
 
@@ -106,7 +107,7 @@ def stream_masks(
     on_problem: Report | None = None,
     workers: int = 1,
 ) -> Iterator[MaskStep]:
-    """Silhouettes of the selected frames, in order.
+    """Silhouettes of the selected frames, in order; processes begin with this call.
 
     Parameters
     ----------
@@ -122,9 +123,10 @@ def stream_masks(
     workers : int
         Processes; cameras are spread over so many more than this one (`hmc.voxels.looks`). The result does not depend on it.
 
-    Yields
-    ------
-    MaskStep
+    Returns
+    -------
+    iterator of MaskStep
+        A generator; close it where not all of it is taken.
 
     Raises
     ------
@@ -136,35 +138,50 @@ def stream_masks(
     first = recording.start if first is None else first
     start = max(recording.start, first - warm_up)
     scene = _empty_scene(recording, settings, report)
-    names = recording.rig.names
+    pool = ThreadPoolExecutor(settings.threads or os.cpu_count() or 1)  # has no threads until it is asked, so that processes may fork
+    looks = look_at(recording, scene.models, scene.background, settings, start, last, workers, pool)
+
+    def steps() -> Iterator[MaskStep]:
+        with pool, closing(looks):  # type: ignore[type-var]
+            yield from _mask_steps(recording, scene, settings, (start, first), looks, pool, report)
+
+    return held_steps(steps(), frames_to_hold(recording.rig, recording.fps))
+
+
+def _mask_steps(
+    recording: Recording,
+    scene: _EmptyScene,
+    settings: FrontendSettings,
+    begin: tuple[int, int],
+    looks: Iterator[Look],
+    pool: ThreadPoolExecutor,
+    report: Report,
+) -> Iterator[MaskStep]:
+    """Silhouettes from the second of two frames on, of what cameras see from the first on."""
+    names, (index, first) = recording.rig.names, begin
     decided_together = (settings.complete or settings.cut_shadows) and any(scene.known)
     tables = make_completion_tables(recording.room, recording.rig) if decided_together else None
     watch = make_watch(recording.rig, recording.room, recording.fps, _scene_images(recording, scene), settings.exclude)
-
-    def steps() -> Iterator[MaskStep]:
-        changed: dict[int, int] = {}  # camera whose whole image changed -> the frame in which that began
-        state, index = begin_watch(watch), start
-        with ThreadPoolExecutor(settings.threads or os.cpu_count() or 1) as pool:
-            for look in look_at(recording, scene.models, scene.background, settings, start, last, workers, pool):
-                for line in look.lines:
-                    report(line)
-                masks, index = look.masks, look.index
-                if scene.places is not None:
-                    masks = with_unseen_places(scene.places, look.images, masks, pool)
-                state = watch_step(watch, state, index, look.images, masks)
-                for c, (image, mask) in enumerate(zip(look.images, look.masks, strict=True)):
-                    gone = scene.known[c] and image is not None and mask is None and not state.cameras[c].dark
-                    if gone:
-                        changed.setdefault(c, index)
-                    elif c in changed:
-                        report(_say_changed(names[c], changed.pop(c), index - 1))
-                if index >= first:
-                    counting = without_faulty(masks, state.faults)
-                    yield MaskStep(index, look.images, *settle(tables, replace(look, masks=counting), settings), faults=state.faults)
-            for c, began in changed.items():
-                report(_say_changed(names[c], began, index))
-
-    yield from held_steps(steps(), frames_to_hold(recording.rig, recording.fps))
+    changed: dict[int, int] = {}  # camera whose whole image changed -> the frame in which that began
+    state = begin_watch(watch)
+    for look in looks:
+        for line in look.lines:
+            report(line)
+        masks, index = look.masks, look.index
+        if scene.places is not None:
+            masks = with_unseen_places(scene.places, look.images, masks, pool)
+        state = watch_step(watch, state, index, look.images, masks)
+        for c, (image, mask) in enumerate(zip(look.images, look.masks, strict=True)):
+            gone = scene.known[c] and image is not None and mask is None and not state.cameras[c].dark
+            if gone:
+                changed.setdefault(c, index)
+            elif c in changed:
+                report(_say_changed(names[c], changed.pop(c), index - 1))
+        if index >= first:
+            counting = without_faulty(masks, state.faults)
+            yield MaskStep(index, look.images, *settle(tables, replace(look, masks=counting), settings), faults=state.faults)
+    for c, began in changed.items():
+        report(_say_changed(names[c], began, index))
 
 
 def _scene_images(recording: Recording, scene: _EmptyScene) -> list[list[np.ndarray]]:

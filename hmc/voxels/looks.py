@@ -5,17 +5,18 @@ Up to here no camera asks another, so cameras can be spread over processes: each
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from functools import partial
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
 from hmc.camera.segmentation import BackgroundModel, SegmentationSettings, segment_views, train_background
 from hmc.camera.shade import floor_pixels
+from hmc.camera.silhouettes import in_planes
 from hmc.io.recording import Frame, Recording, background_frames, iterate_frames, only_cameras
 from hmc.processes import arrays_ahead
 from hmc.voxels.floor_shadows import Scene
@@ -68,7 +69,7 @@ def look_at(
     workers: int,
     pool: Executor,
 ) -> Iterator[Look]:
-    """What all cameras see, frame by frame.
+    """What all cameras see, frame by frame; processes begin with this call.
 
     Parameters
     ----------
@@ -85,33 +86,38 @@ def look_at(
     pool : concurrent.futures.Executor
         Threads for this process.
 
-    Yields
-    ------
-    Look
+    Returns
+    -------
+    iterator of Look
+        A generator; close it where not all of it is taken.
     """
-    cameras = list(range(len(recording.rig)))
     if workers < 2:
-        for look, _ in _look(recording, models, background, settings, first, last, pool):
-            yield look
-        return
+        return (look for look, _ in _look(recording, models, background, settings, first, last, pool))
+    cameras = list(range(len(recording.rig)))
     groups = [cameras[k::workers] for k in range(min(workers, len(cameras)))]
-    order = np.argsort([c for group in groups for c in group]).tolist()
-    scenes: list[Scene | None] = [None] * len(cameras)
+    parts = []
+    for group in groups:
+        own = {k: models[c] for k, c in enumerate(group) if c in models}
+        taught = {k for k, c in enumerate(group) if c in background}
+        part = only_cameras(recording, group)
+        item_bytes = PIXEL_BYTES * sum(int(np.prod(camera.size)) for camera in part.rig) + FRAME_BYTES
+        make = partial(_arrays, part, own, taught, settings, first, last)
+        parts.append(arrays_ahead(make, workers, item_bytes))
+    return _together(parts, np.argsort([c for group in groups for c in group]).tolist())
+
+
+def _together(parts: Sequence[Iterator[tuple[list[np.ndarray | None], Any]]], order: Sequence[int]) -> Iterator[Look]:
+    """What groups of cameras see, as one; `order` says where among the groups each camera is."""
+    scenes: list[Scene | None] = [None] * len(order)
     with ExitStack() as stack:
-        parts = []
-        for group in groups:
-            own = {k: models[c] for k, c in enumerate(group) if c in models}
-            taught = {k for k, c in enumerate(group) if c in background}
-            part = only_cameras(recording, group)
-            item_bytes = PIXEL_BYTES * sum(int(np.prod(camera.size)) for camera in part.rig) + FRAME_BYTES
-            make = partial(_arrays, part, own, taught, settings, first, last)
-            parts.append(stack.enter_context(closing(arrays_ahead(make, workers, item_bytes))))  # type: ignore[type-var]
+        for part in parts:
+            stack.enter_context(closing(part))  # type: ignore[type-var]
         for found in zip(*parts, strict=True):
             flat = [array for arrays, _ in found for array in arrays]
             images, masks, doubtful, filled, means, unseen = (tuple(flat[6 * k + kind] for k in order) for kind in range(6))
-            # Copied where others may keep them, or they are wanted again.
-            new = zip(scenes, _copies(means), _copies(unseen), strict=True)
-            scenes = [before if mean is None else Scene(mean, hidden) for before, mean, hidden in new]
+            # Copied where others may keep them, or they are wanted again; of a mean, others gather channel by channel.
+            new = zip(scenes, means, _copies(unseen), strict=True)
+            scenes = [before if mean is None else Scene(in_planes(mean), hidden) for before, mean, hidden in new]
             lines = tuple(line for _, (_, own_lines) in found for line in own_lines)
             index = found[0][1][0]
             yield Look(index, _copies(images), _copies(masks), _copies(doubtful), filled, tuple(scenes), lines)

@@ -1,5 +1,7 @@
 """What holds for every pose method of the registry, run by the one driver: seeds, stopped runs, people whom nothing shows, limbs, legs."""
 
+import importlib
+import os
 from dataclasses import replace
 
 import numpy as np
@@ -37,14 +39,18 @@ from hmc.io.masks import keep_masks
 from hmc.io.recording import open_recording
 from hmc.io.results import TrackTable
 from hmc.landmarks import landmark_index
-from hmc.pose.follow import FollowOptions, PosedPeople, follow
+from hmc.pose.follow import FollowOptions, PosedPeople, follow, persons_of
 from hmc.pose.method import Capture, begin_tracking
+from hmc.pose.person import DecidedFrames, PersonState
 from hmc.pose.recovery import LossSettings
 from hmc.pose.registry import METHODS
+from hmc.pose.views.person_view import PersonView
+from hmc.processes import may_fork
 from hmc.tracking.resumable import person_grid
 from hmc.voxels.hulls import FrontendSettings, stream_hulls, stream_masks
 from hmc.voxels.run_options import RunOptions
 
+follow_module = importlib.import_module("hmc.pose.follow")
 APF, CANTON, MARKERS = ("apf", "default"), ("apf", "canton2009"), ("marker-apf", "default")
 FRAMES = MOST_FRAMES
 #: Where nobody is.
@@ -429,3 +435,29 @@ def test_voxels_that_do_not_fit_are_refused():
         follow(tiny_clip(3), true_tracks(3), lean_method(*APF), FollowOptions(0.0005))
     with pytest.raises(InputError, match="would fit"):
         person_grid(tiny_clip(3), 0.0005)
+
+
+@pytest.mark.skipif(not may_fork(), reason="processes are forked on Linux alone")
+def test_people_beside_others_are_followed_in_processes_of_their_own(monkeypatch, pair):
+    """With steps that add up what they see, and tell who took them."""
+    recording, tracks = pair
+
+    def step(task, person, state, view):
+        total = (0.0 if state.tracked is None else state.tracked.state) + np.full(len(DOF_NAMES), person.number * view.frame + 1.0)
+        tracked = None if view.frame < 1 else begin_tracking(None, total)
+        rows = DecidedFrames(person.number, (view.frame,), total[None], (os.getpid(),), tracked)
+        return replace(state, tracked=tracked, done_to=view.frame), [rows]
+
+    monkeypatch.setattr(follow_module, "person_step", step)
+    monkeypatch.setattr(follow_module, "starts_with", lambda *_: False)
+    found = {}
+    for workers in (1, 2, 5):
+        persons = persons_of(recording, tracks)
+        views = iter([(frame, dict.fromkeys((3, 5), PersonView(frame))) for frame in range(4)])
+        states = dict.fromkeys(persons, PersonState())
+        rows = list(follow_module._decided(None, persons, states, views, RunOptions(workers=workers)))
+        order = sorted(rows, key=lambda pair: (pair[0].person, pair[0].frames))
+        found[workers] = [(one.person, one.frames, one.states.sum(), before) for one, before in order]
+        apart = {one.person for one, _ in order if one.infos[0] != os.getpid()}
+        assert apart == (set() if workers == 1 else {5})
+    assert len(found[1]) == 8 and found[1] == found[2] == found[5]
