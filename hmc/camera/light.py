@@ -44,27 +44,31 @@ def light_gains(image: np.ndarray, mean: np.ndarray, people: np.ndarray) -> np.n
         At the pixels `FEW`; blue, green, red; 1 where nothing tells.
     """
     seen, empty = image[FEW], as_image(np.ascontiguousarray(mean[FEW]))
+    told = (seen < OVEREXPOSED) & (empty >= TOO_DARK) & ~people[FEW][..., None]
+    ratios = np.log(np.maximum(seen, 1) / np.maximum(empty, 1))
     gains = np.ones(seen.shape, np.float32)
     y, x = (axis.ravel() for axis in np.meshgrid(*(np.linspace(-1, 1, n) for n in seen.shape[:2]), indexing="ij"))
-    terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1)
-    for channel in range(3):
-        now, before = seen[..., channel].ravel(), empty[..., channel].ravel()
-        told = (now < OVEREXPOSED) & (before >= TOO_DARK) & ~people[FEW].ravel()
-        if told.any():
-            ratios = np.log(np.maximum(now[told], 1) / before[told])
-            if _is_same(ratios, x[told], y[told]):
-                continue
-            known = terms[told] if len(ratios) >= LEAST_TOLD else terms[told, :1]
-            at = _fitted(known, ratios)
-            low, high = np.percentile(known @ at, (2, 98))
-            gains[..., channel] = np.exp(np.clip(terms[:, : len(at)] @ at, low, high)).reshape(seen.shape[:2])
+    for channel in np.flatnonzero(told.any(axis=(0, 1)) & ~_is_same(ratios, told)):
+        terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1)
+        here = told[..., channel].ravel()
+        known = terms[here] if np.count_nonzero(here) >= LEAST_TOLD else terms[here, :1]
+        at = _fitted(known, ratios[..., channel].ravel()[here])
+        low, high = np.percentile(known @ at, (2, 98))
+        gains[..., channel] = np.exp(np.clip(terms[:, : len(at)] @ at, low, high)).reshape(seen.shape[:2])
     return gains
 
 
-def _is_same(ratios: np.ndarray, x: np.ndarray, y: np.ndarray) -> bool:
-    """Whether logarithms of factors are those of the same light, in each quarter of the image."""
-    quarter = 2 * (y > 0) + (x > 0)
-    return all(abs(np.median(ratios[quarter == k])) < np.log(LEAST_GAIN) for k in np.unique(quarter))
+def _is_same(ratios: np.ndarray, told: np.ndarray) -> np.ndarray:
+    """Of each channel, whether most logarithms of factors (h, w, 3) that tell something are those of the same light, in each quarter."""
+    least, (height, width) = np.log(LEAST_GAIN), ratios.shape[:2]
+    up, down = told & (ratios < least), told & (ratios > -least)
+    same = np.ones(3, bool)
+    for rows in (slice(-(-height // 2)), slice(-(-height // 2), None)):
+        for columns in (slice(-(-width // 2)), slice(-(-width // 2), None)):
+            half = np.count_nonzero(told[rows, columns], axis=(0, 1)) / 2
+            for side in (up, down):  # as of their median
+                same &= (np.count_nonzero(side[rows, columns], axis=(0, 1)) > half) | (half == 0)
+    return same
 
 
 def _fitted(terms: np.ndarray, values: np.ndarray) -> np.ndarray:
