@@ -1,4 +1,9 @@
-"""The one exception for input that a user can mend."""
+"""The one exception for input that a user can mend, and the words for what the system refuses."""
+
+import errno
+
+#: No space, no more of one's share of it, or a file larger than may be.
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 class InputError(ValueError):
@@ -6,3 +11,9 @@ class InputError(ValueError):
 
     The command line prints it as one line and exits with code 2; from Python it is an ordinary ``ValueError``.
     """
+
+
+def system_words(error: OSError) -> str:
+    """What the system says of a file that it did not let be read or written; in the middle of writing it names none."""
+    place = "" if error.filename is None else f"{error.filename}: "
+    return f"{place}{error.strerror or error}" + ("; make room, and start it again" if error.errno in FULL else "")

@@ -7,15 +7,13 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 
 from hmc.camera.coverage import in_view
 from hmc.camera.model import Camera, Rig, backproject, project
-from hmc.errors import InputError
 
-__all__ = ["draw_rig", "draw_view", "save_rig_picture"]
+__all__ = ["draw_rig", "draw_view", "rig_figure"]
 
 #: Points along a drawn line; enough that a distorted one looks curved.
 LINE_POINTS = 60
@@ -153,13 +151,11 @@ def _draw_line(ax, camera: Camera, start: np.ndarray, stop: np.ndarray, color: s
     ax.plot(*np.where(valid[:, None], uv, np.nan).T, color=color, linewidth=width)
 
 
-def save_rig_picture(path: str | Path, rig: Rig, room: np.ndarray, images: Sequence[np.ndarray | None], title: str = "") -> None:
-    """Write the picture: `draw_rig` on the left, `draw_view` of each camera on the right.
+def rig_figure(rig: Rig, room: np.ndarray, images: Sequence[np.ndarray | None], title: str = ""):
+    """The picture of a rig: `draw_rig` on the left, `draw_view` of each camera on the right.
 
     Parameters
     ----------
-    path : str or Path
-        Any format matplotlib writes, by its suffix.
     rig : Rig
     room : ndarray, shape (2, 3)
     images : sequence of ndarray or None
@@ -167,10 +163,9 @@ def save_rig_picture(path: str | Path, rig: Rig, room: np.ndarray, images: Seque
     title : str
         Its first line is the title; what follows, one line each, stands below it, cut short where it is too long or too much.
 
-    Raises
-    ------
-    InputError
-        When the file cannot be written.
+    Returns
+    -------
+    matplotlib Figure
     """
     from matplotlib.figure import Figure
 
@@ -186,7 +181,4 @@ def save_rig_picture(path: str | Path, rig: Rig, room: np.ndarray, images: Seque
         draw_view(camera, room, image, right.add_subplot(rows, columns, index + 1))
     first, *others = title.split("\n")
     figure.suptitle("\n".join([first, *(textwrap.shorten(line, MOST_LETTERS, placeholder=" ...") for line in others[:MOST_LINES])]))
-    try:
-        figure.savefig(path, dpi=90)
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path}: the picture cannot be written ({error})") from None
+    return figure

@@ -12,7 +12,7 @@ from hmc.camera.model import Rig
 from hmc.camera.rig_picture import draw_view
 from hmc.camera.world import World, in_world
 from hmc.check.upright import Figure
-from hmc.errors import InputError
+from hmc.io.files import write_figure
 
 __all__ = ["save_world_picture"]
 
@@ -67,10 +67,7 @@ def save_world_picture(
     for ax, c in zip(np.atleast_1d(rows[2].subplots(1, max(1, len(shown)))), shown, strict=False):
         draw_view(new_rig[c], room, images[c], ax)
     picture.suptitle(title)
-    try:
-        picture.savefig(path, dpi=80)
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path}: the picture cannot be written ({error})") from None
+    write_figure(path, picture, dpi=80)
 
 
 def _draw_side(ax, rig: Rig, people: np.ndarray, across: int, up: int) -> None:

@@ -14,7 +14,7 @@ import sys
 from collections.abc import Sequence
 
 from hmc import __version__
-from hmc.errors import InputError
+from hmc.errors import InputError, system_words
 
 __all__ = ["command_parser", "main", "make_parser", "repeated"]
 
@@ -91,9 +91,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"hmc {args.command}: {error} Try --workers 1; what is done is kept.", file=sys.stderr)
         return EXIT_WORKER
     except OSError as error:
-        if error.filename is None:
+        if error.errno is None:
             raise
-        print(f"hmc {args.command}: {error.filename}: {error.strerror}", file=sys.stderr)
+        print(f"hmc {args.command}: {system_words(error)}", file=sys.stderr)
         return EXIT_INPUT
     except KeyboardInterrupt:
         print(f"hmc {args.command}: interrupted", file=sys.stderr)

@@ -41,11 +41,12 @@ def run(args: argparse.Namespace) -> int:
     name = real_path(args.recording).name
     verdict = f"{name}: {_summary(inspection)}"
     if inspection.rig is not None and inspection.room is not None:
-        from hmc.camera.rig_picture import save_rig_picture
+        from hmc.camera.rig_picture import rig_figure
+        from hmc.io.files import write_figure
 
         out = args.out or Path(f"{name}_check.png")
         wrong = [str(finding) for finding in inspection.findings if finding.severity != "note"]
-        save_rig_picture(out, inspection.rig, inspection.room, inspection.images, "\n".join([verdict, *wrong]))
+        write_figure(out, rig_figure(inspection.rig, inspection.room, inspection.images, "\n".join([verdict, *wrong])), dpi=90)
         print(f"picture: {out}")
     print(verdict)
     return 0 if inspection.usable else 2

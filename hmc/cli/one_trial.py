@@ -98,10 +98,10 @@ def _timed(state, stage: str, work: Callable[[], object]):
 
 def _check(session, trial, options: TrialOptions, state):
     """Look the recording over, unless it was in this form before."""
-    from hmc.camera.rig_picture import save_rig_picture
+    from hmc.camera.rig_picture import rig_figure
     from hmc.check import inspect_recording
     from hmc.cli.common import places_source
-    from hmc.io.files import sibling, to_toml
+    from hmc.io.files import to_toml, write_figure
     from hmc.trials.page import CHECK_PICTURE
     from hmc.trials.state import digest, write_state
 
@@ -116,8 +116,7 @@ def _check(session, trial, options: TrialOptions, state):
         found.extend(inspection.findings)
         picture.unlink(missing_ok=True)
         if inspection.rig is not None and inspection.room is not None:
-            with sibling(picture) as path:
-                save_rig_picture(path, inspection.rig, inspection.room, inspection.images, trial.name)
+            write_figure(picture, rig_figure(inspection.rig, inspection.room, inspection.images, trial.name), dpi=90)
 
     state = replace(_timed(state, "check", check), findings=tuple(map(str, found)), checked=source)
     for finding in found:

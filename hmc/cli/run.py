@@ -15,7 +15,7 @@ from typing import Any
 
 from hmc.cli.common import add_workers_option, camera_names, output_path, whole_number
 from hmc.cli.one_trial import TrialOptions, pose_arguments, run_trial
-from hmc.errors import InputError
+from hmc.errors import InputError, system_words
 from hmc.io.files import real_path
 
 __all__ = ["add_parser", "run"]
@@ -99,11 +99,11 @@ def _in_turn(session, trials: Sequence, options: TrialOptions) -> Iterator[tuple
             print(f"hmc run: {trial.name}: {error}", file=sys.stderr)
             yield trial.name, EXIT_INPUT
         except OSError as error:
-            if error.filename is None:
+            if error.errno is None:
                 traceback.print_exc()
             else:
-                print(f"hmc run: {trial.name}: {error.filename}: {error.strerror}", file=sys.stderr)
-            yield trial.name, EXIT_FAULT if error.filename is None else EXIT_INPUT
+                print(f"hmc run: {trial.name}: {system_words(error)}", file=sys.stderr)
+            yield trial.name, EXIT_FAULT if error.errno is None else EXIT_INPUT
         except Exception:  # one trial must not cost the others of a night's run
             traceback.print_exc()
             yield trial.name, EXIT_FAULT

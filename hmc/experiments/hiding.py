@@ -21,6 +21,7 @@ from hmc.body.scalable_models import UNITIVE_PIECES
 from hmc.experiments.engine.inputs import Inputs, once
 from hmc.experiments.markerless_runs import FRONTEND, MASKS_KEY, VOXEL_M, tracked
 from hmc.experiments.truth import HEIGHT_M, first_truth, standing_state, stature_m, truth_track
+from hmc.io.door import kept_arrays
 from hmc.io.masks import kept_masks
 from hmc.landmarks import LANDMARKS, landmark_index
 from hmc.pose.method import Capture
@@ -74,7 +75,7 @@ def limb_views(inputs: Inputs, label: str) -> LimbViews:
         with open(part, "wb") as file:
             np.savez(file, occupancy=views.occupancy, cameras=views.cameras)
 
-    with np.load(once(inputs.folder / label / "limbs.npz", make), allow_pickle=False) as kept:
+    with kept_arrays(once(inputs.folder / label / "limbs.npz", make)) as kept:
         return LimbViews(kept["occupancy"], kept["cameras"])
 
 

@@ -11,10 +11,12 @@ from pathlib import Path
 import numpy as np
 
 from hmc.experiments.engine.inputs import Inputs, once
+from hmc.io.door import kept_arrays
 from hmc.io.recording import Recording
 from hmc.tracking.blobs import Observation, blob_features
 from hmc.tracking.resumable import observe_step, person_grid
 from hmc.tracking.views import FrameViews
+from hmc.voxels.grid import VoxelGrid
 
 __all__ = ["observations"]
 
@@ -35,16 +37,17 @@ def observations(inputs: Inputs, label: str, voxel_m: float) -> Iterator[tuple[i
     path = inputs.folder / label / f"observations-{1000 * voxel_m:g}mm"
     folder = once(path, lambda part: _write(part, inputs, label, recording, voxel_m))
     for file in sorted(folder.glob("*.npz")):
-        with np.load(file, allow_pickle=False) as data:
-            seen = dict(data)
-        if not seen:
-            yield int(file.stem), None
-            continue
-        indices, labels = seen["indices"].astype(np.int64), seen["labels"].astype(np.int64)
-        points = grid.centres(indices)
-        blobs = blob_features(points, labels, int(labels.max(initial=-1)) + 1, grid.voxel_size_m)
-        views = FrameViews(recording.rig, tuple(_mask(seen, c, camera.size) for c, camera in enumerate(recording.rig)))
-        yield int(file.stem), Observation(grid.voxel_size_m, grid.bounds, indices, points, labels, blobs, seen["certain"], views)
+        with kept_arrays(file) as seen:
+            one = _observation(seen, recording, grid) if seen else None
+        yield int(file.stem), one
+
+
+def _observation(seen: dict[str, np.ndarray], recording: Recording, grid: VoxelGrid) -> Observation:
+    indices, labels = seen["indices"].astype(np.int64), seen["labels"].astype(np.int64)
+    points = grid.centres(indices)
+    blobs = blob_features(points, labels, int(labels.max(initial=-1)) + 1, grid.voxel_size_m)
+    views = FrameViews(recording.rig, tuple(_mask(seen, c, camera.size) for c, camera in enumerate(recording.rig)))
+    return Observation(grid.voxel_size_m, grid.bounds, indices, points, labels, blobs, seen["certain"], views)
 
 
 def _write(folder: Path, inputs: Inputs, label: str, recording: Recording, voxel_m: float) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 from hmc.experiments.engine.experiment import Plan, Source
 from hmc.experiments.engine.inputs import Inputs, once, rendered
 from hmc.experiments.person_data import training_recipes
+from hmc.io.door import kept_arrays
 from hmc.io.results import read_centroids
 from hmc.tracking.feature_table import FeatureTable, table_of_hulls
 from hmc.tracking.resumable import person_grid
@@ -35,8 +36,8 @@ def features_of(inputs: Inputs, label: str, voxel_m: float, hulls: tuple[str, ..
         inputs.folder / label / f"features-{'-'.join(hulls)}-{1000 * voxel_m:g}mm.npz",
         lambda part: _write(part, inputs, label, voxel_m, hulls),
     )
-    with np.load(path, allow_pickle=False) as data:
-        return FeatureTable(*(data[name] for name in ("frames", "features", "persons", "recordings")), *map(int, data["counts"]))
+    with kept_arrays(path) as data:
+        return FeatureTable(data["frames"], data["features"], data["persons"], data["recordings"], *map(int, data["counts"]))
 
 
 def _write(path: Path, inputs: Inputs, label: str, voxel_m: float, hulls: tuple[str, ...]) -> None:

@@ -15,7 +15,8 @@ import stat
 import struct
 import tomllib
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
 from xml.etree import ElementTree
@@ -25,8 +26,8 @@ import numpy as np
 from hmc.errors import InputError
 
 __all__ = [
-    "LIMITS", "MAX_DEPTH", "MAX_FRAME_NUMBER", "check_file", "check_image", "limit", "open_text", "read_arrays", "read_bytes",
-    "read_image", "read_json_file", "read_text_file", "read_toml_file", "read_xml_file",
+    "LIMITS", "MAX_DEPTH", "MAX_FRAME_NUMBER", "check_file", "check_image", "kept_arrays", "limit", "open_text", "read_arrays",
+    "read_bytes", "read_image", "read_json_file", "read_text_file", "read_toml_file", "read_xml_file",
 ]  # fmt: skip
 
 #: What each environment variable raises, and how much is read where it is not set.
@@ -255,6 +256,23 @@ def read_arrays(path: str | Path) -> dict[str, np.ndarray]:
         raise InputError(f"{path}: holds more than there is memory for") from None
     except Exception as error:  # zipfile and NumPy stumble over damaged archives in many ways
         raise InputError(f"{path}: not a file of arrays, or a damaged one ({_short(error)})") from None
+
+
+@contextmanager
+def kept_arrays(path: str | Path) -> Iterator[dict[str, np.ndarray]]:
+    """The arrays of a file that a run keeps for itself and makes again where it is not there; what the block stumbles over is the file's.
+
+    Raises
+    ------
+    InputError
+        As `read_arrays`, and when the block raises what arrays of other names, shapes or places lead to.
+    """
+    try:
+        yield read_arrays(path)
+    except InputError as error:
+        raise InputError(f"{error}; remove it: it is made again") from None
+    except (KeyError, IndexError, ValueError, TypeError) as error:
+        raise InputError(f"{path}: other arrays than are kept there ({_short(error)}); remove it: it is made again") from None
 
 
 def _refuse_bomb(archive: zipfile.ZipFile, most: float) -> None:

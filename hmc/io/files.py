@@ -17,7 +17,7 @@ from typing import IO, Any
 
 from hmc.errors import InputError
 
-__all__ = ["atomic_write", "part_path", "real_path", "sibling", "sweep", "to_toml", "write_toml"]
+__all__ = ["atomic_write", "part_path", "real_path", "sibling", "sweep", "to_toml", "write_figure", "write_toml"]
 
 #: Names of files that are being written: of which machine and process.
 _PART = re.compile(r"\..*\.([0-9a-f]{8})-(\d+)\.part(\..*)?")
@@ -78,6 +78,27 @@ def sibling(path: str | Path) -> Iterator[Path]:
                 temporary.unlink()
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror or error})") from error
+
+
+def write_figure(path: str | Path, figure: Any, dpi: float) -> None:
+    """Write a matplotlib figure, by the path's suffix, into a folder that is there; it appears under its name when it is complete.
+
+    Raises
+    ------
+    InputError
+        When it cannot be written, or not as a picture of that kind.
+    """
+    path = Path(path)
+    temporary = part_path(path)
+    try:
+        sweep(path.parent)
+        figure.savefig(temporary, dpi=dpi)
+        os.replace(temporary, path)
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: the picture cannot be written ({getattr(error, 'strerror', None) or error})") from None
+    finally:
+        with suppress(OSError):
+            temporary.unlink()
 
 
 @cache

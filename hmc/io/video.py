@@ -15,7 +15,7 @@ from hmc.errors import InputError
 from hmc.io.ffmpeg import ffmpeg_path
 from hmc.io.files import sibling
 
-__all__ = ["write_video"]
+__all__ = ["check_written", "write_video"]
 
 #: Quality of H.264 (constant rate factor: 0 is lossless, 18 hardly to be told from that, 51 worst), and how long it may look for it.
 CRF, SPEED = 20, "veryfast"
@@ -127,8 +127,36 @@ def _by_opencv(path: Path, temporary: Path, pictures: Iterator[np.ndarray], fps:
         cv2.utils.logging.setLogLevel(level)
     if codec == "mp4v" and on_problem is not None:
         on_problem(f"{path}: {NO_ENCODER}")
+    written = 0
     try:
         for picture in _with_first(first, pictures):
             writer.write(_even(picture))
+            written += 1
     finally:
         writer.release()
+    check_written(path, temporary, written)
+
+
+def check_written(path: str | Path, temporary: str | Path, n: int) -> None:
+    """Whether a video of OpenCV has all its frames: on a disk that is full it ends without a word.
+
+    Parameters
+    ----------
+    path, temporary : path
+        The video's name, and where it is.
+    n : int
+        Frames that were written.
+
+    Raises
+    ------
+    InputError
+    """
+    capture = cv2.VideoCapture(str(temporary))
+    try:
+        found = 0
+        while found < n and capture.grab():
+            found += 1
+    finally:
+        capture.release()
+    if found < n:
+        raise InputError(f"{path}: cannot be written (of {n} frames {found} arrived; is the disk full?); make room, and start it again")

@@ -18,6 +18,7 @@ from hmc.errors import InputError
 from hmc.io.calibration import write_calibration
 from hmc.io.files import part_path, sweep, write_toml
 from hmc.io.results import PoseTable, TrackTable, write_joints, write_tracks
+from hmc.io.video import check_written
 from hmc.landmarks import FOOT_POINTS, LANDMARKS
 from hmc.synthetic.actor import PARTS
 from hmc.synthetic.feet import true_foot_points
@@ -143,12 +144,15 @@ def _write_pictures(scene: Scene, folder: Path, workers: int, on_progress: Calla
                     done += 1
                     if on_progress is not None:
                         on_progress(done, total)
+            for camera in scene.rig:
+                place = f"{name}/{camera.name}.mp4"
+                check_written(place, folder / place, len(frames))
     shutil.rmtree(store)
 
 
 def _write_silhouette(path: Path, labels: np.ndarray, persons: int) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
-    cv2.imwrite(str(path), labels * np.uint8(255 if persons == 1 else 85 if persons <= 3 else 51))
+    path.write_bytes(cv2.imencode(".png", labels * np.uint8(255 if persons == 1 else 85 if persons <= 3 else 51))[1].tobytes())
 
 
 @contextmanager

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from hmc.body.joints import DOF_NAMES, N_CANTON, N_DOF
 from hmc.body.model import PARTS
-from hmc.body.model_file import read_hierarchy
 from hmc.body.scalable_models import MODEL_1, MODEL_2, UNITIVE, UNITIVE_PIECES, Inclusive, Model, Union, Unitive
 from hmc.errors import InputError
+from hmc.pose.methods.model_file import read_hierarchy
 from hmc.pose.methods.scalable import method_preset
 from hmc.pose.steps.presets import PRESETS
 

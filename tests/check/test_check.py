@@ -12,9 +12,10 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from hmc.camera.model import Camera, Rig, look_at, project
-from hmc.camera.rig_picture import draw_rig, draw_view, save_rig_picture, view_cone
+from hmc.camera.rig_picture import draw_rig, draw_view, rig_figure, view_cone
 from hmc.check import check_recording, inspect_recording
 from hmc.io.calibration import write_calibration
+from hmc.io.files import write_figure
 
 
 def sentences(findings, severity):
@@ -251,7 +252,8 @@ def test_view_cone_of_a_camera_that_looks_down():
 def test_picture(tmp_path, ring):
     room = np.array([[-1.5, -1.5, 0], [1.5, 1.5, 2.4]])
     image = np.full((120, 160, 3), 90, np.uint8)
-    save_rig_picture(tmp_path / "rig.png", ring, room, [image, None, image, image, image], "ring: a verdict\n" + "error: long " * 40)
+    figure = rig_figure(ring, room, [image, None, image, image, image], "ring: a verdict\n" + "error: long " * 40)
+    write_figure(tmp_path / "rig.png", figure, dpi=90)
     picture = cv2.imread(str(tmp_path / "rig.png"))
     assert picture is not None and picture.shape[1] > 900
     drawn = draw_rig(ring, room)

@@ -1,6 +1,7 @@
 """The frame of the command line: exit codes, one line for a user's mistake, help without heavy imports."""
 
 import argparse
+import errno
 import subprocess
 import sys
 
@@ -112,10 +113,17 @@ def test_files_that_cannot_be_had_are_one_line(monkeypatch, capsys):
     assert capsys.readouterr().err == "hmc check: /out/tracks.csv: Permission denied\n"
 
 
+def test_a_full_disk_is_one_line_where_no_file_is_named(monkeypatch, capsys):
+    fake_command(monkeypatch, raising(OSError(errno.ENOSPC, "No space left on device")))
+    assert main(["check", "x"]) == 2
+    assert capsys.readouterr().err == "hmc check: No space left on device; make room, and start it again\n"
+
+
 def test_faults_of_our_own_are_not_hidden(monkeypatch):
-    fake_command(monkeypatch, raising(RuntimeError("a bug")))
-    with pytest.raises(RuntimeError):
-        main(["check", "x"])
+    for fault in (RuntimeError("a bug"), OSError("raised by hand")):
+        fake_command(monkeypatch, raising(fault))
+        with pytest.raises(type(fault)):
+            main(["check", "x"])
 
 
 def test_reader_of_the_pipe_went_away(tmp_path):

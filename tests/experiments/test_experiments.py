@@ -237,9 +237,14 @@ def test_a_stored_cell_comes_back(tmp_path):
     assert cell.parameters == {"a": 0.1}
     assert cell.results["x"][0] == 1 / 3 and np.isnan(cell.results["x"][1]) and cell.results["nothing"] is None
     assert read_cell(tmp_path / "other.json") is None
-    (tmp_path / "cell.json").write_text('{"parameters": {')
-    with pytest.raises(InputError, match="delete the file"):
-        read_cell(tmp_path / "cell.json")
+    text = (tmp_path / "cell.json").read_text()
+    changed = text.replace('"n": 3', '"n": 4'), text.replace('"n": 3', '"n": {}'), '{"parameters": {}, "results": 5}', '{"parameters": {'
+    for other in changed:
+        (tmp_path / "cell.json").write_text(other)
+        with pytest.raises(InputError, match="delete the file"):
+            read_cell(tmp_path / "cell.json")
+    write_text(tmp_path / "cell.json", cell_text({"a": 1}, {"by number": {2: "a", 10: "b"}, "pair": (1, 2)}))
+    assert read_cell(tmp_path / "cell.json").results == {"by number": {"2": "a", "10": "b"}, "pair": [1, 2]}
 
 
 def test_report_on_disk(toy, tmp_path):

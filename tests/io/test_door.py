@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 from families import FAMILIES
 
-from hmc.body.model_file import read_hierarchy
 from hmc.camera.model import Rig, look_at
 from hmc.check.given_points import read_points
 from hmc.errors import InputError
@@ -22,7 +21,7 @@ from hmc.experiments.engine.store import read_cell
 from hmc.io.c3d import read_c3d
 from hmc.io.calibration import read_calibration, write_calibration
 from hmc.io.detections import read_detections
-from hmc.io.door import LIMITS, limit, read_arrays, read_image, read_json_file, read_toml_file, read_xml_file
+from hmc.io.door import LIMITS, kept_arrays, limit, read_arrays, read_image, read_json_file, read_toml_file, read_xml_file
 from hmc.io.footage import open_video
 from hmc.io.keypoints.csv_forms import read_csv_table
 from hmc.io.keypoints.json_forms import read_json_frame, read_json_table
@@ -30,6 +29,7 @@ from hmc.io.nested_settings import read_settings_table
 from hmc.io.results import PoseStates, read_centroids, read_joints, read_pose, read_run, read_tracks, write_pose
 from hmc.io.settings import read_settings
 from hmc.io.timing import read_times
+from hmc.pose.methods.model_file import read_hierarchy
 from hmc.synthetic.bvh import read_bvh
 from hmc.synthetic.recipe import load_recipe
 from hmc.tracking.person_tree import read_tree
@@ -92,6 +92,21 @@ def _video(path):
 
 
 calibration = partial(read_calibration, sizes=SIZES)
+MODEL = """kind = "inclusive"
+thinning = 2
+[[model]]
+name = "trunk"
+angles = ["root"]
+parts = ["torso"]
+"""
+
+
+def kept(path):
+    """As experiments read what they keep for themselves."""
+    with kept_arrays(path) as arrays:
+        np.zeros(9)[arrays["voxels"]] = arrays["levels"]
+
+
 READERS = {
     "recording.toml": Reader(lambda path: read_settings(path.parent), "recording.toml", "fps = 15\nroom = [[-2, -2, 0], [2, 2, 2]]\n"),
     "calibration.toml": Reader(calibration, "calibration.toml", _calibration),
@@ -116,7 +131,8 @@ READERS = {
     "points": Reader(lambda path: read_points(path, Rig((CAMERA,))), "p.csv", "point,camera,u,v\na,c,1,2\n"),
     "motion": Reader(read_bvh, "m.bvh", BVH),
     "C3D": Reader(read_c3d, "points.c3d", lambda path: path.write_bytes((Path(__file__).parents[1] / "files" / "points.c3d").read_bytes())),
-    "body model": Reader(read_hierarchy, "model.toml", 'kind = "inclusive"\n'),
+    "body model": Reader(read_hierarchy, "model.toml", MODEL),
+    "kept arrays": Reader(kept, "00000003.npz", lambda path: np.savez(path, voxels=np.arange(3), levels=np.ones(3, np.uint8))),
     "person tree": Reader(read_tree, "tree.csv", "a,b\n1,2\n"),
     "cell": Reader(read_cell, "cell.json", '{"parameters": {}, "results": {"a": 1}}'),
     "image": Reader(read_image, "i.png", _image),

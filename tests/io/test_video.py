@@ -10,7 +10,7 @@ import pytest
 from hmc.errors import InputError
 from hmc.io import video
 from hmc.io.ffmpeg import ffmpeg_path
-from hmc.io.video import write_video
+from hmc.io.video import check_written, write_video
 
 needs_encoder = pytest.mark.skipif(
     ffmpeg_path() is None or not video._has_h264(ffmpeg_path()), reason="there is no ffmpeg with an encoder of H.264"
@@ -87,6 +87,16 @@ def test_nothing_is_left_of_a_video_that_failed(tmp_path):
     with pytest.raises(InputError, match=r"c\.mp4: cannot be written"):
         write_video(tmp_path / "c.mp4", pictures(3), 0.0)
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("share", [0, 0.3, 0.95])
+def test_a_video_of_opencv_that_ended_early_is_told(tmp_path, share):
+    path = tmp_path / "a.avi"
+    write_video(path, pictures(), 25)
+    check_written(path, path, 12)
+    path.write_bytes(path.read_bytes()[: int(share * path.stat().st_size)])
+    with pytest.raises(InputError, match=r"b\.avi: cannot be written \(of 12 frames \d+ arrived"):
+        check_written(tmp_path / "b.avi", path, 12)
 
 
 def test_an_avi_is_motion_jpeg(tmp_path):

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from hmc.check.sync.find import TOLD, Synchrony
-from hmc.errors import InputError
+from hmc.io.files import write_figure
 
 __all__ = ["save_sync_picture"]
 
@@ -51,7 +51,4 @@ def save_sync_picture(path: str | Path, names: Sequence[str], found: Synchrony, 
         ax.set_axis_off()
     axes[0].legend(fontsize=7)
     picture.suptitle(title)
-    try:
-        picture.savefig(path, dpi=80)
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path}: the picture cannot be written ({error})") from None
+    write_figure(path, picture, dpi=80)

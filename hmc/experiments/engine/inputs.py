@@ -23,6 +23,7 @@ from hmc.experiments.engine.store import digest
 from hmc.experiments.five_actions import action_recipes
 from hmc.experiments.nine_actions import nine_recipes
 from hmc.experiments.person_data import render_brought_in, training_recipes
+from hmc.io.door import kept_arrays
 from hmc.io.files import real_path
 from hmc.io.recording import Recording, open_recording, read_rig
 from hmc.io.settings import read_settings
@@ -217,7 +218,7 @@ def read_hulls(folder: Path, grid: VoxelGrid, recording: Recording, first: int =
     for path in sorted(folder.glob("*.npz")):
         if int(path.stem) < first or (last is not None and int(path.stem) >= last):
             continue
-        with np.load(path, allow_pickle=False) as data:
+        with kept_arrays(path) as data:
             levels = np.zeros(grid.shape, np.uint8)
             levels.ravel()[data["voxels"]] = data["levels"]
             masks = tuple(_unpack(data[f"mask_{c}"], size) if f"mask_{c}" in data else None for c, size in enumerate(sizes))

@@ -53,13 +53,20 @@ def cell_path(out: Path, experiment: Experiment, key: str) -> Path:
 def cell_text(parameters: Mapping[str, Any], results: Mapping[str, Any], made: Mapping[str, Any] | None = None) -> str:
     """What the file of a cell holds; numbers keep their full precision, and `made` says by which code and in how many seconds.
 
+    A digest of parameters and results tells a file that was changed since.
+
     Raises
     ------
     InputError
         When a result is no plain value.
     """
-    content = {"parameters": dict(parameters), "results": dict(results)} | ({"made": dict(made)} if made else {})
+    content = {"parameters": dict(parameters), "results": dict(results)}
+    content |= {"digest": _sum(json.loads(_canonical(content)))} | ({"made": dict(made)} if made else {})
     return _canonical(content, indent=1) + "\n"
+
+
+def _sum(content: Mapping[str, Any]) -> str:
+    return digest([content["parameters"], content["results"]])
 
 
 def write_text(path: Path, text: str) -> None:
@@ -90,6 +97,10 @@ def read_cell(path: Path) -> Cell | None:
         seconds = made.get("seconds", 0.0)
         if isinstance(seconds, bool) or not (isinstance(seconds, int | float) and 0 <= seconds < math.inf):
             raise TypeError(f"`seconds` must be a number, 0 or more; got {seconds!r:.40}")
+        if not isinstance(content["parameters"], dict) or not isinstance(content["results"], dict):
+            raise TypeError("parameters and results must be tables")
+        if content.get("digest", _sum(content)) != _sum(content):
+            raise TypeError("changed since it was computed")
         return Cell(content["parameters"], content["results"], made)
     except InputError as error:
         raise InputError(f"{error}; delete the file to compute it again") from None

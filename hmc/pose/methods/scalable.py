@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from hmc.body.model_file import read_hierarchy
 from hmc.body.scalable_models import Inclusive, Unitive
 from hmc.errors import InputError
+from hmc.pose.methods.model_file import read_hierarchy
 from hmc.pose.steps.presets import PosePreset
 
 __all__ = ["SCALABLE_METHODS", "method_preset"]

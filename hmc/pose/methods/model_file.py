@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -11,11 +10,9 @@ from typing import Any
 from hmc.body.joints import DOF_NAMES
 from hmc.body.scalable_models import Inclusive, Model, Union, Unitive
 from hmc.errors import InputError
+from hmc.io.door import read_toml_file
 
 __all__ = ["read_hierarchy"]
-
-#: No model needs more; deep tables in a larger file would take long to read.
-MAX_BYTES = 100_000
 
 _KEYS = {"inclusive": ("kind", "name", "held", "thinning", "model"), "unitive": ("kind", "name", "leaf", "union", "needs")}
 _MODEL_KEYS = ("name", "angles", "parts")
@@ -40,17 +37,14 @@ def read_hierarchy(path: str | Path) -> Inclusive | Unitive:
     path = Path(path)
     if not path.is_file():
         raise InputError(f"{path}: there is no such file; a model is 1, 2, auto or a TOML file")
-    try:
-        if path.stat().st_size > MAX_BYTES:
-            raise ValueError(f"larger than {MAX_BYTES} bytes")
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (ValueError, OSError, RecursionError) as error:
-        raise InputError(f"{path}: not a TOML file ({error})") from None
+    content = read_toml_file(path)
     kind = content.get("kind")
-    if kind not in _KEYS:
+    if not isinstance(kind, str) or kind not in _KEYS:
         raise InputError(f"{path}: `kind` must be 'inclusive' or 'unitive'; got {kind!r}")
     _check_keys(content, _KEYS[kind], str(path))
-    name = content.get("name", path.stem)
+    name, needed = content.get("name", path.stem), content.get("needs", [])
+    if not isinstance(name, str) or not isinstance(needed, list):
+        raise InputError(f'{path}: `name` must be text, and `needs` a list of pairs of leaves, [["r_shank", "r_thigh"]]')
     try:
         if kind == "inclusive":
             models = tuple(_model(item, f"[[model]] {k + 1}") for k, item in enumerate(_tables(content, "model")))
@@ -60,7 +54,7 @@ def read_hierarchy(path: str | Path) -> Inclusive | Unitive:
         for k, item in enumerate(_tables(content, "union")):
             unions.append(_union(item, known, f"[[union]] {k + 1}"))
             known[unions[-1].model.name] = unions[-1].model
-        needs = tuple(tuple(_texts({"needs": pair}, "needs", "the top")) for pair in content.get("needs", []))
+        needs = tuple(tuple(_texts({"needs": pair}, "needs", "the top")) for pair in needed)
         if any(len(pair) != 2 for pair in needs):
             raise InputError('`needs` must be pairs of leaves, [["r_shank", "r_thigh"]]')
         return Unitive(name, tuple(leaves), tuple(unions), needs)  # type: ignore[arg-type]
