@@ -138,6 +138,10 @@ def make_body(dimensions: dict[str, float], limits: JointLimits | None = None, s
 
 def make_bodies(dimensions: Mapping[int, Mapping[str, float | np.ndarray]], limits: JointLimits | None = None) -> dict[int, BodyModel]:
     """The bodies of several people by number, as a result keeps their dimensions; parameters and errors as of `make_body`."""
+    for person, own in dimensions.items():
+        for name, value in own.items():
+            if np.ndim(value):
+                raise InputError(f"body dimension '{name}' of person {person} must be one number; got {np.size(value)}")
     return {person: make_body({name: float(value) for name, value in own.items()}, limits) for person, own in dimensions.items()}
 
 

@@ -144,6 +144,7 @@ def go_by_time(path: Path, views: Mapping[str, Footage], fps: float, by_stamps: 
                 raise InputError(
                     f"{file}: tells when frames were taken, and so does `first_frame` of recording.toml for '{name}'; leave one"
                 )
+            _refuse_far(file, times[: view.n_frames], fps)
             in_frames = times * fps
             if not (nearest_frames(in_frames[: view.n_frames]) >= 0).any():
                 low, high = np.nanmin(times), np.nanmax(times)
@@ -157,8 +158,19 @@ def go_by_time(path: Path, views: Mapping[str, Footage], fps: float, by_stamps: 
             even = np.arange(len(seconds)) / (view.fps or fps)
             if len(seconds) and (by_stamps or np.abs(seconds - even).max() * (view.fps or fps) > UNEVEN):
                 first = min(starts.get(name, 0), len(seconds) - 1)
+                _refuse_far(view.path, seconds - seconds[first], fps)
                 found[name] = (seconds - seconds[first]) * fps
     return found
+
+
+def _refuse_far(file: Path, times: np.ndarray, fps: float) -> None:
+    """Times at which no recording is still at work: each frame up to the last takes memory."""
+    last = float(np.max(times, initial=0.0, where=~np.isnan(times)))
+    if last > MAX_FRAME_NUMBER / fps:
+        raise InputError(
+            f"{file}: has a frame at {last:.6g} s, frames go to {MAX_FRAME_NUMBER}, {fps:g} a second; give seconds from the recording's "
+            "first frame on"
+        )
 
 
 def rates_differ(rates: Sequence[float | None]) -> bool:

@@ -12,7 +12,7 @@ import numpy as np
 from hmc.body.feet import foot_places, foot_points
 from hmc.body.joints import DOF_NAMES, N_DOF, JointLimits, default_limits, dof_index
 from hmc.body.model import BodyModel
-from hmc.body.proportions import make_body
+from hmc.body.proportions import make_bodies
 from hmc.errors import InputError
 from hmc.io.results import PoseStates, PoseTable, read_joints, read_pose, read_run
 from hmc.landmarks import ENOUGH_VIEWS, FOOT_POINTS, LANDMARKS, landmark_index
@@ -109,7 +109,7 @@ def trajectories(poses: PoseTable, states: PoseStates | None, fps: float) -> lis
             of_person = np.flatnonzero(states.persons == person)
             kept = of_person[np.isin(states.frames[of_person], own.frames)]
             whole = _spread(_known_dofs(states)[kept], states.frames[kept] - first, len(frames))
-            body = make_body({name: float(value) for name, value in states.bodies[person].items()}, _wide_limits(whole))
+            body = make_bodies({person: states.bodies[person]}, _wide_limits(whole))[person]
             one = replace(one, states=whole, body=body)
         found.append(one)
     return found
@@ -138,7 +138,11 @@ def read_trajectories(folder: str | Path, fps: float | None = None, person: int 
     if not (folder / "joints.csv").is_file():
         raise InputError(f"{folder}: no joints.csv; make poses first (hmc pose)")
     states = read_pose(folder / "pose.npz") if (folder / "pose.npz").is_file() else None
-    found = trajectories(read_joints(folder / "joints.csv"), states, fps or _fps_of(folder))
+    poses, rate = read_joints(folder / "joints.csv"), fps or _fps_of(folder)
+    try:
+        found = trajectories(poses, states, rate)
+    except InputError as error:
+        raise InputError(f"{folder / 'pose.npz'}: {error}") from None
     return chosen(found, person, str(folder))
 
 

@@ -114,7 +114,12 @@ def read_result(directory: str | Path) -> Result:
     if states is not None and N_CANTON <= len(states.dof_names) < N_DOF and states.dof_names == DOF_NAMES[: len(states.dof_names)]:
         # Of before the trunk bent, or the ankles did: their joints, which come last, are at 0.
         states = replace(states, dof_names=DOF_NAMES, states=np.pad(states.states, ((0, 0), (0, N_DOF - len(states.dof_names)))))
-    return result if states is None or states.dof_names != DOF_NAMES else with_bodies(result, states)
+    if states is None or states.dof_names != DOF_NAMES:
+        return result
+    try:
+        return with_bodies(result, states)
+    except InputError as error:
+        raise InputError(f"{directory / 'pose.npz'}: {error}") from None
 
 
 def with_bodies(result: Result, states: PoseStates) -> Result:

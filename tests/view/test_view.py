@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from functools import partial
 
 import cv2
 import numpy as np
@@ -17,11 +18,13 @@ from hmc.body.model import neutral_state
 from hmc.body.proportions import default_body
 from hmc.camera.model import look_at
 from hmc.cli import main
+from hmc.errors import InputError
 from hmc.io.calibration import write_calibration
 from hmc.io.keypoints import KEYPOINTS, write_openpose
 from hmc.io.recording import open_recording
 from hmc.io.results import PoseStates, PoseTable, TrackTable, read_pose, write_joints, write_pose, write_run, write_tracks
 from hmc.landmarks import landmark_index
+from hmc.motion.trajectory import read_trajectories
 from hmc.view.mosaic import make_layout, people_in, read_result, stream_mosaics
 from hmc.view.overlay import LEFT, RIGHT, draw_keypoints, draw_outline, draw_paths, draw_sticks, draw_track, person_color
 from hmc.view.scene import BACKGROUND, draw_floor, draw_rig, draw_voxels, from_above, viewpoint
@@ -85,6 +88,18 @@ def test_bodies_from_before_the_trunk_bent_are_drawn_as_they_were(result, tmp_pa
     assert old.states is not None and old.bodies[0].dimensions == old.bodies[0].dimensions | then
     assert {SEGMENTS[k].name for k in old.bodies[0].cones.segment}.isdisjoint({"chest", "l_clavicle", "r_clavicle"})
     np.testing.assert_allclose(landmarks(old.bodies[0], old.states.states[0]), standing()[2], atol=1e-9)
+
+
+@pytest.mark.parametrize("value", [np.ones(2), np.ones((1, 1)), np.array(-1.0)])
+def test_bodies_that_are_none_are_told_with_their_file(result, tmp_path, value):
+    shutil.copytree(result, tmp_path / "odd")
+    now = read_pose(result / "pose.npz")
+    write_pose(
+        tmp_path / "odd" / "pose.npz", PoseStates(now.frames, now.persons, now.states, now.dof_names, {0: now.bodies[0] | {"head": value}})
+    )
+    for read in (read_result, partial(read_trajectories, fps=30.0)):
+        with pytest.raises(InputError, match=r"odd/pose\.npz: body dimension 'head'"):
+            read(tmp_path / "odd")
 
 
 @pytest.mark.parametrize("number", range(5))

@@ -60,7 +60,7 @@ def cell_text(parameters: Mapping[str, Any], results: Mapping[str, Any], made: M
     InputError
         When a result is no plain value.
     """
-    content = {"parameters": dict(parameters), "results": dict(results)}
+    content: dict[str, Any] = {"parameters": dict(parameters), "results": dict(results)}
     content |= {"digest": _sum(json.loads(_canonical(content)))} | ({"made": dict(made)} if made else {})
     return _canonical(content, indent=1) + "\n"
 
