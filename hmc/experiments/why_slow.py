@@ -140,11 +140,13 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     speeds = {action: _speed(list(own.run)) for action, own in frame[frame.seen == PLACES].groupby("action")}
     table.insert(2, "motion_P0_per_frame", [speeds.get(action) for action in table.action])
     figure, panels = plt.subplots(1, len(CHANGES), figsize=(9, 3.4), sharey=True)
+    slow_first = sorted(speeds, key=speeds.__getitem__)
     for axes, (seen, own) in zip(panels, table.groupby("seen", sort=False), strict=True):
         for change, line in own.groupby("change", sort=False):
-            line = line.sort_values("motion_P0_per_frame")
-            axes.plot(line.motion_P0_per_frame, line.MMTA_percent, "o-", label=change)
-        axes.set(title=f"seen: {seen}", xlabel="motion in the median frame, in P0, over all variables", ylim=(0, 105))
+            scores = line.set_index("action").MMTA_percent
+            axes.plot(range(len(slow_first)), [scores.get(action, np.nan) for action in slow_first], "o-", label=change)
+        axes.set_xticks(range(len(slow_first)), [f"{action}\n{speeds[action]:.1f} P0 a frame" for action in slow_first])
+        axes.set(title=f"seen: {seen}", ylim=(0, 105))
         axes.legend(fontsize=6)
     panels[0].set_ylabel("MMTA at 100 mm (%)")
 
