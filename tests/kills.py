@@ -69,8 +69,8 @@ def started(folder: Path, words: tuple[str, ...]) -> int:
     """The process of a command."""
     pid = os.fork()
     if pid == 0:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-        _child(folder, words, folder.parent / "log")
+        signal.signal(signal.SIGINT, signal.SIG_DFL)  # before the command is at work, an interrupt is not its to tell
+        _child(folder, words, folder.parent / "log", signal.default_int_handler)
     return pid
 
 

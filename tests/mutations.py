@@ -48,6 +48,8 @@ MEMORY_BYTES = 2 * 2**30
 TIME_S, CLOCK_S = 60, 240
 #: All commands, each as often as it says.
 ROUND = [k for k, given in enumerate(COMMANDS) for _ in range(given.often)]
+#: What `track` and `pose` write, whatever else was put beside it.
+TABLES = ("tracks.csv", "joints.csv")
 #: Trials between two looks at the clock.
 BLOCK = 50
 NUMBER = re.compile(r"[\d.]+")
@@ -146,12 +148,12 @@ def judged(folder: Path, words: tuple[str, ...], number: int, family: str, file:
     tables = {}
     if kind == "ok" and words[0] in ("track", "pose"):
         made = folder / words[words.index("--out") + 1]
-        tables = {one.name: one.read_bytes() for one in sorted(made.glob("*.csv"))}
+        tables = {one.name: one.read_bytes() for one in sorted(made.glob("*.csv")) if one.name in TABLES}
     said = frozenset(NUMBER.sub("#", one) for one in text.splitlines())
     return Ending(kind, why, number, family, file, " ".join(words), text[-3000:] if kind == "bad" else line, tables, said)
 
 
-def _child(folder: Path, words: tuple[str, ...], log: Path) -> None:
+def _child(folder: Path, words: tuple[str, ...], log: Path, interrupts: signal.Handlers | Callable | None = None) -> None:
     code = 99
     try:
         out = os.open(log, os.O_CREAT | os.O_WRONLY | os.O_APPEND, 0o644)
@@ -166,6 +168,8 @@ def _child(folder: Path, words: tuple[str, ...], log: Path) -> None:
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
         resource.setrlimit(resource.RLIMIT_CPU, (TIME_S, TIME_S + 5))
         os.setsid()
+        if interrupts is not None:
+            signal.signal(signal.SIGINT, interrupts)
         code = call(words)
     except SystemExit as error:
         code = error.code if isinstance(error.code, int) else 1
