@@ -18,8 +18,9 @@ FEW = (slice(None, None, 16),) * 2
 LEAST_GAIN = 1.01
 #: Grey levels from which on a pixel may be brighter than it looks, and below which a channel tells of no factor.
 OVEREXPOSED, TOO_DARK = 250, 20
-#: So many pixels must tell of a factor that changes over the image; of fewer it is one.
-LEAST_TOLD = 100
+#: So many pixels must tell of a factor that changes over the image, and leave no more than this share of what one factor leaves: soft
+#: shadows and what people reflect change the light of a part as well, by less.
+LEAST_TOLD, LEAST_BETTER = 100, 0.5
 #: The fit is weighted anew so many times; what is off by more than so many deviations hardly counts (Geman and McClure 1987): people.
 ROUNDS, DEVIATIONS = 6, 3.0
 
@@ -27,7 +28,8 @@ ROUNDS, DEVIATIONS = 6, 3.0
 def light_gains(image: np.ndarray, mean: np.ndarray, people: np.ndarray) -> np.ndarray:
     """By which factor an image is brighter than the empty scene in each channel, and how that changes over the image.
 
-    A polynomial of second order of the logarithms, by iteratively reweighted least squares, within what the image itself shows.
+    One factor, or a polynomial of second order of the logarithms where that leaves half as much unexplained; by iteratively reweighted
+    least squares, within what the image itself shows.
 
     Parameters
     ----------
@@ -51,10 +53,14 @@ def light_gains(image: np.ndarray, mean: np.ndarray, people: np.ndarray) -> np.n
     for channel in np.flatnonzero(told.any(axis=(0, 1)) & ~_is_same(ratios, told)):
         terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1)
         here = told[..., channel].ravel()
-        known = terms[here] if np.count_nonzero(here) >= LEAST_TOLD else terms[here, :1]
-        at = _fitted(known, ratios[..., channel].ravel()[here])
-        low, high = np.percentile(known @ at, (2, 98))
-        gains[..., channel] = np.exp(np.clip(terms[:, : len(at)] @ at, low, high)).reshape(seen.shape[:2])
+        values = ratios[..., channel].ravel()[here]
+        one = _fitted(terms[here, :1], values)
+        gains[..., channel] = np.exp(one[0])
+        if len(values) >= LEAST_TOLD:
+            at = _fitted(terms[here], values)
+            if _left(terms[here], values, at) <= LEAST_BETTER * _left(terms[here, :1], values, one):
+                low, high = np.percentile(terms[here] @ at, (2, 98))
+                gains[..., channel] = np.exp(np.clip(terms @ at, low, high)).reshape(seen.shape[:2])
     return gains
 
 
@@ -72,15 +78,18 @@ def _is_same(ratios: np.ndarray, told: np.ndarray) -> np.ndarray:
 
 
 def _fitted(terms: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Coefficients (k,) of terms (n, k) for values (n,), of which many may be off."""
-    at = np.zeros(terms.shape[1])
-    at[0] = np.median(values)
-    for _ in range(ROUNDS if terms.shape[1] > 1 else 0):
-        left = values - terms @ at
-        spread = 1.4826 * np.median(np.abs(left)) + 1e-3
-        weighted = terms / (1 + (left / (DEVIATIONS * spread)) ** 2)[:, None] ** 2
+    """Coefficients (k,) of terms (n, k), the first of which is 1, for values (n,), of which many may be off."""
+    at = np.r_[np.median(values), np.zeros(terms.shape[1] - 1)]
+    for _ in range(ROUNDS):
+        spread = 1.4826 * _left(terms, values, at) + 1e-3
+        weighted = terms / (1 + ((values - terms @ at) / (DEVIATIONS * spread)) ** 2)[:, None] ** 2
         at = np.linalg.lstsq(weighted.T @ terms, weighted.T @ values, rcond=None)[0]
     return at
+
+
+def _left(terms: np.ndarray, values: np.ndarray, at: np.ndarray) -> float:
+    """By how much values are off, in the median."""
+    return float(np.median(np.abs(values - terms @ at)))
 
 
 def in_light_of(image: np.ndarray, mean: np.ndarray, people: np.ndarray) -> np.ndarray:
