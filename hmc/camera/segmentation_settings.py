@@ -59,7 +59,7 @@ class SegmentationSettings:
     learn_every: int = 10
     keep_out_px: int = 12
     max_foreground: float = 0.5
-    least_chance: float = 0.3
+    least_chance: float = 0.4
 
     def __post_init__(self) -> None:
         factors = ("shadow_factor", "gap_shadow_factor", "grey_shadow_factor", "grey_gap_shadow_factor")

@@ -202,10 +202,10 @@ def test_merging_takes_no_cell_that_is_not_what_its_name_says(tmp_path, capsys):
     for path in (second, fourth):
         (here / "cells" / "fig-B.1" / path.name).unlink()
     first.write_text(first.read_text().replace('"results"', '"found"'))  # damaged
-    second.write_text(second.read_text().replace('"step_deg": ', '"step_deg": 1'))  # other parameters under this name
+    content = json.loads(second.read_text())
+    second.write_text(cell_text(content["parameters"] | {"step_deg": 11}, content["results"]))  # other parameters under this name
     content = json.loads(third.read_text())
-    content["results"] = dict.fromkeys(content["results"], 0)
-    third.write_text(json.dumps(content))  # other results
+    third.write_text(cell_text(content["parameters"], dict.fromkeys(content["results"], 0)))  # other results
     before = cells_of_b1(here)
     merged = merge_stores(here, [there])
     assert (merged.copied, merged.damaged, merged.old, merged.different) == (1, (first,), (second,), (third,))
