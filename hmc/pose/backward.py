@@ -7,7 +7,8 @@ first second and a half. When the recording is over more is known:
    covers asks nothing of a person.
 2. The person's dimensions are fitted anew, to frames of the whole run (`hmc.pose.starts.own_body`).
 3. Each person is followed from the last frame to the first. Nothing is drawn at random but limbs that are lost: the pose of the frame after
-   and the first pass's are refined side by side, so that a limb that was found again is followed back to where it was lost.
+   and the first pass's are refined side by side, so that a limb that was found again is followed back to where it was lost. Where a
+   person was lost for long, so is a pose that is found anew (`hmc.pose.anew`).
 4. Each frame then has two poses, and more with limbs of one on the other; the best way through all of them is taken
    (`hmc.pose.mixtures`). Where nothing shows a limb, the way in from before and the way out to after are joined where they meet best.
 
@@ -30,9 +31,10 @@ from hmc.io.journal import append_journal, open_journal
 from hmc.io.masks import kept_frames
 from hmc.io.recording import Recording, spread_frames
 from hmc.io.results import PoseStates, TrackTable
+from hmc.pose.anew import doubtful_frames, pose_anew
 from hmc.pose.follow import FollowOptions, PosedPeople
 from hmc.pose.keypoint_cues import beside_body, learn_beside, with_keypoints
-from hmc.pose.method import SURFACE_POINTS, Capture, PoseMethod, Subject, make_subject
+from hmc.pose.method import SURFACE_POINTS, Capture, PoseMethod, Subject, make_subject, other_rng
 from hmc.pose.mixtures import N_MIXTURES, BackwardSettings, choose_path, mixed_poses, mixture
 from hmc.pose.objectives.objective import Objective
 from hmc.pose.objectives.symmetric import body_distance
@@ -57,6 +59,8 @@ T = TypeVar("T")
 
 #: Of the random numbers of a frame: those of the backward pass.
 BACKWARD = 3
+#: Of those of the backward pass (`hmc.pose.method.other_rng`).
+ANEW = 1
 #: Frames from which it is learnt where a detector's keypoints lie, at most, well spread.
 BESIDE_FRAMES = 40
 #: A ray that passes another's body as near as this may be of that one, metres: as wide as clothes are.
@@ -79,6 +83,8 @@ class _Person:
         The first pass's poses, refined, and those of the backward one.
     costs : ndarray, shape (n, 32)
         Of `mixed_poses` of both; zero where nothing tells them apart.
+    anew : frozenset of int
+        Frames in which a pose is looked for anew.
     """
 
     rows: np.ndarray
@@ -87,6 +93,7 @@ class _Person:
     own: np.ndarray
     back: np.ndarray
     costs: np.ndarray
+    anew: frozenset[int] = frozenset()
 
 
 def backward(
@@ -133,6 +140,11 @@ def backward(
             append_journal(run.journal, {"bodies": {person: body.dimensions for person, body in bodies.items()}})
     pass_ = _with_beside(pass_, people, fitted, bodies)
     persons = {person: _begun(people, fitted, person, make_subject(body, pass_.capture)) for person, body in bodies.items()}
+    if settings.anew is not None:
+        lost = doubtful_frames({number: people.costs[person.rows] for number, person in persons.items()}, recording.fps, settings.anew)
+        persons = {
+            number: replace(person, anew=frozenset(people.frames[person.rows[lost[number]]].tolist())) for number, person in persons.items()
+        }
     for record in records[1:]:
         for person, own, back, costs in record["rows"]:
             _put(persons[person], record["frame"], np.array(own), np.array(back), np.array(costs))
@@ -310,7 +322,7 @@ def _each_refined(
                     # What the asking process has too is not sent.
                     number: (
                         None if number in recent and view.target is recent[number].target else view,
-                        _own(pass_.rng(number, frame), persons[number], view, pass_.settings.polish),
+                        _own(pass_.rng(number, frame), persons[number], view, pass_.settings),
                     )
                     for number, view in shown.items()
                     if shows_enough(view.target)
@@ -322,11 +334,14 @@ def _each_refined(
         yield frame, {number: (recent[number] if view is None else view, own) for number, (view, own) in found.items()}
 
 
-def _own(rng: np.random.Generator, person: _Person, view: PersonView, settings: PolishSettings) -> list[np.ndarray]:
-    """A frame's first pose, refined, and where it would be by the keypoints alone."""
-    objective = fine_objective(rng, person.subject, view, settings)
-    own, _ = refine(objective, person.own[person.row_of[view.frame]], settings.refine)
-    return [own, *keypoint_pose(person.subject.body, view.keypoints, own)]
+def _own(rng: np.random.Generator, person: _Person, view: PersonView, settings: BackwardSettings) -> list[np.ndarray]:
+    """A frame's first pose, refined, and where it would be by the keypoints alone, and anew by the hulls alone."""
+    objective = fine_objective(rng, person.subject, view, settings.polish)
+    own, info = refine(objective, person.own[person.row_of[view.frame]], settings.polish.refine)
+    found = [own, *keypoint_pose(person.subject.body, view.keypoints, own)]
+    if view.frame in person.anew and settings.anew is not None and view.target is not None:
+        found += pose_anew(other_rng(rng, ANEW), person.subject, view.target, objective, info.cost_after, settings.polish, settings.anew)
+    return found
 
 
 def _back(

@@ -15,6 +15,7 @@ import numpy as np
 from hmc.body.dimensions import FitBodySettings
 from hmc.body.limbs import CHAIN_OF_DOF, LIMBS
 from hmc.body.model import BodyModel
+from hmc.pose.anew import AnewSettings
 from hmc.pose.legs import LegSettings, choose_legs, limb_points
 from hmc.pose.steps.polish import PolishSettings
 
@@ -44,6 +45,8 @@ class BackwardSettings:
     hidden_places, own_rays, best_way : bool
         False, to see what each is for: nothing is learnt of what furniture hides; rays that another's pose covers ask all the same; the
         backward pass's poses stay as they are, and none of the first pass's are taken.
+    anew : AnewSettings or None
+        Where a pose is looked for anew (`hmc.pose.anew`); None: nowhere.
     """
 
     polish: PolishSettings
@@ -53,6 +56,7 @@ class BackwardSettings:
     hidden_places: bool = True
     own_rays: bool = True
     best_way: bool = True
+    anew: AnewSettings | None = field(default_factory=AnewSettings)
 
 
 def mixed_poses(one: np.ndarray, other: np.ndarray) -> np.ndarray:
