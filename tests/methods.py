@@ -156,11 +156,11 @@ def true_detections(frames: int, without: tuple[int, ...] = ()) -> DetectionTabl
 
 
 def followed(case: tuple[str, str], frames: int, run: RunOptions | None = None, **how) -> PosedPeople:
-    """The clip's person by a method: `tracks`, `seed`, `recording`, `detections` and `method` may be others."""
+    """The clip's person by a method: `tracks`, `seed`, `recording`, `detections`, `method` and `change` may be others."""
     method = how.get("method") or lean_method(*case)
     tracks = how.get("tracks", true_tracks(frames)) if pose_method(case[0]).needs_tracks else None
     detections = None
     if "detections" in method.needs:
         detections = how.get("detections", true_detections(frames))
-    options = FollowOptions(VOXEL_M, how.get("seed", 3), HEIGHT_M, detections)
+    options = FollowOptions(VOXEL_M, how.get("seed", 3), HEIGHT_M, detections, change=how.get("change"))
     return follow(how.get("recording") or tiny_clip(frames), tracks, method, options, run)

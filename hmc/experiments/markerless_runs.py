@@ -5,7 +5,7 @@ Tracks and silhouettes are made once for all cells of a recording and its camera
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -29,7 +29,7 @@ from hmc.voxels.run_options import RunOptions
 
 __all__ = [
     "EVERYTHING", "FAMILY", "FRONTEND", "MASKS_KEY", "SWITCHES", "TRACK_VOXEL_M", "VERSION", "VOXEL_M", "TrackedRecording",
-    "Way", "action_sources", "cell", "change_hulls", "chosen_cameras", "opened", "pose_results", "run_method", "tracked",
+    "Way", "action_sources", "cell", "chosen_cameras", "opened", "pose_results", "run_method", "tracked",
 ]  # fmt: skip
 
 FAMILY = "markerless"
@@ -41,7 +41,7 @@ VOXEL_M, TRACK_VOXEL_M = 0.03, 0.05
 FRONTEND = FrontendSettings(threads=1)
 MASKS_KEY = "experiments"
 EVERYTHING = ""
-#: Passes the frames of a run on, and may change their hulls.
+#: Passes the frames of a run on.
 Progress = Callable[[Iterable, int], Iterable]
 
 
@@ -146,19 +146,8 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
     """
     way = SWITCHES[parameters["without"]](PRESETS[parameters["preset"]])
     seen = tracked(inputs, parameters["recording"], parameters["cameras"])
-    options = FollowOptions(VOXEL_M, int(rng.integers(2**31)))
-    return pose_results(seen.recording, run_method(seen, way.method, options, change_hulls(way.change)))
-
-
-def change_hulls(change: Callable[[HullStep], HullStep] | None) -> Progress | None:
-    """What changes every frame's hulls, as a run's `progress`."""
-    if change is None:
-        return None
-
-    def changed(steps: Iterable[HullStep], total: int) -> Iterator[HullStep]:
-        return map(change, steps)
-
-    return changed
+    options = FollowOptions(VOXEL_M, int(rng.integers(2**31)), change=way.change)
+    return pose_results(seen.recording, run_method(seen, way.method, options))
 
 
 def run_method(seen: TrackedRecording, method: PoseMethod, options: FollowOptions, progress: Progress | None = None) -> PosedPeople:

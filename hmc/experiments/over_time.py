@@ -18,7 +18,7 @@ from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameter
 from hmc.experiments.engine.inputs import Inputs, rendered
 from hmc.experiments.engine.style import COLORS
 from hmc.experiments.five_actions import LONG_SUFFIX, action_name, action_title
-from hmc.experiments.markerless_runs import VOXEL_M, action_sources, change_hulls, pose_results, run_method, tracked
+from hmc.experiments.markerless_runs import VOXEL_M, action_sources, pose_results, run_method, tracked
 from hmc.experiments.pose_intervals import none_better, score_difference
 from hmc.experiments.truth import estimates
 from hmc.metrics.landmarks import landmark_errors
@@ -98,8 +98,8 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
     seen = tracked(inputs, parameters["recording"], parameters["cameras"])
     recording = seen.recording
     gone = [recording.start + round(second * recording.fps) for second in parameters["gone_s"]]
-    change = change_hulls(lambda step: hidden(step, *gone)) if gone else None
-    people = run_method(seen, WAYS[parameters["way"]], FollowOptions(VOXEL_M, int(rng.integers(2**31))), change)
+    change = (lambda step: hidden(step, *gone)) if gone else None
+    people = run_method(seen, WAYS[parameters["way"]], FollowOptions(VOXEL_M, int(rng.integers(2**31)), change=change))
     return pose_results(recording, people) | {"gone": gone}
 
 

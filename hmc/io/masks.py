@@ -147,6 +147,8 @@ def _begin(path: Path, key: str, first: int) -> None:
     header = _header(key)
     ends = [start + length for index, (start, length) in places.items() if index < first]
     path.parent.mkdir(parents=True, exist_ok=True)
+    if not path.is_file():  # a pipe would be waited for
+        path.unlink(missing_ok=True)
     with open(path, "r+b" if places else "wb") as file:
         file.write(header)
         file.truncate(max(ends, default=len(header)))

@@ -30,6 +30,8 @@ JOINT_COLUMNS = ("frame", "person", "joint", "x", "y", "z")
 VIEWS_COLUMN, TRUST_COLUMN = "views", "trust"
 TRACK_COLUMNS = ("frame", "person", "x", "y", "z")
 HEAD_COLUMNS = ("head_x", "head_y", "head_z")
+#: No coordinate is farther off, metres.
+MAX_METRES = 1e9
 
 
 @dataclass(frozen=True)
@@ -296,9 +298,9 @@ def write_tracks(path: str | Path, table: TrackTable) -> None:
 def _points(path: Path, names: Sequence[str], columns: Mapping[str, Sequence[str]], lines: np.ndarray) -> np.ndarray:
     """Three columns of numbers as (n, 3); an empty cell is NaN."""
     points = np.stack([_numbers(path, name, columns[name], lines, "a number of metres") for name in names], axis=1)
-    infinite = np.isinf(points).any(axis=1)
-    if infinite.any():
-        raise InputError(f"{path}, line {lines[np.argmax(infinite)]}: an infinite coordinate; write nan where there is none")
+    for wrong, what in ((np.isinf(points), "an infinite coordinate"), (np.abs(points) > MAX_METRES, "a coordinate beyond any room")):
+        if wrong.any():
+            raise InputError(f"{path}, line {lines[np.argmax(wrong.any(axis=1))]}: {what}; write nan where there is none")
     return points
 
 

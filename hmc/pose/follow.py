@@ -7,7 +7,7 @@ in memory. Records of what is decided go to a journal, so that a run that was st
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
 from functools import partial
@@ -159,6 +159,8 @@ class FollowOptions:
         What a detector of 2-D keypoints saw.
     recent : RecentViews or None
         Where the pass forward leaves views for the pass backward; None: that makes all of them again. The result is the same.
+    change : callable or None
+        What is made of every frame's hulls before the pass forward sees them: what an experiment hides.
     """
 
     voxel_size_m: float = 0.03
@@ -168,6 +170,7 @@ class FollowOptions:
     drift: np.ndarray | None = None
     keypoints: KeypointCues | None = None
     recent: RecentViews | None = None
+    change: Callable[[HullStep], HullStep] | None = None
 
 
 def follow(
@@ -282,7 +285,7 @@ def _views_from(
     grid = person_grid(recording, options.voxel_size_m)
 
     def seen(hulls: Iterable[HullStep]) -> Iterator[tuple[int, dict[int, PersonView]]]:
-        for hull in hulls:
+        for hull in hulls if options.change is None else map(options.change, hulls):
             views = with_keypoints(views_of(recording, grid, tracks, hull, method.needs), recording.rig, tracks, cues)
             yield hull.index, _with_markers(views, recording, method, options)
 

@@ -140,12 +140,12 @@ def velocities(table: TrackTable, fps: float, window_s: float = 0.4) -> np.ndarr
     Returns
     -------
     ndarray, shape (n, 3)
-        Metres a second; zero for a person seen in one frame only.
+        Metres a second, by the positions that are known; zero where there is one only, or none.
     """
     result = np.zeros((len(table.frames), 3))
     half = max(1.0, window_s * fps / 2)
     for person in np.unique(table.persons):
-        rows = np.flatnonzero(table.persons == person)
+        rows = np.flatnonzero((table.persons == person) & np.isfinite(table.positions).all(axis=1))
         rows = rows[np.argsort(table.frames[rows], kind="stable")]
         frames, places = table.frames[rows].astype(float), table.positions[rows]
         first, last = np.searchsorted(frames, frames - half, "left"), np.searchsorted(frames, frames + half, "right")

@@ -1,5 +1,7 @@
 """Silhouettes kept between two passes: what comes back is what was kept, whatever happened to the run that kept them."""
 
+import os
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -44,6 +46,19 @@ def test_any_size(tmp_path_factory, size, seed):
     path = tmp_path_factory.mktemp("any") / "masks"
     keep(path, 0, 3, seed=seed, shapes=(size, size[::-1]))
     same(kept_masks(path, "k", 0, 3), steps(0, 3, seed, (size, size[::-1])))
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes")
+@pytest.mark.parametrize("make", ["pipe", "link to itself", "link to nothing"])
+def test_what_is_no_file_is_not_waited_for(tmp_path, make):
+    path = tmp_path / ".masks"
+    if make == "pipe":
+        os.mkfifo(path)
+    else:
+        path.symlink_to(path if make == "link to itself" else tmp_path / "nothing")
+    keep(path, 0, 3)
+    assert path.is_file() and not path.is_symlink()
+    same(kept_masks(path, "k", 0, 3), steps(0, 3))
 
 
 def test_all_or_nothing(tmp_path):

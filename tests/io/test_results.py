@@ -128,6 +128,7 @@ def test_tracks_come_back(tmp_path, heads):
         ("frame,person,joint,x,y,z\n0.5,0,neck,1,2,3\n", "line 2: `frame` must be a whole number; got '0.5'"),
         ("frame,person,joint,x,y,z\n0,9999999999999999999999,neck,1,2,3\n", "line 2: `person` must be a whole number"),
         ("frame,person,joint,x,y,z\n0,0,neck,1,2,inf\n", "line 2: an infinite coordinate"),
+        ("frame,person,joint,x,y,z\n0,0,neck,1,2,1e300\n", "line 2: a coordinate beyond any room"),
         ("frame,person,joint,x,y,z\n0,0,neck,1,2,3\n\n0,0,neck,1,2,3\n", "line 4: this frame, person and joint stood in an earlier line"),
     ],
 )

@@ -35,13 +35,14 @@ from hmc.body.kinematics import landmarks
 from hmc.body.proportions import make_body
 from hmc.camera.segmentation import SegmentationSettings
 from hmc.errors import InputError
+from hmc.experiments.over_time import hidden
 from hmc.io.masks import keep_masks
 from hmc.io.recording import open_recording
 from hmc.io.results import TrackTable
 from hmc.landmarks import landmark_index
 from hmc.pose.follow import FollowOptions, PosedPeople, follow, persons_of
 from hmc.pose.method import Capture, begin_tracking
-from hmc.pose.person import DecidedFrames, PersonState
+from hmc.pose.person import NO_START, DecidedFrames, PersonState
 from hmc.pose.recovery import LossSettings
 from hmc.pose.registry import METHODS
 from hmc.pose.views.person_view import PersonView
@@ -244,6 +245,14 @@ def test_a_damaged_journal_ends_where_it_is_damaged(tmp_path, whole):
 
 
 # --- frames and people whom nothing shows
+
+
+def test_what_an_experiment_hides_is_not_seen(tmp_path):
+    """Hulls are changed before anybody sees them, be silhouettes new or kept."""
+    run = RunOptions(masks=tmp_path / "masks", key="clip")
+    for _ in range(2):
+        people = followed(("apf", "default"), FRAMES, run, change=lambda step: hidden(step, 0, 10**9))
+        assert set(people.status) == {NO_START} and np.isnan(people.positions).all()
 
 
 @each(TRACKED)

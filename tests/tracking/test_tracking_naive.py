@@ -1,5 +1,7 @@
 """The naive tracker on drawn rooms: ellipsoid people whose true centroids are known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -245,6 +247,16 @@ def test_velocities_are_polyfit_s_over_the_window_whatever_the_order_and_gaps():
         near = (persons == persons[row]) & (np.abs(frames - frames[row]) <= 5)
         expected = np.polyfit(frames[near], table.positions[near], 1)[0] * FPS if near.sum() > 1 else np.zeros(3)
         assert np.allclose(slope[row], expected, atol=1e-9)
+
+
+def test_velocities_are_of_the_positions_that_are_known():
+    places = np.arange(12.0)[:, None] * [0.1, -0.2, 0.0]
+    table = TrackTable(np.arange(12), np.zeros(12, int), places)
+    holes = replace(table, positions=np.where(np.isin(np.arange(12), [0, 4, 5])[:, None], np.nan, places))
+    known = np.isfinite(holes.positions).all(axis=1)
+    slope = velocities(holes, FPS)
+    assert np.allclose(slope[known], velocities(table, FPS)[known]) and not slope[~known].any()
+    assert not velocities(replace(table, positions=np.full((12, 3), np.nan)), FPS).any()
 
 
 def test_gaps_longer_than_asked_stay():
