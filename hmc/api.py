@@ -16,6 +16,7 @@ from hmc.errors import InputError
 from hmc.io.masks import MaskStep
 from hmc.io.recording import Recording, for_voxels, open_recording
 from hmc.io.results import TrackTable, read_centroids, read_joints
+from hmc.processes import one_thread
 from hmc.voxels.hulls import HullStep, stream_hulls, stream_masks
 
 if TYPE_CHECKING:
@@ -102,6 +103,7 @@ def hulls(recording: Recording, voxel_size_m: float = POSE_VOXEL_M, masks: Itera
     return stream_hulls(recording, person_grid(recording, voxel_size_m), masks=masks)
 
 
+@one_thread()
 def track(
     recording: Recording | str | Path,
     tracker: str | Tracker | None = None,
@@ -189,6 +191,7 @@ def views(
     return (views_of(recording, grid, tracks, hull, wanted) for hull in stream_hulls(recording, grid, masks=masks))
 
 
+@one_thread()
 def pose(
     recording: Recording | str | Path,
     tracks: TrackTable | None = None,

@@ -5,7 +5,8 @@ memory that both share. Where that cannot be, on systems that do not fork safely
 process that asks, so the result never depends on the number of processes.
 
 A fork copies the asking thread alone. Libraries with threads of their own could wait for those for ever: OpenCV's are stopped before the
-fork, and the command line keeps linear algebra to one thread. What forks should have no other threads at work at that moment.
+fork, and linear algebra is kept to one thread, by the command line and, for who calls from Python, by `one_thread`. What forks should have
+no other threads at work at that moment.
 """
 
 from __future__ import annotations
@@ -28,8 +29,19 @@ from typing import Any, TypeVar
 
 import cv2
 import numpy as np
+from threadpoolctl import threadpool_limits
 
-__all__ = ["ahead", "arrays_ahead", "available_processors", "each_ahead", "end_with", "may_fork", "share_out", "stepped_apart"]
+__all__ = [
+    "ahead",
+    "arrays_ahead",
+    "available_processors",
+    "each_ahead",
+    "end_with",
+    "may_fork",
+    "one_thread",
+    "share_out",
+    "stepped_apart",
+]
 
 T = TypeVar("T")
 K = TypeVar("K")
@@ -50,6 +62,18 @@ ITEM, END, FAILED = range(3)
 def available_processors() -> int:
     """How many processors this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Linear algebra in one thread, for a while, or, as a decorator, during each call.
+
+    Matrices are small here: threads of BLAS wait for one another longer than they work. On two idle cores a step of a session took three
+    times as long with two of them and a first pose five times, and more where others use the cores. Nor do sums then depend on how many
+    cores there are.
+    """
+    with threadpool_limits(1, "blas"):
+        yield
 
 
 def may_fork() -> bool:

@@ -13,13 +13,15 @@ import pytest
 from drawn import draw_recording, walk
 from methods import TINY, lean_method, lean_work, tiny_clip, true_joints
 from numpy.testing import assert_allclose, assert_array_equal
+from threadpoolctl import threadpool_info, threadpool_limits
 
 import hmc
 from hmc.body.kinematics import landmarks
 from hmc.io.recording import background_frames, iterate_frames, reduced
-from hmc.session import front
+from hmc.session import front, step
 from hmc.session.newest import live
 from hmc.session.step import session_step
+from hmc.voxels.looks import look_once
 
 FRAMES = 12
 
@@ -219,6 +221,24 @@ def test_the_lines_of_the_readme_run():
     assert np.isfinite(names["people"].positions).all() and len(names["people"].frames) == len(names["images"][0])
     exec(compile(lines, "README.md", "exec"), names)
     assert list(names["found"].people) == [0] and names["person"].position.shape == (3,)
+
+
+def test_linear_algebra_has_one_thread_in_a_step_and_as_many_as_before_after_it(monkeypatch):
+    def threads():
+        return [library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"]
+
+    seen = []
+
+    def look(*given):
+        seen.append(threads())
+        return look_once(*given)
+
+    monkeypatch.setattr(step, "look_once", look)
+    with threadpool_limits(2, "blas"):
+        before = threads()
+        stepped(clip_images()[:1], posed=False)
+        assert threads() == before
+    assert seen and set(seen[0]) == {1}
 
 
 def test_wrong_input_is_told_in_a_line():

@@ -25,6 +25,7 @@ from hmc.io.recording import Frame, Recording
 from hmc.pose.follow import known_landmarks
 from hmc.pose.person import DecidedFrames, PersonState, PersonTrack, PoseTask, end_person, person_step
 from hmc.pose.views.person_view import PersonView, views_of
+from hmc.processes import one_thread
 from hmc.session.images import Images, frame_images
 from hmc.tracking.following import init, original_number
 from hmc.tracking.resumable import observe_step
@@ -167,6 +168,7 @@ class SessionState:
     index: int = 0
 
 
+@one_thread()
 def session_step(settings: SessionSettings, state: SessionState, images: Images) -> tuple[SessionState, LiveFrame]:
     """The state after one more frame of every camera, and what the frame shows.
 
@@ -223,6 +225,7 @@ def session_step(settings: SessionSettings, state: SessionState, images: Images)
     return SessionState(tuple(models[c] for c in range(len(scene.rig))), tracker, people, index + 1), found
 
 
+@one_thread()
 def end_session(settings: SessionSettings, state: SessionState) -> tuple[SessionState, tuple[DecidedFrames, ...]]:
     """Everybody leaves: the poses that still waited for later frames, and the state without people.
 

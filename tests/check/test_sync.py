@@ -119,6 +119,45 @@ def test_where_others_do_not_agree_a_dropped_frame_is_not_placed(dropped, placed
         assert found[3].unplaced == 1 and found[3].doubt >= 1
 
 
+def apart_from(own, reach, floor=0.02, slope=0.05):
+    """How unlike each frame about a moment is, where the frame of that moment is `own`."""
+    there = np.arange(len(own))[:, None] + np.arange(-reach, reach + 1)
+    return np.minimum(np.abs(there - own[:, None]), 6) * slope + floor
+
+
+def test_a_pair_that_is_unlike_at_any_time_counts_for_little():
+    """Two cameras tell of a frame that the fourth lacks; by the third, before which furniture stands, nothing is missing."""
+    n, reach = 100, 20
+    even, own = np.arange(n), np.arange(n) - (np.arange(n) >= 40)
+    bands = {pair: apart_from(even, reach) for pair in ((0, 1), (0, 2), (1, 2))}
+    bands |= {(0, 3): apart_from(own, reach), (1, 3): apart_from(own, reach), (2, 3): apart_from(even, reach, 0.3, 0.15)}
+    found = find_synchrony(Evidence(4, n, reach, bands)).cameras
+    assert all(one.course == Course() for one in found[:3])
+    ((moment, change),) = found[3].course.steps
+    assert (found[3].status, found[3].course.shift, change) == ("sure", 0, -1) and abs(moment - 40) <= 1
+
+
+def test_while_somebody_stands_it_is_all_one_where_a_frame_was_dropped():
+    """Somebody walks, stands for long, and walks on; by each camera the frame is missing at another moment of standing."""
+    places = np.concatenate([np.arange(25), np.full(80, 25), np.arange(25, 50)])
+    n, reach = len(places) - 1, 20
+    own = np.delete(places, 60)
+    bands = {}
+    for pair, seems in {(0, 3): 27, (1, 3): 60, (2, 3): 100, (0, 1): None, (0, 2): None, (1, 2): None}.items():
+        other = places[:n] if seems is None else own
+        there = np.arange(n)[:, None] + np.arange(-reach, reach + 1)
+        known = (there >= 0) & (there < n)
+        apart = np.minimum(np.abs(places[:n, None] - other[there.clip(0, n - 1)]), 6) / 20 + 0.02
+        if seems is not None:  # what silhouettes are off by
+            best = np.arange(n) - (np.arange(n) >= seems)
+            apart[25:104] += 0.002 * (there != best[:, None])[25:104]
+        bands[pair] = np.where(known, apart, np.nan)
+    found = find_synchrony(Evidence(4, n, reach, bands)).cameras
+    assert found[3].unplaced == 0 and [change for _, change in found[3].course.steps] == [-1] and found[3].course.shift == 0
+    assert 25 <= found[3].course.steps[0][0] <= 105
+    assert all(one.course == Course() for one in found[:3])
+
+
 def test_a_clock_that_drifts_is_found(ring):
     places = np.column_stack([np.interp(np.arange(4 * 310) / 4, np.arange(320), axis) for axis in path_of(320).T])
     n = 300

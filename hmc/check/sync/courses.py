@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from hmc.check.sync.evidence import Evidence
 
-__all__ = ["Course", "against", "best_course", "disagreement"]
+__all__ = ["Course", "against", "best_course", "disagreement", "weights"]
 
 #: No frame of a camera belongs to a moment.
 NONE = -(10**9)
@@ -27,6 +27,10 @@ CAP = 4.0
 NOISE, PART = 1.0, 12
 #: A clock is believed to be off when by the end it is so by this many frames, and not by more frames a frame than any clock is.
 LEAST_DRIFT, MOST_SLOPE = 0.75, 0.005
+#: Pairs of cameras are never taken for less unlike than this at their best: silhouettes are of pixels.
+LEAST_UNLIKE = 0.015
+#: People stand still where a frame more or less makes less than this share of the usual difference.
+STILL = 0.5
 #: A clock is off, and nothing was dropped, where shifts over time are this much nearer to a line than to steps.
 LINE = 0.6
 
@@ -86,7 +90,48 @@ class Course:
         return found
 
 
-def against(evidence: Evidence, frames: Sequence[np.ndarray], members: Sequence[int], c: int) -> np.ndarray:
+def weights(evidence: Evidence, frames: Sequence[np.ndarray]) -> dict[tuple[int, int], float]:
+    """What each pair of cameras counts for: one over how unlike both usually are at their best.
+
+    A pair of which one camera sees legs that furniture hides from the other stays unlike at any time, and what it tells of time is lost
+    in that.
+
+    Parameters
+    ----------
+    evidence : Evidence
+    frames : sequence of ndarray of int, shape (n_moments,)
+        Each camera's frame at each moment.
+
+    Returns
+    -------
+    dict from (int, int) to float
+    """
+    found = {}
+    for i, j in evidence.bands:
+        own = _pair_costs(evidence, frames, i, j, frames[j][:, None])
+        known = own[np.isfinite(own)]
+        found[i, j] = 1 / max(LEAST_UNLIKE, float(np.median(known)) if len(known) else 1.0)
+    return found
+
+
+def _pair_costs(evidence: Evidence, frames: Sequence[np.ndarray], j: int, c: int, own: np.ndarray) -> np.ndarray:
+    """How unlike camera c, at the frames `own` (n_moments, k), is to camera j at each moment; NaN where that cannot be told."""
+    n, reach = evidence.n_moments, evidence.reach
+    other = np.broadcast_to(frames[j][:, None], own.shape)
+    first, second = (own, other) if c < j else (other, own)
+    there = (first >= 0) & (first < n) & (second >= 0) & (second < n) & (np.abs(second - first) <= reach)
+    values = np.full(own.shape, np.nan)
+    values[there] = evidence.bands[min(c, j), max(c, j)][first[there], (second - first + reach)[there]]
+    return values
+
+
+def against(
+    evidence: Evidence,
+    frames: Sequence[np.ndarray],
+    members: Sequence[int],
+    c: int,
+    weighed: Mapping[tuple[int, int], float] | None = None,
+) -> np.ndarray:
     """How unlike a camera is to the others at each moment, when it is taken some frames from where it is.
 
     Parameters
@@ -97,30 +142,29 @@ def against(evidence: Evidence, frames: Sequence[np.ndarray], members: Sequence[
     members : sequence of int
         The cameras to compare with.
     c : int
+    weighed : mapping from (int, int) to float, optional
+        What each pair counts for, as from `weights`; without it all count alike.
 
     Returns
     -------
     ndarray, shape (n_moments, 2 * ROOM + 1)
         The mean over the others; NaN where nothing can be told. Of a moment whose frame the camera has not, of the frame it would be.
     """
-    reach, n = evidence.reach, evidence.n_moments
-    total, number = np.zeros((n, 2 * ROOM + 1)), np.zeros((n, 2 * ROOM + 1))
+    n = evidence.n_moments
+    total, weight, number = (np.zeros((n, 2 * ROOM + 1)) for _ in range(3))
     own = (frames[c][:, None] + np.arange(-ROOM, ROOM + 1)).clip(-1, n)
     for j in members:
         pair = (min(c, j), max(c, j))
         if j == c or pair not in evidence.bands:
             continue
-        other = np.broadcast_to(frames[j][:, None], own.shape)
-        first, second = (own, other) if c < j else (other, own)
-        there = (first >= 0) & (first < n) & (second >= 0) & (second < n) & (np.abs(second - first) <= reach)
-        values = np.full(own.shape, np.nan)
-        values[there] = evidence.bands[pair][first[there], (second - first + reach)[there]]
-        known = np.isfinite(values)
-        total[known] += values[known]
+        values = _pair_costs(evidence, frames, j, c, own)
+        known, counts = np.isfinite(values), 1.0 if weighed is None else weighed[pair]
+        total[known] += counts * values[known]
+        weight[known] += counts
         number[known] += 1
     # Where one camera alone saw somebody, what it says is no mean of what the others say.
     most = number.max(axis=1, keepdims=True)
-    return np.where((number > 0) & (number == most), total / np.maximum(number, 1), np.nan)
+    return np.where((number > 0) & (number == most), total / np.where(number > 0, weight, 1), np.nan)
 
 
 def best_course(costs: np.ndarray) -> tuple[Course, float]:
@@ -140,19 +184,11 @@ def best_course(costs: np.ndarray) -> tuple[Course, float]:
     gain : float
         By how much it lowers the costs, less what its complication is charged, as a share of that charge; 0 where nothing is gained.
     """
-    known = np.isfinite(costs)
-    told = known[:, ROOM - 1 : ROOM + 2].all(axis=1)
-    if told.sum() < 2 * LEAST_SEEN:
+    made = _filled(costs)
+    if made is None:
         return Course(), 0.0
-    # What cannot be told speaks neither for a course nor against it.
-    filled = np.where(known, costs, costs[:, ROOM : ROOM + 1])
-    rises = np.array([_rise(filled[part]) for part in np.array_split(np.flatnonzero(told), max(1, int(told.sum()) // PART))])
-    frame = float(np.median(rises[:, 0]))
-    if frame <= 0:
-        return Course(), 0.0
-    usual = float(np.median(filled[told].min(axis=1)))
-    filled = np.where(np.isfinite(filled), np.minimum(filled, usual + CAP * frame), usual)
-    charge = max(LEAST_SEEN * frame, NOISE * float(np.median(rises[:, 1])) * np.sqrt(told.sum()))
+    filled, usual, frame, scatter = made
+    charge = max(LEAST_SEEN * frame, NOISE * scatter)
     now = float(filled[:, ROOM].sum())
     best = int(filled.sum(axis=0).argmin())
     found = [
@@ -167,16 +203,17 @@ def best_course(costs: np.ndarray) -> tuple[Course, float]:
 
 
 def disagreement(evidence: Evidence, frames: Sequence[np.ndarray], members: Sequence[int], c: int, course: Course) -> float:
-    """At how many moments a camera's course would be another without one of the cameras that it is compared with.
+    """At how many moments a camera's frame might be another without one of the cameras that it is compared with.
 
     Where people hardly move, what silhouettes are off by decides at which moment a frame was dropped, and that is another for each pair.
+    Moments at which a frame more or less makes no difference do not count: people are still there, and any frame is as good.
 
     Parameters
     ----------
     evidence, frames, members, c
         As of `against`; of the other cameras the courses that were found.
     course : Course
-        The camera's own.
+        The camera's own, with steps.
 
     Returns
     -------
@@ -186,15 +223,54 @@ def disagreement(evidence: Evidence, frames: Sequence[np.ndarray], members: Sequ
     partners = [j for j in members if j != c and (min(c, j), max(c, j)) in evidence.bands]
     if len(partners) < 2:
         return 1.0
-    n = evidence.n_moments
+    n, weighed = evidence.n_moments, weights(evidence, frames)
     about = [*frames[:c], Course(course.shift).frames(n), *frames[c + 1 :]]
+    together = _filled(against(evidence, about, partners, c, weighed))
+    if together is None:
+        return 1.0
+    filled, _, frame, _ = together
+    told = _telling(filled, frame, course)
     own, worst = course.frames(n), 0.0
+    if not told.any():
+        return 1.0
     for left_out in partners:
-        other, _ = best_course(against(evidence, about, [j for j in partners if j != left_out], c))
-        there = replace(other, shift=other.shift + course.shift).frames(n)
-        both = (own != NONE) & (there != NONE)
-        worst = max(worst, float((own != there)[both].mean()) if both.any() else 1.0)
+        costs = against(evidence, about, [j for j in partners if j != left_out], c, weighed)
+        other = replace(found := best_course(costs)[0], shift=found.shift + course.shift).frames(n)
+        there = told & (own != NONE) & (other != NONE)
+        differing = float((own != other)[there].mean()) if there.any() else 1.0
+        rest = _filled(costs)
+        spans = ((0, n),) if rest is None else _spans(rest[0], course.steps, ROOM, AS_WELL * rest[2])
+        # Too little may be left for the step to be found at all, and yet it fits nowhere else.
+        worst = max(worst, min(differing, max(float(told[low:high].sum()) for low, high in spans) / float(told.sum())))
     return worst
+
+
+def _telling(costs: np.ndarray, frame: float, course: Course) -> np.ndarray:
+    """The moments at which a frame more or less makes half the difference that it usually makes where people move, bool; `costs` are about
+    the course's shift, with nothing unknown."""
+    columns = np.full(len(costs), ROOM)
+    for moment, change in course.steps:
+        columns[moment:] += change
+    near = np.stack([costs[np.arange(len(costs)), (columns + k).clip(0, 2 * ROOM)] for k in (-1, 0, 1)])
+    return np.ptp(near, axis=0) >= STILL * frame
+
+
+def _filled(costs: np.ndarray) -> tuple[np.ndarray, float, float, float] | None:
+    """Costs with nothing unknown and no moment that counts for much, their usual value, and what a frame makes worse and by how much that
+    scatters; None where they tell too little."""
+    known = np.isfinite(costs)
+    told = known[:, ROOM - 1 : ROOM + 2].all(axis=1)
+    if told.sum() < 2 * LEAST_SEEN:
+        return None
+    # What cannot be told speaks neither for a course nor against it.
+    filled = np.where(known, costs, costs[:, ROOM : ROOM + 1])
+    rises = np.array([_rise(filled[part]) for part in np.array_split(np.flatnonzero(told), max(1, int(told.sum()) // PART))])
+    frame = float(np.median(rises[:, 0]))
+    if frame <= 0:
+        return None
+    usual = float(np.median(filled[told].min(axis=1)))
+    filled = np.where(np.isfinite(filled), np.minimum(filled, usual + CAP * frame), usual)
+    return filled, usual, frame, float(np.median(rises[:, 1])) * float(np.sqrt(told.sum()))
 
 
 def _rise(costs: np.ndarray) -> tuple[float, float]:

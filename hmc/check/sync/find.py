@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hmc.check.sync.courses import Course, against, best_course, disagreement
+from hmc.check.sync.courses import Course, against, best_course, disagreement, weights
 from hmc.check.sync.evidence import Evidence
 from hmc.check.sync.shifts import Certainty, certainty, find_shifts, fractions, moved_curve
 
@@ -191,10 +191,11 @@ def _refined(evidence: Evidence, courses: dict[int, Course], members: Sequence[i
     settled: set[int] = set()
     for _ in range(2 * len(members)):
         frames = [courses[c].frames(evidence.n_moments) for c in range(evidence.n_cameras)]
+        weighed = weights(evidence, frames)
         best: tuple[float, int, Course] | None = None
         for c in members:
             if courses[c].is_plain and c not in settled:
-                course, gain = best_course(against(evidence, frames, members, c))
+                course, gain = best_course(against(evidence, frames, members, c, weighed))
                 if gain > LEAST_GAIN and course != Course() and (best is None or gain > best[0]):
                     best = gain, c, _moved(course, courses[c].shift)
         if best is None:
