@@ -29,7 +29,7 @@ METHOD = OBJECTIVES | {"pose.method"}
 STEPS = METHOD | {"pose.steps"}
 STARTS = STEPS | {"pose.starts"}
 PERSON = STARTS | {"pose.legs", "pose.person"}
-MIXTURES = STEPS | {"pose.legs", "pose.mixtures"}
+MIXTURES = STEPS | {"pose.anew", "pose.legs", "pose.mixtures"}
 FINISHED = MOTION | {"view"}
 FOLLOWING = PERSON | FINISHED | {"pose.finished", "pose.records", "pose.follow", "pose.keypoint_cues", "pose.keypoint_sides"}
 METHODS = STARTS | MIXTURES | {"pose.recovery", "pose.methods"}
@@ -64,6 +64,7 @@ MAY_IMPORT = {
     "pose.keypoint_sides": VIEWS,
     "pose.keypoint_tracks": VIEWS,
     "pose.keypoint_views": FOLLOWING | {"pose.trust"},
+    "pose.anew": STARTS,
     "pose.mixtures": MIXTURES,
     "pose.occluders": VIEWS,
     "pose.backward": FOLLOWING | MIXTURES | {"pose.backward", "pose.occluders"},
