@@ -81,7 +81,7 @@ def test_nobody_is_seen_in_the_gap(monkeypatch):
     asked = []
     recording = SimpleNamespace(recording=SimpleNamespace(start=5, fps=20.0))
     monkeypatch.setattr(over_time, "tracked", lambda *rest: recording)
-    monkeypatch.setattr(over_time, "run_method", lambda seen, method, options, progress: asked.append((method, progress)))
+    monkeypatch.setattr(over_time, "run_method", lambda seen, method, options: asked.append((method, options.change)))
     monkeypatch.setattr(over_time, "pose_results", lambda recording, people: {})
     results = [
         over_time.cell(parameters, None, np.random.default_rng(0))
@@ -91,5 +91,5 @@ def test_nobody_is_seen_in_the_gap(monkeypatch):
     assert all(result["gone"] == [45, 75] for result in results)
     assert [method.recover is None for method, _ in asked] == [False, True]
     assert all(method.settings == PRESETS["default"] for method, _ in asked)
-    shown = list(asked[0][1](steps, len(steps)))
+    shown = list(map(asked[0][1], steps))
     assert not shown[50].strict.any() and shown[80] is steps[80]
