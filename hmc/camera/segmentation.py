@@ -98,6 +98,9 @@ class BackgroundModel:
     filled : ndarray of bool, shape (height, width), or None
         Pixels of the last silhouette that were filled for their darkness alone: what other cameras see of the floor decides there
         (`hmc.voxels.floor_shadows`). None before the first image.
+    chance : ndarray of uint8, shape (height, width), or None
+        Of each pixel of the last image that may as well be a shadow, how likely it is a person, of 255 (`hmc.camera.shade`), which other
+        cameras' sight of the floor may tell better (`hmc.voxels.floor_light`); 0 of all others. None before the first image.
     unseen : ndarray of bool, shape (height, width), or None
         Where the empty scene was never seen (`hmc.camera.empty_scene`): nothing is learnt there, and what is found there tells nothing.
     blur : int
@@ -122,6 +125,7 @@ class BackgroundModel:
     before: np.ndarray | None = None
     doubtful: np.ndarray | None = None
     filled: np.ndarray | None = None
+    chance: np.ndarray | None = None
     unseen: np.ndarray | None = None
     blur: int = 0
     grey: bool = False
@@ -254,13 +258,13 @@ def segment(
     image, answer, found = _level(model, image)
     if cv2.countNonZero(found) > settings.max_foreground * found.size:
         return None, _adapt_to_switch(model, image, settings)
-    mask, filled, doubtful = _complete(found, cv2.threshold(answer, SHADOW - 1, 1, cv2.THRESH_BINARY)[1], image, model, settings)
+    mask, filled, chance, doubtful = _complete(found, cv2.threshold(answer, SHADOW - 1, 1, cv2.THRESH_BINARY)[1], image, model, settings)
     mask, filled = mask.view(bool), filled.view(bool)
     doubtful = np.bitwise_or(doubtful.view(bool), mask, out=doubtful.view(bool))
     if model.unseen is not None:
         doubtful &= ~model.unseen
     settling = max(0, model.settling - 1)
-    after = replace(model, people=mask, frame=model.frame + 1, settling=settling, doubtful=doubtful, filled=filled)
+    after = replace(model, people=mask, frame=model.frame + 1, settling=settling, doubtful=doubtful, filled=filled, chance=chance)
     if not after.settling and after.before is not None:
         after = replace(after, before=None)
     if after.settling or after.frame % settings.learn_every == 0:
@@ -321,18 +325,18 @@ def _nearer(image: np.ndarray, one: np.ndarray, other: np.ndarray) -> bool:
 
 def _complete(
     found: np.ndarray, doubtful: np.ndarray, image: np.ndarray, model: BackgroundModel, settings: SegmentationSettings
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """What the mixture found, cleaned and completed, what of that was filled for darkness alone, and what is doubtful.
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """What the mixture found, cleaned and completed; what of that was filled for darkness alone; the chance of shades; what is doubtful.
 
     Only the part of the image around what was found is looked at.
     """
     scale = max(image.shape[:2]) / 640
-    mask, filled = np.zeros_like(found), np.zeros_like(found)
+    mask, filled, chance = np.zeros_like(found), np.zeros_like(found), np.zeros_like(found)
     # Specks are all over the image; a person has some solid part.
     solid = min(SOLID_PX, max(LEAST_SOLID_PX, round(SOLID_PX * scale)))
     left, top, width, height = cv2.boundingRect(cv2.erode(found, np.ones((solid, solid), np.uint8)))
     if width == 0:
-        return mask, filled, np.zeros_like(found)
+        return mask, filled, chance, np.zeros_like(found)
     margin = round(MARGIN_PX * scale)
     rows = slice(max(0, top - margin), top + height + margin)
     columns = slice(max(0, left - margin), left + width + margin)
@@ -353,7 +357,7 @@ def _complete(
     if settings.least_chance > 0 and zoom == 1 and not model.blur and not model.grey:
         floor = None if model.floor is None else model.floor[rows, columns]
         shades = shade_features(image[rows, columns], mean, model.deviation[rows, columns], seen, seeds, scale, floor)
-        part, dark = told_by_chance(part, *shades, settings.least_chance)
+        part, dark, chance[rows, columns] = told_by_chance(part, *shades, settings.least_chance)
         part = cut_halo(without_specks(part, seeds, seen, rules, scale), seen, settings.halo_share, scale)
         dark &= part
     else:
@@ -361,7 +365,7 @@ def _complete(
     mask[rows, columns] = reduced_mask(part, zoom)
     filled[rows, columns] = mask[rows, columns] & reduced_mask(dark, zoom)
     doubtful[rows, columns] |= reduced_mask(((seen.chroma2 > DOUBT**2) | (np.abs(seen.luma) > DOUBT)).view(np.uint8), zoom)
-    return mask, filled, cv2.morphologyEx(doubtful, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+    return mask, filled, chance, cv2.morphologyEx(doubtful, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
 
 
 def _hidden(mask: np.ndarray, answer: np.ndarray, settings: SegmentationSettings) -> np.ndarray:

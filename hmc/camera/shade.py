@@ -61,7 +61,7 @@ DEFAULT_NET = Path(__file__).with_name("shade_net.csv")
 
 @dataclass(frozen=True)
 class ShadeNet:
-    """Weights of the network; ``chance = logistic(tanh((x - middle) / spread @ inner + inner_bias) @ outer + outer_bias)``.
+    """Weights of the network; ``chance = logistic(max(0, (x - middle) / spread @ inner + inner_bias) @ outer + outer_bias)``.
 
     Attributes
     ----------
@@ -219,11 +219,12 @@ def _neighbourhood(
 def person_chance(net: ShadeNet, features: np.ndarray) -> np.ndarray:
     """How likely each of some shades is a person: float32, shape (n,), from features of shape (n, 23)."""
     weights = net.inner / net.spread[:, None]
-    hidden = np.tanh(features @ weights + (net.inner_bias - net.middle @ weights))
+    hidden = features @ weights + (net.inner_bias - net.middle @ weights)
+    np.maximum(hidden, 0, out=hidden)
     return np.asarray(1 / (1 + np.exp(-(hidden @ net.outer + net.outer_bias))), np.float32)
 
 
-def told_by_chance(mask: np.ndarray, pixels: np.ndarray, features: np.ndarray, least: float) -> tuple[np.ndarray, np.ndarray]:
+def told_by_chance(mask: np.ndarray, pixels: np.ndarray, features: np.ndarray, least: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """A silhouette in which each shade is what its chance says, averaged over the shades around it.
 
     Parameters
@@ -240,13 +241,16 @@ def told_by_chance(mask: np.ndarray, pixels: np.ndarray, features: np.ndarray, l
         Without specks and whiskers.
     unsure : ndarray of uint8, shape (height, width)
         Shades that may be shadows all the same.
+    chance : ndarray of uint8, shape (height, width)
+        Of each shade, how likely it is a person, from 1 to 255; 0 of all other pixels.
     """
     shade, chance = np.zeros((2, *mask.shape), np.float32)
     shade.ravel()[pixels], chance.ravel()[pixels] = 1, person_chance(default_net(), features)
     chance = cv2.GaussianBlur(chance, (5, 5), 0) / np.maximum(cv2.GaussianBlur(shade, (5, 5), 0), 0.2)
     told = np.where(shade > 0, (chance > least).view(np.uint8), mask)
     unsure = ((shade > 0) & (chance < SURE_CHANCE)).view(np.uint8)
-    return cv2.morphologyEx(told, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)), unsure
+    guess = np.where(shade > 0, np.maximum(255 * chance, 1), 0).astype(np.uint8)
+    return cv2.morphologyEx(told, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)), unsure, guess
 
 
 @functools.cache

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import argparse
 import os
+from dataclasses import replace
 
-from hmc.cli.common import output_path, whole_number
+from hmc.cli.common import output_path, positive_float, whole_number
 
 __all__ = ["add_parser", "run"]
 
@@ -17,11 +18,23 @@ def add_parser(subparsers) -> None:
         help="render a recording with truth from a recipe",
         description="Render people in a room, seen by a rig of cameras, into a recording with exact truth.",
     )
-    parser.add_argument("recipe", metavar="RECIPE", help="a TOML file, or the name of a shipped recipe (data/synthetic), such as demo")
+    parser.add_argument(
+        "recipe",
+        metavar="RECIPE",
+        help="a TOML file, the name of a shipped recipe (data/synthetic), such as demo, or varied-N: drawn at random",
+    )
     parser.add_argument(
         "--out", type=output_path, required=True, metavar="RECORDING", help="folder to make; a rendered recording there is replaced"
     )
     parser.add_argument("--seed", type=whole_number, default=None, metavar="N", help="in place of the recipe's seed")
+    parser.add_argument("--fps", type=positive_float, default=None, metavar="F", help="frames a second in place of the recipe's")
+    parser.add_argument(
+        "--silhouette-every",
+        type=whole_number,
+        default=None,
+        metavar="N",
+        help="true silhouettes of every Nth frame, in place of the recipe's",
+    )
     parser.add_argument("--workers", type=whole_number, default=None, metavar="N", help="processes (default: one a core)")
     parser.add_argument("--quiet", action="store_true", help="no progress bar")
 
@@ -30,10 +43,13 @@ def run(args: argparse.Namespace) -> int:
     """Render."""
     from tqdm import tqdm
 
-    from hmc.synthetic.recipe import load_recipe
+    from hmc.synthetic.recipe import check_recipe, load_recipe
     from hmc.synthetic.render import render_recording
 
     recipe = load_recipe(args.recipe)
+    changes = {"fps": args.fps, "silhouette_every": args.silhouette_every}
+    recipe = replace(recipe, **{name: value for name, value in changes.items() if value is not None})
+    check_recipe(recipe, recipe.name)
     total = recipe.n_frames + recipe.background_frames
     with tqdm(total=total, desc=f"rendering {recipe.name}", unit="frame", dynamic_ncols=True, disable=args.quiet) as bar:
         render_recording(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 from dataclasses import MISSING, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, get_args, get_origin, get_type_hints
@@ -15,6 +16,7 @@ from hmc.synthetic.physique import girth_of
 from hmc.synthetic.rigs import RIGS, RigRecipe
 from hmc.synthetic.room import FURNITURE
 from hmc.synthetic.textures import TEXTURES
+from hmc.synthetic.varied import varied_recipe
 
 __all__ = [
     "ActorRecipe",
@@ -24,6 +26,7 @@ __all__ = [
     "Recipe",
     "RoomRecipe",
     "StepRecipe",
+    "check_recipe",
     "load_recipe",
     "shipped_recipes",
 ]
@@ -36,6 +39,8 @@ MOTIONS = (
 )  # fmt: skip
 #: What a step of a script may be.
 STEPS = ("walk", "turn", "stand", "gesture", "box", "throw_catch", "pick_up", "hug", "sit")
+#: Names of recipes that are drawn at random, with their seed.
+VARIED = re.compile(r"varied-(\d{1,9})")
 #: So many people can be told apart in silhouettes, by 85 or 51 x (person + 1).
 MOST_ACTORS = 5
 
@@ -245,7 +250,7 @@ def shipped_recipes() -> list[str]:
 
 
 def load_recipe(source: str | Path) -> Recipe:
-    """Read a recipe from a file, or by the name of a shipped one.
+    """Read a recipe from a file, by the name of a shipped one, or drawn at random: ``varied-`` and a seed (`hmc.synthetic.varied`).
 
     Raises
     ------
@@ -254,6 +259,9 @@ def load_recipe(source: str | Path) -> Recipe:
     """
     path = Path(source)
     if not path.is_file():
+        drawn = VARIED.fullmatch(str(source))
+        if drawn:
+            return recipe_from(varied_recipe(int(drawn[1])), str(source))
         path = shipped_folder() / f"{source}.toml"
     if not path.is_file():
         near = difflib.get_close_matches(str(source), shipped_recipes(), 1)
@@ -291,7 +299,7 @@ def recipe_from(content: dict[str, Any], where: str = "recipe") -> Recipe:
                 raise InputError(f"{where}: '{label}' must be tables, each under its own line [[{label}]]")
             content[key] = tuple(_fill(kind, item, f"{where}: [[{label}]] number {k + 1}") for k, item in enumerate(content[key]))
     recipe = _fill(Recipe, content, where)
-    _check(recipe, where)
+    check_recipe(recipe, where)
     return recipe
 
 
@@ -339,8 +347,14 @@ def _fits(value: Any, hint: Any) -> bool:
     return isinstance(value, (int, float) if hint is float else hint)
 
 
-def _check(recipe: Recipe, where: str) -> None:
-    """Values that make no sense together or alone."""
+def check_recipe(recipe: Recipe, where: str) -> None:
+    """Refuse values that make no sense together or alone.
+
+    Raises
+    ------
+    InputError
+        With `where`, what is wrong, and what may be.
+    """
 
     def among(value: str, names, what: str) -> None:
         if value not in names:

@@ -25,7 +25,7 @@ from hmc.camera.light import in_light_of
 from hmc.voxels.carving import carve, pixels_at
 from hmc.voxels.completion import CompletionTables, doubted_floor, shown
 
-__all__ = ["Scene", "cut_filled_shadows", "cut_floor_shadows"]
+__all__ = ["OTHER_COLOR", "Scene", "cut_filled_shadows", "cut_floor_shadows", "darkness"]
 
 #: Shares of the empty floor's light: from the first on a spot is bare, below the second it is no shadow but something dark.
 BARE, DARKEST = 0.93, 0.5
@@ -40,7 +40,7 @@ ABOVE_M = 0.25
 SPOT, SPECK, AROUND = 3, 3, 5
 
 #: Of a pixel that tells nothing of the floor: no image, another color than the floor's.
-_UNKNOWN, _OTHER = np.float32(np.nan), np.float32(9)
+_UNKNOWN, OTHER_COLOR = np.float32(np.nan), np.float32(9)
 
 
 @dataclass(frozen=True)
@@ -149,19 +149,34 @@ class _Floor:
     scene: Scene
 
 
-def _darkness(floor: _Floor, pixels: np.ndarray) -> np.ndarray:
-    """Logarithm of the share of the empty scene's light that flat pixels have, float32; `_OTHER` where they have another color as well."""
+def darkness(image: np.ndarray, scene: Scene, pixels: np.ndarray) -> np.ndarray:
+    """How dark some pixels are against the empty scene.
+
+    Parameters
+    ----------
+    image : ndarray of uint8, shape (height, width, 3)
+        BGR, in the light of the empty scene (`hmc.camera.light.in_light_of`).
+    scene : Scene
+    pixels : ndarray of int, shape (n,)
+        Flat.
+
+    Returns
+    -------
+    ndarray of float32, shape (n,)
+        Logarithms of the shares of that scene's light; `OTHER_COLOR` of pixels that have another color as well, or whose scene was never
+        seen.
+    """
     if not len(pixels):
         return np.zeros(0, np.float32)
-    box, places = _around(pixels, floor.image.shape, 1)  # the blur takes in one pixel more
-    part = cv2.GaussianBlur(cv2.cvtColor(floor.image[box], cv2.COLOR_BGR2YCrCb), (3, 3), 0)
+    box, places = _around(pixels, image.shape, 1)  # the blur takes in one pixel more
+    part = cv2.GaussianBlur(cv2.cvtColor(image[box], cv2.COLOR_BGR2YCrCb), (3, 3), 0)
     color = part.reshape(-1, 3).take(places, axis=0).astype(np.float32)
-    luma, *chroma = (floor.scene.mean[..., k].reshape(-1).take(pixels) for k in range(3))
+    luma, *chroma = (scene.mean[..., k].reshape(-1).take(pixels) for k in range(3))
     share = np.maximum(color[:, 0], 1) / luma
     lit = np.minimum(share, 1)  # chroma shrinks with the light
     tint = np.maximum(*(np.abs(color[:, k] - 128 - lit * (mean - 128)) for k, mean in enumerate(chroma, start=1)))
-    dark = np.where(tint < MOST_CHROMA, np.log(share), _OTHER)
-    return dark if floor.scene.unseen is None else np.where(floor.scene.unseen.ravel().take(pixels), _OTHER, dark)
+    dark = np.where(tint < MOST_CHROMA, np.log(share), OTHER_COLOR)
+    return dark if scene.unseen is None else np.where(scene.unseen.ravel().take(pixels), OTHER_COLOR, dark)
 
 
 def _dark_pixels(floor: _Floor, mask: np.ndarray, pixel_cells: np.ndarray, n_cells: int) -> tuple[np.ndarray, np.ndarray]:
@@ -170,7 +185,7 @@ def _dark_pixels(floor: _Floor, mask: np.ndarray, pixel_cells: np.ndarray, n_cel
     cells = pixel_cells.ravel().take(pixels)
     inside = cells < n_cells
     pixels, cells = pixels[inside], cells[inside]
-    share = _darkness(floor, pixels)
+    share = darkness(floor.image, floor.scene, pixels)
     some = (share > np.log(DARKEST)) & (share < 0)
     return pixels[some], cells[some]
 
@@ -190,8 +205,8 @@ def _shadowed(tables: CompletionTables, floors: dict[int, _Floor], asked: dict[i
     for row, (c, floor) in zip(seen, floors.items(), strict=True):
         pixels = tables.cell_pixels[c].take(cells)
         there = np.flatnonzero(pixels < floor.scene.mean[..., 0].size)
-        row[there] = _darkness(floor, pixels.take(there))
-    bare = ((seen > np.log(BARE)) & (seen < _OTHER)).sum(axis=0)
+        row[there] = darkness(floor.image, floor.scene, pixels.take(there))
+    bare = ((seen > np.log(BARE)) & (seen < OTHER_COLOR)).sum(axis=0)
     dark = (seen <= np.log(BARE)) & (seen >= np.log(DARKEST))
     most = dark.sum(axis=0) > bare
     square = np.ones((SPOT, SPOT), np.uint8)

@@ -29,6 +29,7 @@ from hmc.io.recording import Recording, background_frames
 from hmc.voxels.background_initialisation import UnseenPlaces, learn_from_people, with_unseen_places
 from hmc.voxels.carving import CarvingTables, carve_levels, shared_tables
 from hmc.voxels.completion import CompletionTables, complete_masks, doubtful_hull, make_completion_tables
+from hmc.voxels.floor_light import tell_shades
 from hmc.voxels.floor_shadows import cut_filled_shadows, cut_floor_shadows
 from hmc.voxels.frontend_settings import FrontendSettings
 from hmc.voxels.grid import VoxelGrid
@@ -292,6 +293,7 @@ def settle(tables: CompletionTables | None, look: Look, settings: FrontendSettin
     if tables is None:
         return masks, none
     if settings.cut_shadows:
+        masks = tell_shades(tables, look.images, look.scenes, look.chances, masks)
         masks = cut_filled_shadows(tables, masks, look.filled, doubtful)
     if settings.complete:
         masks, much = complete_masks(tables, masks, doubtful)

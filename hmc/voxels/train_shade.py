@@ -26,7 +26,9 @@ __all__ = ["main", "shade_examples", "train_shade", "write_net"]
 logger = logging.getLogger("hmc")
 
 #: Of each camera's image, shades that are learnt from, at most; frames of the empty scene; hidden units.
-MOST_SHADES, EMPTY_FRAMES, HIDDEN = 1500, 60, 16
+MOST_SHADES, EMPTY_FRAMES, HIDDEN = 1500, 60, 32
+#: Each pixel of a person counts as so many: a leg that is lost is lost, a shadow the other cameras may still take away.
+PERSON_COUNTS = 3
 #: Share of the examples of which the network is not told whether they look at the floor: it must do without where nobody knows.
 NO_FLOOR = 0.2
 
@@ -98,9 +100,11 @@ def train_shade(features: np.ndarray, is_person: np.ndarray, seed: int = 0) -> S
     rng = np.random.default_rng(seed)
     features = features.copy()
     features[rng.random(len(features)) < NO_FLOOR, FEATURES.index("floor")] = FLOOR_UNKNOWN
+    again = np.concatenate([np.arange(len(features)), *[np.flatnonzero(is_person)] * (PERSON_COUNTS - 1)])
+    features, is_person = features[again], np.asarray(is_person)[again]
     middle, spread = features.mean(axis=0), np.maximum(features.std(axis=0), 1e-6)
     net = MLPClassifier(
-        (HIDDEN,), activation="tanh", alpha=1e-2, batch_size=512, max_iter=60, early_stopping=True, tol=1e-5, random_state=seed
+        (HIDDEN,), activation="relu", alpha=1e-2, batch_size=1024, max_iter=60, early_stopping=True, tol=1e-5, random_state=seed
     )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)  # so many rounds are enough
@@ -140,7 +144,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             logger.info("%s: %d shades, %.1f%% of them people", path.name, len(people), 100 * people.mean())
         features, people = (np.concatenate(column) for column in zip(*examples, strict=True))
         net = train_shade(features, people, args.seed)
-        right = (person_chance(net, features) > 0.5) == people
+        right = (person_chance(net, features) > PERSON_COUNTS / (PERSON_COUNTS + 1)) == people
         notes = (
             f"trained on {', '.join(path.name for path in args.recordings)}",
             f"{np.count_nonzero(people)} pixels of people and {np.count_nonzero(~people)} of shadows",

@@ -1,0 +1,222 @@
+"""Person or shadow, told by the floor: how dark the other cameras see the spot behind a pixel.
+
+A pixel that is darker than the empty scene and of its color is a person's or a shadow's, and one camera can only guess
+(`hmc.camera.shade`). Where it looks at the floor, the others know: a shadow darkens the spot for whoever looks at it, and by as much,
+as a floor scatters light all ways; behind a trouser leg they see the bare floor. So the guess is weighed with how much brighter the
+others see the spot, by a logistic regression over these two numbers.
+
+Two cameras look at the same spot only where the empty scene has the same color there in both. Else one of them sees a table before it, or
+the wall behind.
+
+Measured by ``python -m hmc.experiments run repairs``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from hmc.camera.light import in_light_of
+from hmc.voxels.completion import CompletionTables
+from hmc.voxels.floor_shadows import OTHER_COLOR, Scene, darkness
+
+__all__ = ["FloorEvidence", "floor_evidence", "person_by_floor", "tell_shades"]
+
+#: Two cameras see the same spot where the empty scene's luma differs by less than this factor (logarithm) and chroma by less than so many
+#: grey levels.
+SAME_LUMA, SAME_CHROMA = 0.25, 7.0
+#: Lights (logarithms of shares of the empty scene's) tell within these bounds.
+LIGHT = (-0.7, 0.1)
+#: The guess is no surer than this, as a logit.
+MOST_LOGIT = 4.0
+#: Logit of a person: so much of the guess's, so much a unit by which the others see the spot brighter (in logarithms), and this.
+BY_GUESS, BY_LIGHT, BIAS = 0.8, 10.9, -2.2
+
+
+#: The floor is asked of every so manieth pixel of each row and column.
+EVERY_PX = 2
+#: Side of the squares that pieces hold which come or go, pixels.
+SOLID_PX = 5
+
+
+@dataclass(frozen=True)
+class FloorEvidence:
+    """What the floor tells of one camera's pixels.
+
+    Attributes
+    ----------
+    pixels : ndarray of int, shape (n,)
+        Flat; shades behind which some other camera sees the floor.
+    guess : ndarray of float32, shape (n,)
+        Logits of the chances.
+    brighter : ndarray of float32, shape (n,)
+        By how much the others see the spot brighter than this camera sees the pixel: logarithms of shares of the empty scene's light, mean
+        over the cameras that see it.
+    """
+
+    pixels: np.ndarray
+    guess: np.ndarray
+    brighter: np.ndarray
+
+
+def floor_evidence(
+    tables: CompletionTables,
+    images: Sequence[np.ndarray | None],
+    scenes: Sequence[Scene | None],
+    chances: Sequence[np.ndarray | None],
+    masks: Sequence[np.ndarray | None],
+) -> dict[int, FloorEvidence]:
+    """What the floor tells of all cameras' shades, by camera.
+
+    Parameters
+    ----------
+    tables : CompletionTables
+        Of the room and the rig.
+    images : sequence of ndarray of uint8, shape (height, width, 3), or None
+        BGR, one a camera.
+    scenes : sequence of Scene or None
+        What is known of the empty scene; None of a camera that has other silhouettes.
+    chances : sequence of ndarray of uint8, shape (height, width), or None
+        Of each pixel that is a shade, how likely it is a person, of 255; 0 of all others.
+    masks : sequence of ndarray of bool, shape (height, width), or None
+        Silhouettes so far: behind them nobody sees the floor.
+    """
+    known = {
+        c: (image, scene, chance, mask)
+        for c, (image, scene, chance, mask) in enumerate(zip(images, scenes, chances, masks, strict=True))
+        if image is not None and scene is not None and chance is not None and mask is not None
+    }
+    n_cells = tables.cells[0] * tables.cells[1]
+    asked, near = {}, np.zeros(n_cells + 1, bool)
+    for c, (_, _, chance, _) in known.items():
+        rows, columns = np.nonzero(chance[::EVERY_PX, ::EVERY_PX])
+        pixels = EVERY_PX * (rows * chance.shape[1] + columns)
+        cells = tables.pixel_cells[c].ravel().take(pixels)
+        asked[c] = pixels[cells < n_cells], cells[cells < n_cells]
+        near[asked[c][1]] = True
+    spots = np.flatnonzero(near[:n_cells])
+    place = np.zeros(n_cells, np.intp)
+    place[spots] = np.arange(len(spots))
+    floors = {c: _floor(image, scene, mask, tables.cell_pixels[c].take(spots), asked[c][0]) for c, (image, scene, _, mask) in known.items()}
+    found = {}
+    for c, (pixels, cells) in asked.items():
+        others = [floor for other, floor in floors.items() if other != c]
+        light, n = _seen_by(others, place.take(cells), floors[c].shade_scene)
+        told = np.flatnonzero((n > 0) & np.isfinite(floors[c].shade_light))
+        chance = np.clip(known[c][2].ravel().take(pixels[told]) / np.float32(255), 1e-3, 1 - 1e-3)
+        guess = np.clip(np.log(chance / (1 - chance)), -MOST_LOGIT, MOST_LOGIT)
+        found[c] = FloorEvidence(pixels[told], guess, light[told] / n[told] - floors[c].shade_light[told])
+    return found
+
+
+@dataclass(frozen=True)
+class _Floor:
+    """One camera's sight of some spots of the floor, and of its own shades.
+
+    Attributes
+    ----------
+    light, shade_light : ndarray of float32, shapes (n_spots,) and (n_shades,)
+        Logarithms of shares of the empty scene's light; NaN where a person hides the spot, the camera does not see it, or it has another
+        color.
+    scene, shade_scene : ndarray of float32, shapes (3, n_spots) and (3, n_shades)
+        Luma's logarithm and chroma of the empty scene there.
+    """
+
+    light: np.ndarray
+    scene: np.ndarray
+    shade_light: np.ndarray
+    shade_scene: np.ndarray
+
+
+def _floor(image: np.ndarray, scene: Scene, mask: np.ndarray, spots: np.ndarray, shades: np.ndarray) -> _Floor:
+    """Of the flat pixels of spots, beyond the image where they are not seen, and of shades."""
+    seen = spots < mask.size
+    pixels = np.concatenate([spots[seen], shades])
+    light = darkness(in_light_of(image, scene.mean, mask), scene, pixels)
+    light = np.where(light == OTHER_COLOR, np.float32(np.nan), np.clip(light, *LIGHT))
+    colors = np.stack([scene.mean[..., k].reshape(-1).take(pixels) for k in range(3)])
+    np.log(colors[0], out=colors[0])
+    n = np.count_nonzero(seen)
+    at_spots, there = np.full((4, len(spots)), np.nan, np.float32), light[:n]
+    there[mask.ravel().take(pixels[:n])] = np.nan
+    at_spots[0, seen], at_spots[1:, seen] = there, colors[:, :n]
+    return _Floor(at_spots[0], at_spots[1:], light[n:], colors[:, n:])
+
+
+def _seen_by(cameras: Sequence[_Floor], spots: np.ndarray, scene: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Sum of the light that other cameras see at spots whose empty scene is the same to them, and how many these are."""
+    light, n = np.zeros((2, len(spots)), np.float32)
+    for other in cameras:
+        seen = other.light.take(spots)
+        luma, *chroma = (np.abs(other.scene[k].take(spots) - scene[k]) for k in range(3))
+        same = (luma < SAME_LUMA) & (chroma[0] < SAME_CHROMA) & (chroma[1] < SAME_CHROMA) & np.isfinite(seen)
+        light += np.where(same, seen, 0)
+        n += same
+    return light, n
+
+
+def person_by_floor(evidence: FloorEvidence) -> np.ndarray:
+    """How likely each pixel is a person's: float32, shape (n,)."""
+    return np.asarray(1 / (1 + np.exp(-(BY_GUESS * evidence.guess + BY_LIGHT * evidence.brighter + BIAS))), np.float32)
+
+
+def tell_shades(
+    tables: CompletionTables,
+    images: Sequence[np.ndarray | None],
+    scenes: Sequence[Scene | None],
+    chances: Sequence[np.ndarray | None],
+    masks: Sequence[np.ndarray | None],
+) -> tuple[np.ndarray | None, ...]:
+    """Silhouettes in which shades are what guess and floor together say.
+
+    Parameters
+    ----------
+    tables, images, scenes, chances, masks
+        As for `floor_evidence`.
+
+    Returns
+    -------
+    tuple of ndarray of bool, shape (height, width), or None
+        The very masks where nothing is told.
+    """
+    told: list[np.ndarray | None] = list(masks)
+    for c, evidence in floor_evidence(tables, images, scenes, chances, masks).items():
+        if len(evidence.pixels):
+            mask, shades = np.asarray(masks[c]), np.asarray(chances[c])
+            rows, columns = np.divmod(evidence.pixels, mask.shape[1])
+            box = _around(rows, mask.shape[0]), _around(columns, mask.shape[1])
+            places = rows // EVERY_PX - box[0].start // EVERY_PX, columns // EVERY_PX - box[1].start // EVERY_PX
+            part, shade = mask[box], shades[box] > 0
+            person, asked = _spread(places, person_by_floor(evidence), part.shape)
+            came = _solid(asked & person & shade & ~part)
+            gone = _solid(asked & ~person & shade & part)
+            after = mask.copy()
+            after[box] = (part | came) & ~gone
+            told[c] = after
+    return tuple(told)
+
+
+def _around(places: np.ndarray, size: int) -> slice:
+    """From the first to the last of some rows or columns, with a margin; begins where pixels are asked."""
+    margin = EVERY_PX * SOLID_PX
+    return slice(max(0, int(places.min()) - margin) // EVERY_PX * EVERY_PX, min(size, int(places.max()) + margin + 1))
+
+
+def _spread(places: tuple[np.ndarray, np.ndarray], chances: np.ndarray, size: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
+    """From chances at some of every few pixels to an image: where it is likely a person, and what is near enough to be told at all."""
+    weight, chance = np.zeros((2, *(-(-side // EVERY_PX) for side in size)), np.float32)
+    weight[places], chance[places] = 1, chances
+    weight, chance = cv2.GaussianBlur(weight, (3, 3), 0), cv2.GaussianBlur(chance, (3, 3), 0)
+    answers = (2 * (weight > 0) + (chance > 0.5 * weight)).astype(np.uint8)
+    whole = answers.repeat(EVERY_PX, axis=0).repeat(EVERY_PX, axis=1)[: size[0], : size[1]]
+    return whole == 3, whole >= 2
+
+
+def _solid(pixels: np.ndarray) -> np.ndarray:
+    """Pixels of pieces that hold a square; rims, of which shades at outlines are, go."""
+    square = np.ones((SOLID_PX, SOLID_PX), np.uint8)
+    some = pixels.view(np.uint8)
+    return cv2.bitwise_and(cv2.dilate(cv2.morphologyEx(some, cv2.MORPH_OPEN, square), square), some).view(bool)

@@ -1,0 +1,153 @@
+"""Person or shadow by the floor: trousers and a shadow of one darkness, drawn exactly into a room whose floor has one color."""
+
+import cv2
+import numpy as np
+import pytest
+from drawn import floor_patch, silhouette
+
+from hmc.camera.light import in_light_of
+from hmc.camera.shade import floor_pixels
+from hmc.voxels.completion import make_completion_tables
+from hmc.voxels.floor_light import EVERY_PX, FloorEvidence, floor_evidence, person_by_floor, tell_shades
+from hmc.voxels.floor_shadows import Scene
+
+ROOM = np.array([[-2.5, -2.5, 0.0], [2.5, 2.5, 2.2]])
+FLOOR, WALL, DARK = (110, 125, 140), (190, 170, 150), 0.6
+
+
+@pytest.fixture(scope="module")
+def tables(ring):
+    return make_completion_tables(ROOM, ring)
+
+
+@pytest.fixture(scope="module")
+def people(ring):
+    return [silhouette(camera, 0.3, 0.1) for camera in ring]
+
+
+@pytest.fixture(scope="module")
+def shadows(ring, people):
+    return [floor_patch(camera) & ~person for camera, person in zip(ring, people, strict=True)]
+
+
+@pytest.fixture(scope="module")
+def floors(ring):
+    return [floor_pixels(camera, ROOM) for camera in ring]
+
+
+def scene_of(image):
+    return Scene(cv2.cvtColor(image, cv2.COLOR_BGR2YCrCb).astype(np.float32))
+
+
+def empty_images(floors):
+    return [np.where(floor[..., None], FLOOR, WALL).astype(np.uint8) for floor in floors]
+
+
+def darkened(images, places, share=DARK):
+    return [np.where(place[..., None], share * image, image).astype(np.uint8) for image, place in zip(images, places, strict=True)]
+
+
+def guesses(places, chance):
+    return [np.where(place, round(255 * chance), 0).astype(np.uint8) for place in places]
+
+
+def lower(people):
+    """The half of each person that stands before the floor: dark trousers of the floor's color, which the camera alone has lost."""
+    rows = [np.flatnonzero(person.any(axis=1)) for person in people]
+    return [person & (np.arange(len(person)) > row.mean())[:, None] for person, row in zip(people, rows, strict=True)]
+
+
+@pytest.fixture(scope="module")
+def told(tables, people, shadows, floors):
+    """All that is darker guessed as a person's with a chance of .3, with half of the shadow in the silhouettes all the same."""
+    trousers = [legs & floor for legs, floor in zip(lower(people), floors, strict=True)]
+    empty = empty_images(floors)
+    dark = [legs | shadow for legs, shadow in zip(trousers, shadows, strict=True)]
+    images = darkened(empty, dark)
+    halves = [shadow & (np.arange(shadow.shape[1]) % 40 < 20) for shadow in shadows]
+    masks = [(person & ~legs) | half for person, legs, half in zip(people, trousers, halves, strict=True)]
+    after = tell_shades(tables, images, [scene_of(image) for image in empty], guesses(dark, 0.3), masks)
+    return trousers, halves, masks, after
+
+
+def test_trousers_before_the_bare_floor_are_a_persons(told):
+    for legs, _, mask, after in zip(*told, strict=True):
+        assert (mask & legs).sum() == 0
+        assert (after & legs).sum() > 0.85 * legs.sum()
+
+
+def test_what_others_see_as_dark_is_a_shadow(told, shadows):
+    taken = left = 0
+    for legs, half, _, after, shadow in zip(*told, shadows, strict=True):
+        middle = cv2.erode((shadow & ~legs).view(np.uint8), np.ones((5, 5), np.uint8)) > 0
+        taken += (half & middle).sum()
+        left += (after & middle).sum()
+    assert taken > 100 and left < 0.1 * taken
+
+
+def test_a_table_hides_the_floor_and_tells_nothing(tables, people, shadows, floors):
+    """A shadow on a table top: behind it the others see a lit floor, of another color than the table's."""
+    empty = empty_images(floors)
+    empty[0] = np.where(shadows[0][..., None], (60, 90, 160), empty[0]).astype(np.uint8)
+    only = [shadows[0], *(np.zeros_like(shadow) for shadow in shadows[1:])]
+    images = darkened(empty, only)
+    scenes = [scene_of(image) for image in empty]
+    done = tell_shades(tables, images, scenes, guesses(only, 0.3), people)
+    assert all(after is person for after, person in zip(done, people, strict=True))
+    bare = empty_images(floors)  # without the table it would be somebody
+    done = tell_shades(tables, darkened(bare, only), [scene_of(image) for image in bare], guesses(only, 0.3), people)
+    assert (done[0] & shadows[0]).sum() > 0.8 * shadows[0].sum()
+
+
+def test_the_evidence_is_that_of_a_loop_over_pixels(tables, ring, people, shadows, floors):
+    rng = np.random.default_rng(0)
+    empty = [np.clip(image + rng.normal(0, 6, image.shape[:2])[..., None], 0, 255).astype(np.uint8) for image in empty_images(floors)]
+    shares = [0.5 + 0.1 * k for k in range(len(ring))]
+    images = [darkened([image], [shadow], share)[0] for image, shadow, share in zip(empty, shadows, shares, strict=True)]
+    scenes = [scene_of(image) for image in empty]
+    found = floor_evidence(tables, images, scenes, guesses(shadows, 0.4), people)
+    light = []
+    for image, scene, person in zip(images, scenes, people, strict=True):
+        color = cv2.GaussianBlur(cv2.cvtColor(in_light_of(image, scene.mean, person), cv2.COLOR_BGR2YCrCb), (3, 3), 0).astype(float)
+        share = np.maximum(color[..., 0], 1) / scene.mean[..., 0]
+        tint = np.abs(color[..., 1:] - 128 - np.minimum(share, 1)[..., None] * (scene.mean[..., 1:] - 128)).max(axis=-1)
+        light.append(np.where(tint < 6, np.clip(np.log(share), -0.7, 0.1), np.nan))
+    n_cells, n_told = len(tables.cell_pixels[0]), 0
+    for c, one in found.items():
+        told = dict(zip(one.pixels.tolist(), one.brighter.tolist(), strict=True))
+        width = people[c].shape[1]
+        for pixel in range(0, people[c].size, 7):
+            cell = int(tables.pixel_cells[c].ravel()[pixel])
+            lights = []
+            for other in range(len(ring)) if cell < n_cells else ():
+                spot = int(tables.cell_pixels[other][cell])
+                if other == c or spot >= people[other].size or people[other].ravel()[spot] or np.isnan(light[other].ravel()[spot]):
+                    continue
+                own, its = (scenes[k].mean.reshape(-1, 3)[place] for k, place in ((c, pixel), (other, spot)))
+                if abs(np.log(own[0] / its[0])) < 0.25 and np.abs(own[1:] - its[1:]).max() < 7:
+                    lights.append(light[other].ravel()[spot])
+            asked = shadows[c].ravel()[pixel] and pixel // width % EVERY_PX == 0 and pixel % width % EVERY_PX == 0
+            if asked and lights and np.isfinite(light[c].ravel()[pixel]):
+                assert told[pixel] == pytest.approx(np.mean(lights) - light[c].ravel()[pixel], abs=1e-4)
+                n_told += 1
+            else:
+                assert pixel not in told
+    assert n_told > 30
+
+
+def test_the_brighter_the_spot_to_others_the_likelier_a_person():
+    brighter = np.linspace(-0.3, 0.6, 10, dtype=np.float32)
+    for guess in (-4.0, 0.0, 4.0):
+        chance = person_by_floor(FloorEvidence(np.arange(10), np.full(10, guess, np.float32), brighter))
+        assert (np.diff(chance) > 0).all() and chance[0] < 0.5 < chance[-1]
+
+
+def test_cameras_without_an_empty_scene_or_a_mask_neither_tell_nor_are_told(tables, people, shadows, floors):
+    empty = empty_images(floors)
+    images, chances = darkened(empty, shadows), guesses(shadows, 0.3)
+    assert tell_shades(tables, images, [None] * len(images), chances, people) == tuple(people)
+    one = [scene_of(empty[0]), *[None] * (len(images) - 1)]  # nobody to ask
+    assert tell_shades(tables, images, one, chances, people) == tuple(people)
+    scenes = [scene_of(image) for image in empty]
+    done = tell_shades(tables, images, scenes, [None, *chances[1:]], [*people[:2], None, *people[3:]])
+    assert done[0] is people[0] and done[2] is None
