@@ -120,7 +120,7 @@ def add_tracker_options(parser: argparse.ArgumentParser) -> None:
         "--cut-shadows",
         action=argparse.BooleanOptionalAction,
         default=True,
-        help="cut shadows on the floor, on which the cameras agree, out of the silhouettes (default), or leave them in",
+        help="tell shadows on the floor from people by how dark the other cameras see it (default), or leave it to each camera's own guess",
     )
     parser.add_argument(
         "--exclude",
@@ -134,7 +134,7 @@ def selected_frontend(args: argparse.Namespace):
     """How silhouettes and hulls are made, as the options say."""
     from hmc.voxels.hulls import FrontendSettings
 
-    return FrontendSettings(complete=args.complete, cut_shadows=args.cut_shadows, exclude=args.exclude)
+    return FrontendSettings(ask_floor=args.cut_shadows, complete=args.complete, cut_shadows=args.cut_shadows, exclude=args.exclude)
 
 
 def selected_tracker(args: argparse.Namespace):

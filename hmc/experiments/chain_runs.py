@@ -84,6 +84,8 @@ PARTS: dict[str, Part] = {
     "legs told apart": Part(method={"legs": None, "alternatives": None}),
     "particles where they are needed only": Part(preset={"sparing": None}),
     "limb search": Part(preset={"search": None}),
+    "fresh starts for who is lost": Part(back={"anew": None}),
+    "the floor as others see it": Part(frontend={"ask_floor": False}),
     "completion by other cameras": Part(frontend={"complete": False}),
     "cutting of shadows": Part(frontend={"cut_shadows": False}),
 }

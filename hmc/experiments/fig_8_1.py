@@ -45,8 +45,9 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     frame = runs_of(cells)
     frame["evaluations"] = [_count(one, plan) for one in cells]
     table = score_table(frame, ("annealing", "method", "evaluations"))
-    figure, panels = plt.subplots(len(runs.ANNEALING), 2, figsize=(7.5, 5.6), sharex=True, squeeze=False)
-    for annealing, line in zip(runs.ANNEALING, panels, strict=True):
+    ways = [annealing for annealing in runs.ANNEALING if (table.annealing == annealing).any()]
+    figure, panels = plt.subplots(len(ways), 2, figsize=(7.5, 1.2 + 1.5 * len(ways)), sharex=True, squeeze=False)
+    for annealing, line in zip(ways, panels, strict=True):
         own = table[table.annealing == annealing]
         for axes, column, label in zip(line, ("MMTP_mm", "MMTA_percent"), ("MMTP (mm)", "MMTA at 100 mm (%)"), strict=True):
             draw_lines(axes, own, "evaluations", column, "method", title=f"{annealing} annealing", xlabel="evaluations", ylabel=label)

@@ -51,9 +51,10 @@ WITHOUT: dict[str, tuple[Mapping[str, Any], Mapping[str, Any]]] = {
     "chances of shades": ({"least_chance": 0.0}, {}),
     "filling of gaps": (_NO_GAPS, {}),
     "cutting of halos": ({"halo_share": 0.0}, {}),
+    "the floor as others see it": ({}, {"ask_floor": False}),
     "completion by other cameras": ({}, {"complete": False}),
     "cutting of shadows": ({}, {"cut_shadows": False}),
-    "all of these": (_NO_GAPS | {"halo_share": 0.0, "least_chance": 0.0}, {"complete": False, "cut_shadows": False}),
+    "all of these": (_NO_GAPS | {"halo_share": 0.0, "least_chance": 0.0}, {"ask_floor": False, "complete": False, "cut_shadows": False}),
 }
 #: A repair may cost so much overlap on a recording, and is to add as much on so many more than it takes as much from: of many recordings
 #: some gain by chance, and as many lose.
@@ -116,9 +117,9 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
                 added = {repair: np.append(added[repair], gains[repair]) for repair in repairs}
     claims = [claim for repair in repairs[:-1] for claim in _claims(repair, added[repair], names)]
     figure, axes = plt.subplots(figsize=(7, 0.5 * len(names) + 1.2))
-    place = np.arange(len(names))
+    place, height = np.arange(len(names)), 1 / (len(repairs) + 1)
     for k, repair in enumerate(repairs):
-        axes.barh(place + 0.2 * k, added[repair], 0.18, label=repair)
+        axes.barh(place + k * height, added[repair], 0.9 * height, label=repair)
     axes.axvline(0, color="black", linewidth=0.8)
     axes.set(yticks=place + 0.3, yticklabels=[name.rpartition("@")[0] for name in names], xlabel="added to the silhouettes' overlap")
     axes.legend(fontsize=7)

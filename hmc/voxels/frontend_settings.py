@@ -25,6 +25,8 @@ class FrontendSettings:
         At most this many frames of the empty scene are learnt from.
     median_frames, median_span : int
         Images of which the median is taken, and the number of frames, around the selection, over which they are spread.
+    ask_floor : bool
+        Whether pixels that may be a shadow are told by how dark the other cameras see the floor behind (`hmc.voxels.floor_light`).
     complete : bool
         Whether cameras decide one another's doubtful pixels (`hmc.voxels.completion`).
     cut_shadows : bool
@@ -47,6 +49,7 @@ class FrontendSettings:
     background_frames: int = 200
     median_frames: int = 20
     median_span: int = 1800
+    ask_floor: bool = True
     complete: bool = True
     cut_shadows: bool = True
     tolerance: int = 1

@@ -160,7 +160,7 @@ def _mask_steps(
 ) -> Iterator[MaskStep]:
     """Silhouettes from the second of two frames on, of what cameras see from the first on."""
     names, (index, first) = recording.rig.names, begin
-    decided_together = (settings.complete or settings.cut_shadows) and any(scene.known)
+    decided_together = (settings.ask_floor or settings.complete or settings.cut_shadows) and any(scene.known)
     tables = make_completion_tables(recording.room, recording.rig) if decided_together else None
     watch = make_watch(recording.rig, recording.room, recording.fps, _scene_images(recording, scene), settings.exclude)
     changed: dict[int, int] = {}  # camera whose whole image changed -> the frame in which that began
@@ -292,8 +292,9 @@ def settle(tables: CompletionTables | None, look: Look, settings: FrontendSettin
     none, much = (None,) * len(masks), False
     if tables is None:
         return masks, none
-    if settings.cut_shadows:
+    if settings.ask_floor:
         masks = tell_shades(tables, look.images, look.scenes, look.chances, masks)
+    if settings.cut_shadows:
         masks = cut_filled_shadows(tables, masks, look.filled, doubtful)
     if settings.complete:
         masks, much = complete_masks(tables, masks, doubtful)

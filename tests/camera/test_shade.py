@@ -81,7 +81,7 @@ def test_nothing_is_asked_where_nobody_is(scene):
 @pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceWarning")
 def test_the_network_is_that_of_scikit_learn(tmp_path):
     rng = np.random.default_rng(0)
-    features = rng.normal(0, 2, (3000, len(FEATURES))).astype(np.float32)
+    features = rng.normal(0, 2, (12000, len(FEATURES))).astype(np.float32)
     people = features[:, 0] > features[:, 1]
     net = train_shade(features, people)
     even = PERSON_COUNTS / (PERSON_COUNTS + 1)  # people count for more
