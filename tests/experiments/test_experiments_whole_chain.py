@@ -25,7 +25,9 @@ LABEL = "tiny@0"
 #: Frames of the cells here, and their seed.
 FRAMES, SEED = 8, 2
 #: Parts of the second pass, whose first pass is the whole's.
-SECOND = ("second pass", "own body of the whole run", "what furniture hides", "others' rays", "best way through both passes")
+SECOND = (
+    "second pass", "own body of the whole run", "what furniture hides", "others' rays", "best way through both passes", "fresh starts for who is lost",
+)  # fmt: skip
 
 
 @pytest.fixture(scope="module")
