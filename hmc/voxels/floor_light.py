@@ -32,10 +32,9 @@ SAME_LUMA, SAME_CHROMA = 0.25, 7.0
 LIGHT = (-0.7, 0.1)
 #: The guess is no surer than this, as a logit.
 MOST_LOGIT = 4.0
-#: Logit of a person: so much of the guess's, so much a unit by which the others see the spot brighter (in logarithms), and this.
+#: Logit of a person: so much of the guess's, so much a unit by which the others see the spot brighter (in logarithms), and this. Fitted to
+#: five recordings; fitted to 24 rooms drawn at random (1.4, 6.2, -2.0) they leave silhouettes the same or a little worse.
 BY_GUESS, BY_LIGHT, BIAS = 0.8, 10.9, -2.2
-
-
 #: The floor is asked of every so manieth pixel of each row and column.
 EVERY_PX = 2
 #: Side of the squares that pieces hold which come or go, pixels.

@@ -26,7 +26,8 @@ LABEL = "tiny@0"
 FRAMES, SEED = 8, 2
 #: Parts of the second pass, whose first pass is the whole's.
 SECOND = (
-    "second pass", "own body of the whole run", "what furniture hides", "others' rays", "best way through both passes", "fresh starts for who is lost",
+    "second pass", "own body of the whole run", "what furniture hides", "others' rays", "best way through both passes",
+    "fresh starts for who is lost",
 )  # fmt: skip
 
 
