@@ -1,9 +1,9 @@
 """What each repair of a silhouette is for: overlap with the true silhouettes with all of them, and without one after the other. Ours.
 
-A repair is worth its place where it adds a hundredth on two recordings more than it takes one from, and is wrong where it takes more than
-that on any. Each camera's
-overlap (intersection over union) in the frames of which the truth is there, on their mean over cameras and frames; and the same of the
-strict hulls that all cameras' silhouettes leave, in voxels of 4 cm, against those of the true ones.
+A repair is worth its place where it adds a hundredth on two recordings, and on two more for each it takes one from, and is wrong where it
+takes more than that on any. Each camera's overlap (intersection over union) in the frames of which the truth is there, on their mean
+over cameras and frames; and the same of the strict hulls that all cameras' silhouettes leave, in voxels of 4 cm, against those of the
+true ones.
 """
 
 from __future__ import annotations
@@ -56,8 +56,8 @@ WITHOUT: dict[str, tuple[Mapping[str, Any], Mapping[str, Any]]] = {
     "cutting of shadows": ({}, {"cut_shadows": False}),
     "all of these": (_NO_GAPS | {"halo_share": 0.0, "least_chance": 0.0}, {"ask_floor": False, "complete": False, "cut_shadows": False}),
 }
-#: A repair may cost so much overlap on a recording, and is to add as much on so many more than it takes as much from: of many recordings
-#: some gain by chance, and as many lose.
+#: A repair may cost so much overlap on a recording, and is to add as much on so many, beyond two for each it takes as much from: of many
+#: recordings some gain by chance, and as many lose.
 MOST_HARM, LEAST_GAIN, LEAST_CLIPS = 0.01, 0.01, 2
 
 
@@ -137,8 +137,8 @@ def _claims(repair: str, added: np.ndarray, names: Sequence[str]) -> list[Claim]
             f"least {added[worst]:+.3f} on {names[worst].rpartition('@')[0]}",
         ),
         Claim(
-            f"{repair}: adds {LEAST_GAIN} on {LEAST_CLIPS} recordings at least beyond those it takes that from",
-            helped - harmed >= LEAST_CLIPS,
+            f"{repair}: adds {LEAST_GAIN} on {LEAST_CLIPS} recordings at least beyond two for each it takes that from",
+            helped - 2 * harmed >= LEAST_CLIPS,
             f"adds on {helped} of {len(names)}, takes on {harmed}",
         ),
     ]

@@ -58,7 +58,7 @@ def test_claims_follow_the_figures():
     halo = "cutting of halos: {} 0.01 {}"
     takes, adds = (
         halo.format("takes no more than", "of overlap on any recording"),
-        halo.format("adds", "on 2 recordings at least beyond those it takes that from"),
+        halo.format("adds", "on 2 recordings at least beyond two for each it takes that from"),
     )
     harmful = claims(lambda without, name: -0.02 if (without, name) == ("cutting of halos", "pale") else 0.02 * (without != repairs.ALL))
     assert not harmful.pop(takes) and all(harmful.values())
