@@ -52,6 +52,8 @@ LEAST_LUMA, LOST, MOST_CHROMA, REACH_PX = 4.0, (0.02, 0.65), 8.0, 60
 SURE, DARKEST = 6.0, 0.45
 #: From this chance on a shade needs no other camera's word (`hmc.camera.segmentation.BackgroundModel.filled`).
 SURE_CHANCE = 0.6
+#: Chances are no nearer to 0 and 1 than that of this logit.
+MOST_LOGIT = 30.0
 #: Where it is not known whether a pixel looks at the floor.
 FLOOR_UNKNOWN = 0.5
 #: The floor is looked up at every so manieth pixel, and so far beyond the room, metres.
@@ -221,7 +223,8 @@ def person_chance(net: ShadeNet, features: np.ndarray) -> np.ndarray:
     weights = net.inner / net.spread[:, None]
     hidden = features @ weights + (net.inner_bias - net.middle @ weights)
     np.maximum(hidden, 0, out=hidden)
-    return np.asarray(1 / (1 + np.exp(-(hidden @ net.outer + net.outer_bias))), np.float32)
+    logits = np.clip(hidden @ net.outer + net.outer_bias, -MOST_LOGIT, MOST_LOGIT)  # else a pixel unlike all others overflows
+    return np.asarray(1 / (1 + np.exp(-logits)), np.float32)
 
 
 def told_by_chance(mask: np.ndarray, pixels: np.ndarray, features: np.ndarray, least: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -148,3 +148,9 @@ def test_small_images_are_told_by_the_rules_alone(scene):
     empty = [np.clip(150 + rng.normal(0, 2, (*SHAPE, 3)), 0, 255).astype(np.uint8) for _ in range(20)]
     masks = [segment(train_background(empty), image, SegmentationSettings(least_chance=chance))[0] for chance in (0.0, 0.45)]
     np.testing.assert_array_equal(*masks)
+
+
+def test_pixels_unlike_all_others_have_a_chance_all_the_same():
+    far = 1e4 * np.random.default_rng(0).normal(size=(50, len(FEATURES))).astype(np.float32)
+    chance = person_chance(default_net(), far)  # a warning would be an error here
+    assert ((chance >= 0) & (chance <= 1)).all() and {0.0, 1.0} >= set(np.unique(chance.round(6)).tolist())
