@@ -24,7 +24,7 @@ from hmc.camera.segmentation import SegmentationSettings, segment_views, train_b
 from hmc.voxels.carving import carve_levels, make_tables
 from hmc.voxels.completion import complete_masks, make_completion_tables
 from hmc.voxels.components import components
-from hmc.voxels.floor_shadows import cut_filled_shadows, cut_floor_shadows
+from hmc.voxels.floor_shadows import cut_filled_shadows, cut_floor_shadows, lit_views
 from hmc.voxels.grid import VoxelGrid
 from hmc.voxels.surface import surface
 
@@ -100,7 +100,7 @@ def measure(n_people: int) -> tuple[float, float, float, float, float, float]:
         masks = cut_filled_shadows(completion, masks, [model.filled for model in models], doubtful)
         masks, much = complete_masks(completion, masks, doubtful)
         if not much:
-            cut_floor_shadows(completion, images, models, masks)
+            cut_floor_shadows(completion, lit_views(images, models, [model.gains for model in models]), masks)
         silhouettes.append(time.thread_time() - start)
     ratio = float(np.median(np.subtract(whole, mixture)) / np.median(mixture))
     every = float(np.mean(silhouettes) / np.median(mixture))

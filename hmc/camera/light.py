@@ -10,7 +10,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-__all__ = ["FEW", "as_image", "in_light_of", "light_gains", "luma_chroma"]
+__all__ = ["FEW", "as_image", "brought_back", "in_light_of", "light_gains", "luma_chroma"]
 
 #: Every so manieth pixel of each row and column tells of a whole image.
 FEW = (slice(None, None, 16),) * 2
@@ -94,8 +94,12 @@ def _left(terms: np.ndarray, values: np.ndarray, at: np.ndarray) -> float:
 
 def in_light_of(image: np.ndarray, mean: np.ndarray, people: np.ndarray) -> np.ndarray:
     """An image brought to the light of the empty scene (`light_gains`); itself where that is its own."""
-    gains = light_gains(image, mean, people)
-    if np.all((gains > 1 / LEAST_GAIN) & (gains < LEAST_GAIN)):
+    return brought_back(image, mean, light_gains(image, mean, people))
+
+
+def brought_back(image: np.ndarray, mean: np.ndarray, gains: np.ndarray | None) -> np.ndarray:
+    """An image brought to the light of the empty scene by gains that are known; itself where they are None or nearly 1."""
+    if gains is None or np.all((gains > 1 / LEAST_GAIN) & (gains < LEAST_GAIN)):
         return image
     level = cv2.multiply(image, cv2.resize(1 / gains, image.shape[1::-1]), dtype=cv2.CV_8U)
     # What is overexposed may have been as bright as the scene is.

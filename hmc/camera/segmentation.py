@@ -19,7 +19,7 @@ import cv2
 import numpy as np
 
 from hmc.camera.image_signs import is_dark
-from hmc.camera.light import FEW, as_image, in_light_of, luma_chroma
+from hmc.camera.light import FEW, as_image, brought_back, in_light_of, light_gains, luma_chroma
 from hmc.camera.mixture import SHADOW, ask_mixture, coarse
 from hmc.camera.noise import blur_for, blurred, is_grey, noise_floor
 from hmc.camera.segmentation_settings import SegmentationSettings
@@ -101,6 +101,8 @@ class BackgroundModel:
     chance : ndarray of uint8, shape (height, width), or None
         Of each pixel of the last image that may as well be a shadow, how likely it is a person, of 255 (`hmc.camera.shade`), which other
         cameras' sight of the floor may tell better (`hmc.voxels.floor_light`); 0 of all others. None before the first image.
+    gains : ndarray of float32, shape (rows, columns, 3), or None
+        By which factors the last image was brighter than the empty scene (`hmc.camera.light.light_gains`); None: taken as it is.
     unseen : ndarray of bool, shape (height, width), or None
         Where the empty scene was never seen (`hmc.camera.empty_scene`): nothing is learnt there, and what is found there tells nothing.
     blur : int
@@ -126,6 +128,7 @@ class BackgroundModel:
     doubtful: np.ndarray | None = None
     filled: np.ndarray | None = None
     chance: np.ndarray | None = None
+    gains: np.ndarray | None = None
     unseen: np.ndarray | None = None
     blur: int = 0
     grey: bool = False
@@ -255,7 +258,7 @@ def segment(
     if model.before is not None and _nearer(image, model.before, model.mean):  # it was a flash
         model.mean[...] = model.before
         model = _with_new_mean(replace(model, before=None))
-    image, answer, found = _level(model, image)
+    image, gains, answer, found = _level(model, image)
     if cv2.countNonZero(found) > settings.max_foreground * found.size:
         return None, _adapt_to_switch(model, image, settings)
     mask, filled, chance, doubtful = _complete(found, cv2.threshold(answer, SHADOW - 1, 1, cv2.THRESH_BINARY)[1], image, model, settings)
@@ -264,7 +267,8 @@ def segment(
     if model.unseen is not None:
         doubtful &= ~model.unseen
     settling = max(0, model.settling - 1)
-    after = replace(model, people=mask, frame=model.frame + 1, settling=settling, doubtful=doubtful, filled=filled, chance=chance)
+    told = {"doubtful": doubtful, "filled": filled, "chance": chance, "gains": gains}
+    after = replace(model, people=mask, frame=model.frame + 1, settling=settling, **told)
     if not after.settling and after.before is not None:
         after = replace(after, before=None)
     if after.settling or after.frame % settings.learn_every == 0:
@@ -305,16 +309,17 @@ def segment_views(
     return tuple(mask for mask, _ in results), tuple(model for _, model in results)
 
 
-def _level(model: BackgroundModel, image: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The image in the light of the empty scene, or as it is where that accounts for no less of it; with `ask_mixture` of it."""
-    level = in_light_of(image, model.mean, model.people)
+def _level(model: BackgroundModel, image: np.ndarray) -> tuple[np.ndarray, np.ndarray | None, np.ndarray, np.ndarray]:
+    """The image in the light of the empty scene, or as it is where that accounts for no less of it; its gains, and `ask_mixture` of it."""
+    gains = light_gains(image, model.mean, model.people)
+    level = brought_back(image, model.mean, gains)
     answer, found = ask_mixture(model.mixture, level, model.coarse)
     left = cv2.countNonZero(found)
     if level is not image and left > SUSPECT_SHARE * found.size:
         answer_as_is, found_as_is = ask_mixture(model.mixture, image, model.coarse)
         if left > MOST_LEFT * found.size or left >= cv2.countNonZero(found_as_is):
-            return image, answer_as_is, found_as_is
-    return level, answer, found
+            return image, None, answer_as_is, found_as_is
+    return level, gains, answer, found
 
 
 def _nearer(image: np.ndarray, one: np.ndarray, other: np.ndarray) -> bool:

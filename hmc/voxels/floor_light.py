@@ -19,9 +19,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from hmc.camera.light import in_light_of
 from hmc.voxels.completion import CompletionTables
-from hmc.voxels.floor_shadows import OTHER_COLOR, Scene, darkness
+from hmc.voxels.floor_shadows import OTHER_COLOR, LitView, darkness
 
 __all__ = ["FloorEvidence", "floor_evidence", "person_by_floor", "tell_shades"]
 
@@ -63,8 +62,7 @@ class FloorEvidence:
 
 def floor_evidence(
     tables: CompletionTables,
-    images: Sequence[np.ndarray | None],
-    scenes: Sequence[Scene | None],
+    views: Sequence[LitView | None],
     chances: Sequence[np.ndarray | None],
     masks: Sequence[np.ndarray | None],
 ) -> dict[int, FloorEvidence]:
@@ -74,23 +72,21 @@ def floor_evidence(
     ----------
     tables : CompletionTables
         Of the room and the rig.
-    images : sequence of ndarray of uint8, shape (height, width, 3), or None
-        BGR, one a camera.
-    scenes : sequence of Scene or None
-        What is known of the empty scene; None of a camera that has other silhouettes.
+    views : sequence of LitView or None
+        One a camera (`hmc.voxels.floor_shadows.lit_views`).
     chances : sequence of ndarray of uint8, shape (height, width), or None
         Of each pixel that is a shade, how likely it is a person, of 255; 0 of all others.
     masks : sequence of ndarray of bool, shape (height, width), or None
         Silhouettes so far: behind them nobody sees the floor.
     """
     known = {
-        c: (image, scene, chance, mask)
-        for c, (image, scene, chance, mask) in enumerate(zip(images, scenes, chances, masks, strict=True))
-        if image is not None and scene is not None and chance is not None and mask is not None
+        c: (view, chance, mask)
+        for c, (view, chance, mask) in enumerate(zip(views, chances, masks, strict=True))
+        if view is not None and chance is not None and mask is not None
     }
     n_cells = tables.cells[0] * tables.cells[1]
     asked, near = {}, np.zeros(n_cells + 1, bool)
-    for c, (_, _, chance, _) in known.items():
+    for c, (_, chance, _) in known.items():
         rows, columns = np.nonzero(chance[::EVERY_PX, ::EVERY_PX])
         pixels = EVERY_PX * (rows * chance.shape[1] + columns)
         cells = tables.pixel_cells[c].ravel().take(pixels)
@@ -99,13 +95,13 @@ def floor_evidence(
     spots = np.flatnonzero(near[:n_cells])
     place = np.zeros(n_cells, np.intp)
     place[spots] = np.arange(len(spots))
-    floors = {c: _floor(image, scene, mask, tables.cell_pixels[c].take(spots), asked[c][0]) for c, (image, scene, _, mask) in known.items()}
+    floors = {c: _floor(view, mask, tables.cell_pixels[c].take(spots), asked[c][0]) for c, (view, _, mask) in known.items()}
     found = {}
     for c, (pixels, cells) in asked.items():
         others = [floor for other, floor in floors.items() if other != c]
         light, n = _seen_by(others, place.take(cells), floors[c].shade_scene)
         told = np.flatnonzero((n > 0) & np.isfinite(floors[c].shade_light))
-        chance = np.clip(known[c][2].ravel().take(pixels[told]) / np.float32(255), 1e-3, 1 - 1e-3)
+        chance = np.clip(known[c][1].ravel().take(pixels[told]) / np.float32(255), 1e-3, 1 - 1e-3)
         guess = np.clip(np.log(chance / (1 - chance)), -MOST_LOGIT, MOST_LOGIT)
         found[c] = FloorEvidence(pixels[told], guess, light[told] / n[told] - floors[c].shade_light[told])
     return found
@@ -130,13 +126,13 @@ class _Floor:
     shade_scene: np.ndarray
 
 
-def _floor(image: np.ndarray, scene: Scene, mask: np.ndarray, spots: np.ndarray, shades: np.ndarray) -> _Floor:
+def _floor(view: LitView, mask: np.ndarray, spots: np.ndarray, shades: np.ndarray) -> _Floor:
     """Of the flat pixels of spots, beyond the image where they are not seen, and of shades."""
     seen = spots < mask.size
     pixels = np.concatenate([spots[seen], shades])
-    light = darkness(in_light_of(image, scene.mean, mask), scene, pixels)
+    light = darkness(view, pixels)
     light = np.where(light == OTHER_COLOR, np.float32(np.nan), np.clip(light, *LIGHT))
-    colors = np.stack([scene.mean[..., k].reshape(-1).take(pixels) for k in range(3)])
+    colors = np.stack([view.scene.mean[..., k].reshape(-1).take(pixels) for k in range(3)])
     np.log(colors[0], out=colors[0])
     n = np.count_nonzero(seen)
     at_spots, there = np.full((4, len(spots)), np.nan, np.float32), light[:n]
@@ -164,8 +160,7 @@ def person_by_floor(evidence: FloorEvidence) -> np.ndarray:
 
 def tell_shades(
     tables: CompletionTables,
-    images: Sequence[np.ndarray | None],
-    scenes: Sequence[Scene | None],
+    views: Sequence[LitView | None],
     chances: Sequence[np.ndarray | None],
     masks: Sequence[np.ndarray | None],
 ) -> tuple[np.ndarray | None, ...]:
@@ -173,7 +168,7 @@ def tell_shades(
 
     Parameters
     ----------
-    tables, images, scenes, chances, masks
+    tables, views, chances, masks
         As for `floor_evidence`.
 
     Returns
@@ -182,7 +177,7 @@ def tell_shades(
         The very masks where nothing is told.
     """
     told: list[np.ndarray | None] = list(masks)
-    for c, evidence in floor_evidence(tables, images, scenes, chances, masks).items():
+    for c, evidence in floor_evidence(tables, views, chances, masks).items():
         if len(evidence.pixels):
             mask, shades = np.asarray(masks[c]), np.asarray(chances[c])
             rows, columns = np.divmod(evidence.pixels, mask.shape[1])

@@ -21,11 +21,11 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from hmc.camera.light import in_light_of
+from hmc.camera.light import brought_back
 from hmc.voxels.carving import carve, pixels_at
 from hmc.voxels.completion import CompletionTables, doubted_floor, shown
 
-__all__ = ["OTHER_COLOR", "Scene", "cut_filled_shadows", "cut_floor_shadows", "darkness"]
+__all__ = ["OTHER_COLOR", "LitView", "Scene", "cut_filled_shadows", "cut_floor_shadows", "darkness", "lit_views"]
 
 #: Shares of the empty floor's light: from the first on a spot is bare, below the second it is no shadow but something dark.
 BARE, DARKEST = 0.93, 0.5
@@ -57,6 +57,46 @@ class Scene:
 
     mean: np.ndarray
     unseen: np.ndarray | None = None
+
+
+@dataclass(frozen=True)
+class LitView:
+    """What a camera tells of the floor's light: its image, in the light of the empty scene, and that scene.
+
+    Parameters
+    ----------
+    image : ndarray of uint8, shape (height, width, 3)
+        BGR.
+    scene : Scene
+    """
+
+    image: np.ndarray
+    scene: Scene
+
+
+def lit_views(
+    images: Sequence[np.ndarray | None], scenes: Sequence[Scene | None], gains: Sequence[np.ndarray | None]
+) -> tuple[LitView | None, ...]:
+    """What each camera tells of the floor's light.
+
+    Parameters
+    ----------
+    images : sequence of ndarray of uint8, shape (height, width, 3), or None
+        BGR, one a camera.
+    scenes : sequence of Scene or None
+        What is known of the empty scene; None of a camera that has other silhouettes.
+    gains : sequence of ndarray of float32, shape (rows, columns, 3), or None
+        By which factors the images are brighter than the empty scene (`hmc.camera.light.light_gains`); None where they are not.
+
+    Returns
+    -------
+    tuple of LitView or None
+        None where there is no image, or nothing is known of the scene.
+    """
+    return tuple(
+        None if image is None or scene is None else LitView(brought_back(image, scene.mean, gain), scene)
+        for image, scene, gain in zip(images, scenes, gains, strict=True)
+    )
 
 
 def cut_filled_shadows(
@@ -98,10 +138,7 @@ def cut_filled_shadows(
 
 
 def cut_floor_shadows(
-    tables: CompletionTables,
-    images: Sequence[np.ndarray | None],
-    scenes: Sequence[Scene | None],
-    masks: Sequence[np.ndarray | None],
+    tables: CompletionTables, views: Sequence[LitView | None], masks: Sequence[np.ndarray | None]
 ) -> tuple[np.ndarray | None, ...]:
     """Silhouettes without the shadows on the floor.
 
@@ -109,10 +146,8 @@ def cut_floor_shadows(
     ----------
     tables : CompletionTables
         Of the room and the rig.
-    images : sequence of ndarray of uint8, shape (height, width, 3), or None
-        BGR, one a camera.
-    scenes : sequence of Scene or None
-        What is known of the empty scene; None of a camera that has other silhouettes.
+    views : sequence of LitView or None
+        One a camera (`lit_views`).
     masks : sequence of ndarray of bool, shape (height, width), or None
 
     Returns
@@ -120,11 +155,7 @@ def cut_floor_shadows(
     tuple of ndarray of bool, shape (height, width), or None
         Each within the mask it came from. With fewer than two cameras that know the empty floor, the masks as they are.
     """
-    floors = {
-        c: _Floor(in_light_of(image, scene.mean, mask), scene)
-        for c, (image, scene, mask) in enumerate(zip(images, scenes, masks, strict=True))
-        if image is not None and scene is not None and mask is not None
-    }
+    floors = {c: view for c, (view, mask) in enumerate(zip(views, masks, strict=True)) if view is not None and mask is not None}
     if len(floors) < 2:
         return tuple(masks)
     n_cells = tables.cells[0] * tables.cells[1]
@@ -141,22 +172,12 @@ def cut_floor_shadows(
     return tuple(cut)
 
 
-@dataclass(frozen=True)
-class _Floor:
-    """What a camera knows of the floor's light: its image, in the light of the empty scene, and that scene."""
-
-    image: np.ndarray
-    scene: Scene
-
-
-def darkness(image: np.ndarray, scene: Scene, pixels: np.ndarray) -> np.ndarray:
+def darkness(view: LitView, pixels: np.ndarray) -> np.ndarray:
     """How dark some pixels are against the empty scene.
 
     Parameters
     ----------
-    image : ndarray of uint8, shape (height, width, 3)
-        BGR, in the light of the empty scene (`hmc.camera.light.in_light_of`).
-    scene : Scene
+    view : LitView
     pixels : ndarray of int, shape (n,)
         Flat.
 
@@ -168,6 +189,7 @@ def darkness(image: np.ndarray, scene: Scene, pixels: np.ndarray) -> np.ndarray:
     """
     if not len(pixels):
         return np.zeros(0, np.float32)
+    image, scene = view.image, view.scene
     box, places = _around(pixels, image.shape, 1)  # the blur takes in one pixel more
     part = cv2.GaussianBlur(cv2.cvtColor(image[box], cv2.COLOR_BGR2YCrCb), (3, 3), 0)
     color = part.reshape(-1, 3).take(places, axis=0).astype(np.float32)
@@ -179,18 +201,18 @@ def darkness(image: np.ndarray, scene: Scene, pixels: np.ndarray) -> np.ndarray:
     return dark if scene.unseen is None else np.where(scene.unseen.ravel().take(pixels), OTHER_COLOR, dark)
 
 
-def _dark_pixels(floor: _Floor, mask: np.ndarray, pixel_cells: np.ndarray, n_cells: int) -> tuple[np.ndarray, np.ndarray]:
+def _dark_pixels(floor: LitView, mask: np.ndarray, pixel_cells: np.ndarray, n_cells: int) -> tuple[np.ndarray, np.ndarray]:
     """A silhouette's flat pixels that may be floor in a shadow, and the cells on which they look."""
     pixels = np.flatnonzero(mask)
     cells = pixel_cells.ravel().take(pixels)
     inside = cells < n_cells
     pixels, cells = pixels[inside], cells[inside]
-    share = darkness(floor.image, floor.scene, pixels)
+    share = darkness(floor, pixels)
     some = (share > np.log(DARKEST)) & (share < 0)
     return pixels[some], cells[some]
 
 
-def _shadowed(tables: CompletionTables, floors: dict[int, _Floor], asked: dict[int, np.ndarray]) -> dict[int, np.ndarray]:
+def _shadowed(tables: CompletionTables, floors: dict[int, LitView], asked: dict[int, np.ndarray]) -> dict[int, np.ndarray]:
     """By camera, the floor's cells that are in a shadow as it sees them; one more, beyond the floor, is not.
 
     Only told of the cells that are asked for, some of each camera's.
@@ -205,7 +227,7 @@ def _shadowed(tables: CompletionTables, floors: dict[int, _Floor], asked: dict[i
     for row, (c, floor) in zip(seen, floors.items(), strict=True):
         pixels = tables.cell_pixels[c].take(cells)
         there = np.flatnonzero(pixels < floor.scene.mean[..., 0].size)
-        row[there] = darkness(floor.image, floor.scene, pixels.take(there))
+        row[there] = darkness(floor, pixels.take(there))
     bare = ((seen > np.log(BARE)) & (seen < OTHER_COLOR)).sum(axis=0)
     dark = (seen <= np.log(BARE)) & (seen >= np.log(DARKEST))
     most = dark.sum(axis=0) > bare

@@ -30,7 +30,7 @@ from hmc.voxels.background_initialisation import UnseenPlaces, learn_from_people
 from hmc.voxels.carving import CarvingTables, carve_levels, shared_tables
 from hmc.voxels.completion import CompletionTables, complete_masks, doubtful_hull, make_completion_tables
 from hmc.voxels.floor_light import tell_shades
-from hmc.voxels.floor_shadows import cut_filled_shadows, cut_floor_shadows
+from hmc.voxels.floor_shadows import cut_filled_shadows, cut_floor_shadows, lit_views
 from hmc.voxels.frontend_settings import FrontendSettings
 from hmc.voxels.grid import VoxelGrid
 from hmc.voxels.held import frames_to_hold, held_steps, without_faulty
@@ -292,15 +292,16 @@ def settle(tables: CompletionTables | None, look: Look, settings: FrontendSettin
     none, much = (None,) * len(masks), False
     if tables is None:
         return masks, none
+    views = lit_views(look.images, look.scenes, look.gains) if settings.ask_floor or settings.cut_shadows else none
     if settings.ask_floor:
-        masks = tell_shades(tables, look.images, look.scenes, look.chances, masks)
+        masks = tell_shades(tables, views, look.chances, masks)
     if settings.cut_shadows:
         masks = cut_filled_shadows(tables, masks, look.filled, doubtful)
     if settings.complete:
         masks, much = complete_masks(tables, masks, doubtful)
     if much:  # people who look like what is around them: what is dark on the floor there may be their shoes
         return masks, doubtful
-    return cut_floor_shadows(tables, look.images, look.scenes, masks) if settings.cut_shadows else masks, none
+    return cut_floor_shadows(tables, views, masks) if settings.cut_shadows else masks, none
 
 
 def _say_still(places: UnseenPlaces) -> Iterator[str]:

@@ -30,6 +30,8 @@ T = TypeVar("T")
 PIXEL_BYTES = 3 + 1 + 1 + 1 + 1 + 12 + 1
 #: Of a frame besides, bytes.
 FRAME_BYTES = 1 << 16
+#: Arrays of a camera that go between processes.
+N_ARRAYS = 8
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,8 @@ class Look:
         As `hmc.camera.segmentation.BackgroundModel` has them; None of a camera with ready-made silhouettes.
     chances : tuple of ndarray of uint8, shape (h, w), or None
         Of pixels that may be shadows, likewise.
+    gains : tuple of ndarray of float32, shape (rows, columns, 3), or None
+        Of the image's light, likewise.
     scenes : tuple of Scene or None
         Of cameras that know the empty scene. Arrays in it change when the next frame is looked at.
     lines : tuple of str
@@ -58,6 +62,7 @@ class Look:
     doubtful: tuple[np.ndarray | None, ...]
     filled: tuple[np.ndarray | None, ...]
     chances: tuple[np.ndarray | None, ...]
+    gains: tuple[np.ndarray | None, ...]
     scenes: tuple[Scene | None, ...]
     lines: tuple[str, ...]
 
@@ -117,13 +122,14 @@ def _together(parts: Sequence[Iterator[tuple[list[np.ndarray | None], Any]]], or
             stack.enter_context(closing(part))  # type: ignore[type-var]
         for found in zip(*parts, strict=True):
             flat = [array for arrays, _ in found for array in arrays]
-            images, masks, doubtful, filled, chances, means, unseen = (tuple(flat[7 * k + kind] for k in order) for kind in range(7))
+            kinds = (tuple(flat[N_ARRAYS * k + kind] for k in order) for kind in range(N_ARRAYS))
+            images, masks, doubtful, filled, chances, gains, means, unseen = kinds
             # Copied where others may keep them, or they are wanted again; of a mean, others gather channel by channel.
             new = zip(scenes, means, _copies(unseen), strict=True)
             scenes = [before if mean is None else Scene(in_planes(mean), hidden) for before, mean, hidden in new]
             lines = tuple(line for _, (_, own_lines) in found for line in own_lines)
             index = found[0][1][0]
-            yield Look(index, _copies(images), _copies(masks), _copies(doubtful), filled, chances, tuple(scenes), lines)
+            yield Look(index, _copies(images), _copies(masks), _copies(doubtful), filled, chances, gains, tuple(scenes), lines)
 
 
 def look_once(
@@ -161,8 +167,9 @@ def look_once(
     doubtful = tuple(None if model is None else model.doubtful for model in seen)
     filled = tuple(None if model is None else model.filled for model in seen)
     chances = tuple(None if model is None else model.chance for model in seen)
+    gains = tuple(None if model is None else model.gains for model in seen)
     scenes = tuple(None if model is None else Scene(model.mean, model.unseen) for model in seen)
-    return Look(frame.index, frame.images, tuple(masks), doubtful, filled, chances, scenes, lines), known
+    return Look(frame.index, frame.images, tuple(masks), doubtful, filled, chances, gains, scenes, lines), known
 
 
 def _arrays(
@@ -173,13 +180,13 @@ def _arrays(
     first: int,
     last: int | None,
 ) -> Iterator[tuple[list[np.ndarray | None], tuple[int, tuple[str, ...]]]]:
-    """What some cameras see as arrays, seven a camera, beside the frame's number and lines; of the empty scene only what has changed."""
+    """What some cameras see as arrays, `N_ARRAYS` a camera, beside its number and lines; of the empty scene only what has changed."""
     told = [-1] * len(recording.rig)
     for look, changes in _look(recording, models, background, settings, first, last, None):
         arrays: list[np.ndarray | None] = []
         for c, scene in enumerate(look.scenes):
             new = scene if changes[c] != told[c] else None
-            arrays += [look.images[c], look.masks[c], look.doubtful[c], look.filled[c], look.chances[c]]
+            arrays += [look.images[c], look.masks[c], look.doubtful[c], look.filled[c], look.chances[c], look.gains[c]]
             arrays += [None, None] if new is None else [new.mean, new.unseen]
         told = changes
         yield arrays, (look.index, look.lines)

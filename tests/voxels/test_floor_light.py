@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 from drawn import floor_patch, silhouette
 
-from hmc.camera.light import in_light_of
+from hmc.camera.light import in_light_of, light_gains
 from hmc.camera.shade import floor_pixels
 from hmc.voxels.completion import make_completion_tables
 from hmc.voxels.floor_light import EVERY_PX, FloorEvidence, floor_evidence, person_by_floor, tell_shades
-from hmc.voxels.floor_shadows import Scene
+from hmc.voxels.floor_shadows import Scene, lit_views
 
 ROOM = np.array([[-2.5, -2.5, 0.0], [2.5, 2.5, 2.2]])
 FLOOR, WALL, DARK = (110, 125, 140), (190, 170, 150), 0.6
@@ -47,6 +47,13 @@ def darkened(images, places, share=DARK):
     return [np.where(place[..., None], share * image, image).astype(np.uint8) for image, place in zip(images, places, strict=True)]
 
 
+def lit(images, scenes, people=None):
+    """The images in the light of their scenes."""
+    people = people or [np.zeros(image.shape[:2], bool) for image in images]
+    each = zip(images, scenes, people, strict=True)
+    return lit_views(images, scenes, [None if scene is None else light_gains(image, scene.mean, person) for image, scene, person in each])
+
+
 def guesses(places, chance):
     return [np.where(place, round(255 * chance), 0).astype(np.uint8) for place in places]
 
@@ -66,7 +73,7 @@ def told(tables, people, shadows, floors):
     images = darkened(empty, dark)
     halves = [shadow & (np.arange(shadow.shape[1]) % 40 < 20) for shadow in shadows]
     masks = [(person & ~legs) | half for person, legs, half in zip(people, trousers, halves, strict=True)]
-    after = tell_shades(tables, images, [scene_of(image) for image in empty], guesses(dark, 0.3), masks)
+    after = tell_shades(tables, lit(images, [scene_of(image) for image in empty]), guesses(dark, 0.3), masks)
     return trousers, halves, masks, after
 
 
@@ -92,10 +99,10 @@ def test_a_table_hides_the_floor_and_tells_nothing(tables, people, shadows, floo
     only = [shadows[0], *(np.zeros_like(shadow) for shadow in shadows[1:])]
     images = darkened(empty, only)
     scenes = [scene_of(image) for image in empty]
-    done = tell_shades(tables, images, scenes, guesses(only, 0.3), people)
+    done = tell_shades(tables, lit(images, scenes), guesses(only, 0.3), people)
     assert all(after is person for after, person in zip(done, people, strict=True))
     bare = empty_images(floors)  # without the table it would be somebody
-    done = tell_shades(tables, darkened(bare, only), [scene_of(image) for image in bare], guesses(only, 0.3), people)
+    done = tell_shades(tables, lit(darkened(bare, only), [scene_of(image) for image in bare]), guesses(only, 0.3), people)
     assert (done[0] & shadows[0]).sum() > 0.8 * shadows[0].sum()
 
 
@@ -105,7 +112,7 @@ def test_the_evidence_is_that_of_a_loop_over_pixels(tables, ring, people, shadow
     shares = [0.5 + 0.1 * k for k in range(len(ring))]
     images = [darkened([image], [shadow], share)[0] for image, shadow, share in zip(empty, shadows, shares, strict=True)]
     scenes = [scene_of(image) for image in empty]
-    found = floor_evidence(tables, images, scenes, guesses(shadows, 0.4), people)
+    found = floor_evidence(tables, lit(images, scenes, people), guesses(shadows, 0.4), people)
     light = []
     for image, scene, person in zip(images, scenes, people, strict=True):
         color = cv2.GaussianBlur(cv2.cvtColor(in_light_of(image, scene.mean, person), cv2.COLOR_BGR2YCrCb), (3, 3), 0).astype(float)
@@ -145,9 +152,9 @@ def test_the_brighter_the_spot_to_others_the_likelier_a_person():
 def test_cameras_without_an_empty_scene_or_a_mask_neither_tell_nor_are_told(tables, people, shadows, floors):
     empty = empty_images(floors)
     images, chances = darkened(empty, shadows), guesses(shadows, 0.3)
-    assert tell_shades(tables, images, [None] * len(images), chances, people) == tuple(people)
+    assert tell_shades(tables, lit(images, [None] * len(images)), chances, people) == tuple(people)
     one = [scene_of(empty[0]), *[None] * (len(images) - 1)]  # nobody to ask
-    assert tell_shades(tables, images, one, chances, people) == tuple(people)
+    assert tell_shades(tables, lit(images, one), chances, people) == tuple(people)
     scenes = [scene_of(image) for image in empty]
-    done = tell_shades(tables, images, scenes, [None, *chances[1:]], [*people[:2], None, *people[3:]])
+    done = tell_shades(tables, lit(images, scenes), [None, *chances[1:]], [*people[:2], None, *people[3:]])
     assert done[0] is people[0] and done[2] is None

@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 from drawn import floor_patch, silhouette
 
-from hmc.camera.light import in_light_of
+from hmc.camera.light import in_light_of, light_gains
 from hmc.camera.segmentation import train_background
 from hmc.voxels.carving import carve, pixels_at
 from hmc.voxels.completion import make_completion_tables, shown
-from hmc.voxels.floor_shadows import cut_filled_shadows, cut_floor_shadows
+from hmc.voxels.floor_shadows import cut_filled_shadows, cut_floor_shadows, lit_views
 
 ROOM = np.array([[-1.5, -1.5, 0.0], [1.5, 1.5, 2.2]])
 DARK = 0.6
@@ -50,7 +50,13 @@ def filmed(scenes, people, shadows, trousers=(60, 65, 70), light=1.0):
 
 
 def cut(tables, scenes, images, masks):
-    return cut_floor_shadows(tables, images, [model for _, model in scenes], masks)
+    return cut_by_views(tables, images, [model for _, model in scenes], masks)
+
+
+def cut_by_views(tables, images, models, masks):
+    each = zip(images, models, masks, strict=True)
+    gains = [None if model is None or mask is None else light_gains(image, model.mean, mask) for image, model, mask in each]
+    return cut_floor_shadows(tables, lit_views(images, models, gains), masks)
 
 
 def test_a_shadow_that_all_cameras_see_as_dark_leaves_and_the_person_stays(tables, scenes, ring, people):
@@ -109,9 +115,9 @@ def test_cameras_that_know_no_empty_scene_and_those_without_a_mask_are_left_as_t
     images = filmed(scenes, people, [(shadow, DARK) for shadow in shadows])
     masks = [person | shadow for person, shadow in zip(people, shadows, strict=True)]
     models = [model for _, model in scenes]
-    given = cut_floor_shadows(tables, images, [None, *models[1:]], [masks[0], None, *masks[2:]])
+    given = cut_by_views(tables, images, [None, *models[1:]], [masks[0], None, *masks[2:]])
     assert given[0] is masks[0] and given[1] is None and given[2].sum() < masks[2].sum()
-    assert cut_floor_shadows(tables, images, [None] * 4 + models[4:], masks) == tuple(masks)
+    assert cut_by_views(tables, images, [None] * 4 + models[4:], masks) == tuple(masks)
 
 
 def bands(people):

@@ -37,14 +37,15 @@ def on_uncovered_pixels(
     -------
     ndarray of bool, shape (m,)
     """
-    new = np.zeros(len(candidates), bool)
+    new, left = np.zeros(len(candidates), bool), np.arange(len(candidates))
     for camera, mask in zip(rig, masks, strict=True):
         if mask is None:
             continue
-        column, row, in_image = pixel_of_voxel(camera, candidates)
+        column, row, in_image = pixel_of_voxel(camera, candidates[left])
         seen = np.flatnonzero(in_image & mask.ravel().take(row * camera.size[0] + column))
         covered, step = _covered(camera, known, spacing_m)
-        new[seen] |= ~covered[row.take(seen) // step, column.take(seen) // step]
+        new[left.take(seen)] = ~covered[row.take(seen) // step, column.take(seen) // step]
+        left = left[~new[left]]  # one camera is enough
     return new
 
 
