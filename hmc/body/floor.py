@@ -8,17 +8,20 @@ from __future__ import annotations
 
 import numpy as np
 
+from hmc.body.feet import foot_places
 from hmc.body.joints import SEGMENTS
 from hmc.body.limbs import LIMBS
 from hmc.body.model import BodyModel
 from hmc.body.proportions import sole_ends
 
-__all__ = ["HANG_M", "SINK_M", "above_floor", "floor_gap", "lowest_support"]
+__all__ = ["HANG_M", "SINK_M", "STANDING_M", "above_floor", "floor_gap", "lowest_support", "off_floor", "sole_places"]
 
 #: A lowest point this far above the floor is still standing (on tiptoe, on a mat, in the middle of a step), metres ...
 HANG_M = 0.10
 #: ... and this far below it (a shallow error of the calibration), metres.
 SINK_M = 0.05
+#: A sole that is known to stand is no farther from the floor than this, metres: so well is a floor known, and so thick is a mat.
+STANDING_M = 0.015
 
 _SHANKS = np.array([LIMBS[leg].segments[1] for leg in ("r_leg", "l_leg")])
 _FEET = np.array([[one.name for one in SEGMENTS].index(f"{side}_foot") for side in "rl"])
@@ -54,6 +57,12 @@ def above_floor(height: np.ndarray, floor_z: float) -> np.ndarray:
     return height - np.minimum(np.maximum(height, -SINK_M), HANG_M)
 
 
+def off_floor(height: np.ndarray, floor_z: float) -> np.ndarray:
+    """How far a sole that stands is above the band in which it may be, or below it (negative), metres."""
+    height = height - floor_z
+    return height - np.clip(height, -STANDING_M, STANDING_M)
+
+
 def lowest_support(body: BodyModel, rotations: np.ndarray, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The lowest of both knees and of the heels and balls of both soles.
 
@@ -73,3 +82,30 @@ def lowest_support(body: BodyModel, rotations: np.ndarray, positions: np.ndarray
     lowest = points[..., 2].argmin(axis=1)
     rows = np.arange(len(points))
     return points[rows, lowest, 2], points[rows, lowest], _BEARERS[lowest]
+
+
+def sole_places(body: BodyModel, rotations: np.ndarray, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where both soles bear: heel and ball of the left foot, then of the right one.
+
+    Parameters
+    ----------
+    body : BodyModel
+        With feet.
+    rotations : ndarray, shape (n, 16, 3, 3)
+    positions : ndarray, shape (n, 16, 3)
+        As from `hmc.body.kinematics.segment_transforms`.
+
+    Returns
+    -------
+    points : ndarray, shape (n, 4, 3)
+        World, metres.
+    segment : ndarray of int, shape (4,)
+        What carries each.
+    """
+    places = foot_places(body)
+    if places is None:
+        return np.zeros((len(rotations), 0, 3)), np.zeros(0, int)
+    segments, ends = places
+    ends = ends.reshape(2, 2, 3)  # foot, heel and toe
+    bearing = np.stack([ends[:, 0] + share * (ends[:, 1] - ends[:, 0]) for share in _BEARING], axis=1).reshape(-1, 3)
+    return positions[:, segments] + (rotations[:, segments] @ bearing[..., None])[..., 0], segments

@@ -32,6 +32,7 @@ from hmc.io.masks import kept_frames
 from hmc.io.recording import Recording, spread_frames
 from hmc.io.results import PoseStates, TrackTable
 from hmc.pose.anew import doubtful_frames, pose_anew
+from hmc.pose.contacts import standing_feet
 from hmc.pose.follow import FollowOptions, PosedPeople
 from hmc.pose.keypoint_cues import beside_body, learn_beside, with_keypoints
 from hmc.pose.method import SURFACE_POINTS, Capture, PoseMethod, Subject, make_subject, other_rng
@@ -130,7 +131,9 @@ def backward(
     grid = person_grid(recording, options.voxel_size_m)
     places = learn_hidden_places(recording.rig, grid, run, people.states) if settings.hidden_places else None
     first_bodies = make_bodies(people.states.bodies, method.limits)
-    pass_ = _Pass(recording, tracks, settings, options, run, capture, people.states, first_bodies, places)
+    floor_z = float(recording.room[0, 2])
+    standing = standing_feet(people.states, first_bodies, recording.fps, floor_z) if settings.standing_feet else {}
+    pass_ = _Pass(recording, tracks, settings, options, run, capture, people.states, first_bodies, places, standing)
     records = open_journal(run.journal, with_angles(run.key), run.on_problem)
     if records:
         bodies = make_bodies({int(person): body for person, body in records[0]["bodies"].items()}, method.limits)
@@ -166,6 +169,7 @@ class _Pass:
     states: PoseStates
     bodies: Mapping[int, BodyModel]
     places: HiddenPlaces | None
+    standing: Mapping[int, Mapping[int, tuple[bool, bool]]]
 
     def each(self, make: Callable[[Sequence[int]], Iterator[T]], frames: Sequence[int]) -> Iterator[T]:
         """What is made of each of some frames, made ahead by processes."""
@@ -177,7 +181,7 @@ class _Pass:
         made = self._made([frame for frame in frames if self.recent(frame) is None])
         for frame in frames:
             recent = self.recent(frame)
-            views = next(made) if recent is None else recent
+            views = self._on_their_feet(frame, next(made) if recent is None else recent)
             if not self.settings.own_rays:
                 yield frame, views
                 continue
@@ -188,6 +192,16 @@ class _Pass:
                 for person, row in zip(self.states.persons[rows].tolist(), rows, strict=True)
             }
             yield frame, {person: with_own_rays(view, person, poses) for person, view in views.items()}
+
+    def _on_their_feet(self, frame: int, views: dict[int, PersonView]) -> dict[int, PersonView]:
+        """The same with what is known of who stands."""
+        known = {person: self.standing.get(person, {}).get(frame, (False, False)) for person in views}
+        return {
+            person: replace(view, target=replace(view.target, standing=known[person]))
+            if view.target is not None and any(known[person])
+            else view
+            for person, view in views.items()
+        }
 
     def recent(self, frame: int) -> dict[int, PersonView] | None:
         """What the first pass saw in a frame, if that is still there and nothing has been learnt of the scene since."""

@@ -42,9 +42,9 @@ class BackwardSettings:
         Frames to which it is fitted, at most.
     path : LegSettings
         What a jump of the limbs' velocities costs.
-    hidden_places, own_rays, best_way : bool
+    hidden_places, own_rays, best_way, standing_feet : bool
         False, to see what each is for: nothing is learnt of what furniture hides; rays that another's pose covers ask all the same; the
-        backward pass's poses stay as they are, and none of the first pass's are taken.
+        backward pass's poses stay as they are, and none of the first pass's are taken; feet that stand are not held to the floor.
     anew : AnewSettings or None
         Where a pose is looked for anew (`hmc.pose.anew`); None: nowhere.
     """
@@ -56,6 +56,7 @@ class BackwardSettings:
     hidden_places: bool = True
     own_rays: bool = True
     best_way: bool = True
+    standing_feet: bool = True
     anew: AnewSettings | None = field(default_factory=AnewSettings)
 
 

@@ -1,11 +1,15 @@
 """The floor under the feet, and the loose hull that reaches down to it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.optimize import approx_fprime
 
+from hmc.body.feet import foot_points
 from hmc.body.flesh import surface_coordinates
-from hmc.body.floor import HANG_M, SINK_M, floor_gap, lowest_support
+from hmc.body.floor import HANG_M, SINK_M, STANDING_M, floor_gap, lowest_support, sole_places
 from hmc.body.joints import N_DOF, SEGMENTS, dof_index
 from hmc.body.kinematics import segment_transforms
 from hmc.body.model import neutral_state
@@ -82,6 +86,56 @@ def test_hanging_costs_and_standing_does_not():
     states = np.stack([standing(leg_length()), standing(leg_length() + 0.5)])
     extra = [Symmetric(BODY, points, target, box * 0.05).cost(states) for target in (with_floor, without)]
     assert_allclose(extra[0] - extra[1], [0, SymmetricSettings().floor_weight * (0.5 - HANG_M) ** 2], atol=1e-9)
+
+
+def on_one_foot(feet):
+    """An objective of somebody of whom these feet stand, and a pose with a lifted right foot."""
+    box = np.argwhere(np.ones((4, 4, 8), bool)) + [18, 18, 12]
+    target = replace(make_target(GRID, box, box, None, 0.0), standing=feet)
+    points = body_points(BODY, surface_coordinates(BODY, 60))
+    state = standing(leg_length() + 0.04)
+    state[dof_index("r_hip_y", "r_knee_y", "r_ankle_y", "l_ankle_y")] = (-0.6, 0.7, 0.2, -0.1)
+    return Symmetric(BODY, points, target, target.surface), state
+
+
+def test_heel_and_ball_lie_between_the_ends_of_the_sole():
+    states = np.random.default_rng(0).uniform(-0.5, 0.5, (5, N_DOF))
+    soles, carriers = sole_places(BODY, *segment_transforms(BODY, states))
+    ends = foot_points(BODY, states).reshape(5, 2, 2, 3)
+    for foot in range(2):
+        heel, toe = ends[:, foot, 0], ends[:, foot, 1]
+        assert_allclose(soles[:, 2 * foot], heel + 0.1 * (toe - heel), atol=1e-12)
+        assert_allclose(soles[:, 2 * foot + 1], heel + 0.75 * (toe - heel), atol=1e-12)
+    assert [SEGMENTS[k].name for k in carriers] == ["l_foot", "l_foot", "r_foot", "r_foot"]
+
+
+@pytest.mark.parametrize("feet", [(True, False), (False, True), (True, True)])
+def test_feet_that_stand_cost_what_their_soles_are_off_the_floor(feet):
+    objective, state = on_one_foot(feet)
+    nobody, _ = on_one_foot((False, False))
+    heights = sole_places(BODY, *segment_transforms(BODY, state[None]))[0][0, np.repeat(feet, 2), 2]
+    off = [max(0.0, abs(height) - STANDING_M) for height in heights]
+    assert max(off) > 0.02
+    extra = objective.settings.standing_weight * sum(one**2 for one in off)
+    assert_allclose(objective.cost(state[None]) - nobody.cost(state[None]), extra, rtol=1e-3)
+
+
+@pytest.mark.parametrize("feet", [(True, False), (True, True)])
+def test_the_pull_of_feet_that_stand_is_the_slope_of_what_they_cost(feet):
+    objective, state = on_one_foot(feet)
+    nobody, _ = on_one_foot((False, False))
+
+    def squares(one):
+        residuals, jacobian = residual_rows(one.linearise(state))
+        return 2 * jacobian.T @ residuals
+
+    slope = approx_fprime(state, lambda x: float(extra_of(objective, nobody, x)), 1e-7)
+    assert_allclose(squares(objective) - squares(nobody), slope, atol=1e-3 * np.abs(slope).max())
+
+
+def extra_of(objective, nobody, state):
+    one, other = (residual_rows(each.linearise(state))[0] for each in (objective, nobody))
+    return one @ one - other @ other
 
 
 def test_loose_hull_is_cheap_and_reaches_the_floor():

@@ -34,7 +34,7 @@ FINISHED = MOTION | {"view"}
 FOLLOWING = PERSON | FINISHED | {"pose.finished", "pose.records", "pose.follow", "pose.keypoint_cues", "pose.keypoint_sides"}
 METHODS = STARTS | MIXTURES | {"pose.recovery", "pose.methods"}
 POSE = METHODS | FOLLOWING | {"pose.backward", "pose.clear_views", "pose.keypoint_tracks", "pose.occluders", "pose.registry"}
-POSE |= {"pose.keypoint_views", "pose.trust", "pose.trust_model"}
+POSE |= {"pose.contacts", "pose.keypoint_views", "pose.trust", "pose.trust_model"}
 METRICS = IO | {"metrics"}
 VIEW = VOXELS | {"body", "view"}
 EVERYTHING = POSE | METRICS | VIEW | {"motion", "check", "synthetic", "plugins"}
@@ -67,7 +67,8 @@ MAY_IMPORT = {
     "pose.anew": STARTS,
     "pose.mixtures": MIXTURES,
     "pose.occluders": VIEWS,
-    "pose.backward": FOLLOWING | MIXTURES | {"pose.backward", "pose.occluders"},
+    "pose.backward": FOLLOWING | MIXTURES | {"pose.backward", "pose.contacts", "pose.occluders"},
+    "pose.contacts": BODY | IO,
     "pose.clear_views": FOLLOWING,
     "pose.trust": FOLLOWING | {"pose.clear_views", "pose.trust_model"},
     "pose.trust_model": set(),

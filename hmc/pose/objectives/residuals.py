@@ -15,7 +15,7 @@ import numpy as np
 
 from hmc.body.cone_maps import ConeMaps, cone_maps
 from hmc.body.cones import places_and_directions
-from hmc.body.floor import above_floor, lowest_support
+from hmc.body.floor import above_floor, lowest_support, off_floor, sole_places
 from hmc.body.joints import N_DOF
 from hmc.body.kinematics import dof_masks, joint_twists
 from hmc.body.nearest_cone import Candidates, Nearest, candidates, nearest_cones, towards
@@ -43,9 +43,9 @@ class Distances:
     Parameters
     ----------
     residuals : ndarray, shape (n + 37,)
-        Weighted: of the body's surface, of what is to be covered, of the axes' depth, of the floor, and of the posture.
-    weights : ndarray, shape (4,)
-        Of the first four.
+        Weighted: of the body's surface, of what is to be covered, of the axes' depth, of the floor and of standing, and of the posture.
+    weights : ndarray, shape (5,)
+        Of the first three, of the floor, and of feet that stand on it.
     axes, centres : ndarray, shape (37, 3)
         The joints' twists.
     maps : ConeMaps
@@ -60,7 +60,8 @@ class Distances:
     segment, other : ndarray of int, shape (n_axes,)
         As from `penetration_rows`.
     floor : tuple of ndarray
-        As from `lowest_support`; empty where there is no floor.
+        As from `lowest_support`, and after it heights, places and carriers of the soles that stand (`sole_places`); empty where there is
+        no floor.
     spread : ndarray, shape (37,)
         Of the posture (`posture_spread`), radians.
     objective : Symmetric
@@ -125,15 +126,22 @@ def distances(objective: Symmetric, state: np.ndarray, before: Candidates | None
     gap, floor = np.zeros(0), (np.zeros(0), np.zeros((0, 3)), np.zeros(0, int))
     if target.floor_z is not None:
         floor = lowest_support(body, rotations[None], positions[None])
-        gap = above_floor(floor[0], target.floor_z)
-    sizes = np.array([len(outside), len(nearest.distance), len(depth), 1])
-    weights = np.sqrt(np.array([1, settings.uncovered_weight, settings.overlap_weight, settings.floor_weight]) / sizes)
+        gap = np.sqrt(settings.floor_weight) * above_floor(floor[0], target.floor_z)
+        if any(target.standing):
+            soles, feet = sole_places(body, rotations[None], positions[None])
+            stands = np.repeat(target.standing, 2)[: len(feet)]
+            bearing = soles[0, stands]
+            gap = np.r_[gap, np.sqrt(settings.standing_weight) * off_floor(bearing[:, 2], target.floor_z)]
+            floor = np.r_[floor[0], bearing[:, 2]], np.concatenate([floor[1], bearing]), np.r_[floor[2], feet[stands]]
+    sizes = np.array([len(outside), len(nearest.distance), len(depth), 1, 1])
+    floor_weights = settings.floor_weight, settings.standing_weight
+    weights = np.sqrt(np.array([1, settings.uncovered_weight, settings.overlap_weight, *floor_weights]) / sizes)
     spread = posture_spread(state)
     residuals = [
         weights[0] * np.minimum(outside, settings.cap_m),
         weights[1] * np.minimum(nearest.distance, settings.cap_m),
         weights[2] * depth,
-        weights[3] * gap,
+        gap,
         np.sqrt(settings.posture_weight) * (state - POSTURE[0]) / spread,
     ]
     return Distances(
@@ -164,10 +172,12 @@ def _pulls(found: Distances) -> tuple[np.ndarray, np.ndarray]:
         len(_MASKS) * found.other[deep] + found.segment[deep],
     ]
     if len(gap):
-        _, lowest, shank = found.floor
-        directions.append(np.array([[0.0, 0.0, found.weights[3]]]))
-        places.append(lowest)
-        movers.append(_TO_WORLD + shank)
+        _, bearing, carrier = found.floor
+        up = np.zeros((len(gap), 3))
+        up[:, 2] = found.weights[np.where(gap == 0, 3, 4)]
+        directions.append(up)
+        places.append(bearing[gap])
+        movers.append(_TO_WORLD + carrier[gap])
     rows = [out, n_outside + found.nearest.pulls[uncovered], n_outside + n_asked + deep, n_outside + n_asked + len(found.depth) + gap]
     n = sum(map(len, rows))
     wrenches = np.empty((n, 6))

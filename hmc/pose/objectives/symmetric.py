@@ -14,7 +14,7 @@ import numpy as np
 from hmc.body.cone_maps import ConeMaps, cone_maps, cones_near
 from hmc.body.cones import cone_shapes, places_and_directions, slide_to_axis, squared_distance
 from hmc.body.flesh import SurfaceSamples, surface_samples
-from hmc.body.floor import floor_gap
+from hmc.body.floor import floor_gap, off_floor, sole_places
 from hmc.body.kinematics import place_segments
 from hmc.body.model import PART_OF_DOF, PART_OF_SEGMENT, PARTS, BodyModel, Cones
 from hmc.body.nearest_cone import Candidates
@@ -61,6 +61,8 @@ class SymmetricSettings:
         tell apart, such as the ways to fold an arm before the chest.
     floor_weight : float
         Weight of hanging in the air or being sunk in the floor (`hmc.body.floor`).
+    standing_weight : float
+        Weight of the heights over the floor, or under it, of heel and ball of a foot that is known to stand.
     """
 
     cap_m: float = 0.06
@@ -69,6 +71,7 @@ class SymmetricSettings:
     overlap_weight: float = 2.0
     posture_weight: float = 3e-6
     floor_weight: float = 0.015
+    standing_weight: float = 0.02
 
     def __post_init__(self) -> None:
         if not 0 < self.cap_m <= MOST_CAP_M:
@@ -311,6 +314,10 @@ class Symmetric:
         gap = np.zeros(len(states))
         if self.target.floor_z is not None:
             rotations, positions = np.moveaxis(placed[:, :, :3], -1, 0), np.moveaxis(placed[:, :, 3], -1, 0)
-            gap = floor_gap(body, rotations, positions, self.target.floor_z - origin[2])
+            floor_z = self.target.floor_z - origin[2]
+            gap = settings.floor_weight * floor_gap(body, rotations, positions, floor_z) ** 2
+            if any(self.target.standing):
+                soles = sole_places(body, rotations, positions)[0][:, np.repeat(self.target.standing, 2), 2]
+                gap += settings.standing_weight * np.square(off_floor(soles, floor_z)).sum(axis=1)
         posture = settings.posture_weight * ((states - POSTURE[0]) / posture_spread(states)) ** 2
-        return outside, uncovered, asking, depth, settings.floor_weight * gap**2, posture
+        return outside, uncovered, asking, depth, gap, posture

@@ -53,6 +53,8 @@ class HullTarget:
         Height of the floor, metres, where people stand on one.
     rays : ndarray, shape (m, 6), or None
         Rays of the silhouettes that show the person (`hmc.pose.views.rays`), where these are known.
+    standing : tuple of bool
+        Whether the left foot and the right one are known to stand on the floor (`hmc.pose.contacts`).
     """
 
     distance: np.ndarray
@@ -65,6 +67,7 @@ class HullTarget:
     volume_m3: float
     floor_z: float | None = None
     rays: np.ndarray | None = None
+    standing: tuple[bool, bool] = (False, False)
 
 
 def sound_hull(strict: np.ndarray, tolerant: np.ndarray) -> np.ndarray:

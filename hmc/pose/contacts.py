@@ -1,0 +1,95 @@
+"""Which feet stand: told of a whole run from how they move.
+
+Shoes of the floor's color, and what a foot stands on, are the first that silhouettes lose, and a body that is fitted to what is left hangs
+in the air, with shanks that are too short. But who walks, runs or stands has some foot that stays where it is for a moment, and such a foot
+stands on the floor. Told from the ankles of a first pass, so that the second one can hold the soles there (`hmc.body.floor`).
+
+That a foot at rest is one that stands is how recorded motion is rid of skating feet (Kovar, Schreiner and Gleicher 2002); bounds are ours.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from hmc.body.feet import foot_points
+from hmc.body.kinematics import landmarks
+from hmc.body.model import BodyModel
+from hmc.io.results import PoseStates
+from hmc.landmarks import LANDMARKS
+
+__all__ = ["standing_feet", "standing_frames"]
+
+#: A foot stands where its ankle, over so many seconds, is slower than so much, metres a second, or than this share of its fastest within
+#: so many seconds before and after: a runner's ankle rolls on while the foot stands.
+OVER_S, SLOW_M_S, SLOW_SHARE, STRIDE_S = 0.13, 0.45, 0.25, 1.0
+#: No higher than so far above the lowest that it is within these seconds, metres ...
+LIFTED_M = 0.08
+#: ... and with its sole no farther than this from the floor, metres: what stands on a chair's rung or a step stands elsewhere.
+FROM_FLOOR_M = 0.12
+
+_ANKLES = [LANDMARKS.index("l_ankle"), LANDMARKS.index("r_ankle")]
+
+
+def standing_feet(
+    states: PoseStates, bodies: Mapping[int, BodyModel], fps: float, floor_z: float
+) -> dict[int, dict[int, tuple[bool, bool]]]:
+    """Which feet of each person stand in each frame.
+
+    Parameters
+    ----------
+    states : PoseStates
+        Rows that are not finite were not fitted.
+    bodies : mapping of int to BodyModel
+        By person.
+    fps : float
+    floor_z : float
+        Height of the floor, metres.
+
+    Returns
+    -------
+    dict of int to dict of int to tuple of bool
+        By person and frame: the left foot and the right one.
+    """
+    found = {}
+    for person, body in bodies.items():
+        rows = np.flatnonzero((states.persons == person) & np.isfinite(states.states).all(axis=1))
+        rows = rows[np.argsort(states.frames[rows])]
+        if not len(rows):
+            continue
+        own = states.states[rows]
+        ankles = landmarks(body, own)[:, _ANKLES]
+        lowest = foot_points(body, own)[..., 2].reshape(len(rows), 2, 2).min(axis=2) - floor_z
+        stand = standing_frames(states.frames[rows] / fps, ankles) & (np.abs(lowest) < FROM_FLOOR_M)
+        found[person] = {int(frame): (bool(left), bool(right)) for frame, (left, right) in zip(states.frames[rows], stand, strict=True)}
+    return found
+
+
+def standing_frames(times: np.ndarray, ankles: np.ndarray) -> np.ndarray:
+    """When each foot is at rest, and as low as it comes.
+
+    Parameters
+    ----------
+    times : ndarray, shape (n,)
+        Seconds, in order.
+    ankles : ndarray, shape (n, k, 3)
+        World, metres.
+
+    Returns
+    -------
+    ndarray of bool, shape (n, k)
+    """
+    speed = np.zeros(ankles.shape[:2])
+    for row, time in enumerate(times):
+        away = np.abs(times - time)
+        near = away <= max(OVER_S / 2, np.partition(away, min(2, len(away) - 1))[min(2, len(away) - 1)]) + 1e-6
+        t = times[near] - times[near].mean()
+        if t.any():  # the slope of a straight line through them
+            speed[row] = np.linalg.norm(np.tensordot(t, ankles[near], axes=(0, 0)) / (t @ t), axis=-1)
+    rest = np.zeros(ankles.shape[:2], bool)
+    for row, time in enumerate(times):
+        stride = np.abs(times - time) <= STRIDE_S
+        slow = np.maximum(SLOW_M_S, SLOW_SHARE * speed[stride].max(axis=0))
+        rest[row] = (speed[row] < slow) & (ankles[row, :, 2] < ankles[stride][..., 2].min(axis=0) + LIFTED_M)
+    return rest

@@ -1,0 +1,81 @@
+"""Which feet stand: walkers, runners, who stands still, who sits."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hmc.body.joints import DOF_NAMES, N_DOF, dof_index
+from hmc.body.model import neutral_state
+from hmc.body.proportions import default_body
+from hmc.io.results import PoseStates
+from hmc.pose.contacts import standing_feet, standing_frames
+
+BODY = default_body(1.8)
+LEGS = sum(BODY.dimensions[name] for name in ("thigh", "shank", "ankle_height"))
+
+
+def gait(fps, speed=1.3, stride_s=1.1, stance=0.6, seconds=4.0):
+    """Times, ankles of a walker (n, 2, 3), and whether each foot is on the ground: still in stance, on an arc in between."""
+    times = np.arange(0, seconds, 1 / fps)
+    ankles, down = np.zeros((len(times), 2, 3)), np.zeros((len(times), 2), bool)
+    for foot in range(2):
+        phase = times / stride_s + foot / 2
+        whole, part = np.floor(phase), phase % 1
+        swing = np.clip((part - stance) / (1 - stance), 0, 1)
+        ankles[:, foot, 0] = speed * stride_s * (whole + swing - np.sin(2 * np.pi * swing) / (2 * np.pi))
+        ankles[:, foot, 2] = 0.09 + 0.15 * np.sin(np.pi * swing)
+        down[:, foot] = part < stance
+    return times, ankles, down
+
+
+@pytest.mark.parametrize("fps", [15, 25, 60])
+@pytest.mark.parametrize("speed, stride_s, stance", [(1.3, 1.1, 0.6), (3.0, 0.7, 0.35)])
+def test_a_foot_of_a_walker_or_runner_stands_in_stance(fps, speed, stride_s, stance):
+    times, ankles, down = gait(fps, speed, stride_s, stance)
+    found = standing_frames(times, ankles + np.random.default_rng(0).normal(0, 0.004, ankles.shape))
+    middle = down.copy()
+    for shift in range(1, 1 + round(0.08 * fps)):  # not where a foot comes down or leaves
+        middle &= np.roll(down, shift, 0) & np.roll(down, -shift, 0)
+    assert found[middle].mean() > 0.9
+    swung = ~down
+    for shift in range(1, 1 + round(0.08 * fps)):
+        swung &= ~np.roll(down, shift, 0) & ~np.roll(down, -shift, 0)
+    assert found[swung].mean() < 0.05
+
+
+@given(st.integers(1, 12), st.integers(0, 2**32 - 1))
+def test_any_times_will_do(n, seed):
+    rng = np.random.default_rng(seed)
+    times = np.cumsum(rng.choice([0.03, 0.1, 2.0], n))
+    found = standing_frames(times, rng.normal(size=(n, 2, 3)))
+    assert found.shape == (n, 2) and found.dtype == bool
+
+
+def states_of(states):
+    return PoseStates(np.arange(len(states)), np.zeros(len(states), int), np.array(states), DOF_NAMES, {0: BODY.dimensions})
+
+
+def poses(pelvis_z, lifted=0.0, n=20):
+    state = neutral_state()
+    state[2] = pelvis_z
+    state[dof_index("r_hip_y", "r_knee_y")] = -lifted, lifted
+    return [state] * n
+
+
+def test_who_stands_still_stands_on_both_feet_and_who_lifts_one_on_the_other():
+    both = standing_feet(states_of(poses(LEGS)), {0: BODY}, 30.0, 0.0)
+    assert set(both[0].values()) == {(True, True)} and len(both[0]) == 20
+    one = standing_feet(states_of(poses(LEGS, 1.3)), {0: BODY}, 30.0, 0.0)
+    assert set(one[0].values()) == {(True, False)}
+
+
+def test_who_is_high_above_the_floor_stands_on_something_else():
+    assert set(standing_feet(states_of(poses(LEGS + 0.3)), {0: BODY}, 30.0, 0.0)[0].values()) == {(False, False)}
+    assert set(standing_feet(states_of(poses(LEGS + 0.3)), {0: BODY}, 30.0, 0.3)[0].values()) == {(True, True)}
+
+
+def test_frames_without_a_pose_tell_nothing():
+    lost = [*poses(LEGS, n=5), np.full(N_DOF, np.nan), *poses(LEGS, n=5)]
+    found = standing_feet(states_of(lost), {0: BODY}, 30.0, 0.0)[0]
+    assert sorted(found) == [0, 1, 2, 3, 4, 6, 7, 8, 9, 10] and set(found.values()) == {(True, True)}
