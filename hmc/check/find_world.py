@@ -179,5 +179,6 @@ def _scale(rig: Rig, ground: Ground | None, points: GroundPoints | None, known: 
             return told(unit, f"the calibration is in {name}")
     raise InputError(
         f"people come out {ground.stature:.3g} units tall, which is no usual unit; give --unit METRES (a unit of the calibration: the side "
-        "of its board's squares, mostly), --distance CAMERA,CAMERA,METRES or --height METRES (their stature)"
+        f"of its board's squares, mostly; {1.75 / ground.stature:.3g} if they are 1.75 m tall), "
+        "--distance CAMERA,CAMERA,METRES or --height METRES (their stature)"
     )

@@ -40,6 +40,8 @@ Say = Callable[[str, Iterable[str]], None]
 #: Frames that are read unless all are asked for, and how many of them the silhouettes are compared in.
 PROBE_FRAMES = 90
 COMPARED_FRAMES = 3
+#: Files without a camera that are told one by one, at most.
+MANY_FILES = 12
 #: Background frames below which an adaptive model is not settled yet.
 FEW_BACKGROUND_FRAMES = 10
 
@@ -132,7 +134,7 @@ def inspect_recording(path: AnyPlaces, cameras: Sequence[str] | None = None, rea
         return Inspection(_sorted(found))
     own = [views.get(camera.name) for camera in rig]
     say("error", wrong_sizes(rig, own))
-    say("error", wrong_units(rig))
+    say("error", wrong_units(rig, path))
     say("warning", gaps(own))
     say("note", rates([view.fps for view in own if view is not None]))
     say("warning", itertools.chain.from_iterable(odd_camera(camera) for camera in rig))
@@ -225,13 +227,21 @@ def named_files(path: Path, names: Sequence[str], settings: Mapping[str, Any]) -
 
 
 def unused_views(path: Path, names: Sequence[str], files: set[Path]) -> list[str]:
-    """A sentence for each video or image folder without a camera in the calibration."""
-    return [
-        f"{item}: no camera of this name in the calibration; it is not used"
-        for kind in FILES
-        for item in footage_items(path / kind)
-        if item_name(item) not in names and not any(Path(realpath(item)) in (file, *file.parents) for file in files)
-    ]
+    """A sentence for each video or image folder without a camera in the calibration; of many in one folder, one for all."""
+    sentences = []
+    for kind in FILES:
+        unused = [
+            item
+            for item in footage_items(path / kind)
+            if item_name(item) not in names and not any(Path(realpath(item)) in (file, *file.parents) for file in files)
+        ]
+        if len(unused) > MANY_FILES:
+            sentences.append(
+                f"{path / kind}: {len(unused)} files and folders with no camera's name ({unused[0].name}, ...); they are not used"
+            )
+        else:
+            sentences.extend(f"{item}: no camera of this name in the calibration; it is not used" for item in unused)
+    return sentences
 
 
 def rates(fps: Sequence[float | None]) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from shlex import quote
 
 import numpy as np
 
@@ -40,7 +41,8 @@ def world_findings(recording: Recording, masks: Sequence[Masks]) -> list[str]:
     if len(rig) < 3 or not shown:
         return []
     figures = find_figures(rig, shown)
-    cure = f"find up, the floor and the scale by: hmc world {recording.path}"
+    place = quote(str(recording.path))
+    cure = f"find up, the floor and the scale by: hmc world {place}"
     if not figures:
         return []  # that silhouettes do not meet is told by how far they agree
     ground = find_ground(rig, figures)
@@ -53,9 +55,7 @@ def world_findings(recording: Recording, masks: Sequence[Masks]) -> list[str]:
             said = f"people come out {ground.stature:.3g} m tall"
             covered = covered_shares(recording, shown)
             if np.isfinite(covered).any() and np.nanmedian(covered) < IN_TIME:
-                return [
-                    f"{said}, and little of what cameras see fits together: are they out of time (hmc sync {recording.path})? Else {cure}"
-                ]
+                return [f"{said}, and little of what cameras see fits together: are they out of time (hmc sync {place})? Else {cure}"]
             return [f"{said}; the calibration is in other units than metres; {cure}"]
     if not any(_inside(one, room) >= INSIDE for one in figures):
         where = ", ".join(f"{value:.1f}" for value in np.median(np.concatenate([one.points for one in figures]), axis=0))

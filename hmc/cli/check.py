@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from shlex import quote
 
 from hmc.cli.common import add_session_option, camera_names, given_places, output_path
 from hmc.io.files import real_path
@@ -48,6 +49,9 @@ def run(args: argparse.Namespace) -> int:
         wrong = [str(finding) for finding in inspection.findings if finding.severity != "note"]
         write_figure(out, rig_figure(inspection.rig, inspection.room, inspection.images, "\n".join([verdict, *wrong])), dpi=90)
         print(f"picture: {out}")
+    if inspection.usable and args.session is None:
+        chosen = f" --cameras {quote(','.join(args.cameras))}" if args.cameras else ""
+        print(f"next: hmc pose {quote(str(args.recording))} --out {quote(f'{name}-result')}{chosen}")
     print(verdict)
     return 0 if inspection.usable else 2
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from shlex import quote
 
 from hmc.cli.common import add_session_option, given_places, output_path, positive_float
 from hmc.io.files import real_path
@@ -124,4 +125,6 @@ def run(args: argparse.Namespace) -> int:
             print(line)
         if (args.recording / "truth").is_dir():
             print(f"{args.recording / 'truth'} is still in the old world")
+        if args.session is None:
+            print(f"next: hmc check {quote(str(args.recording))}")
     return 0

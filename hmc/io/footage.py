@@ -109,7 +109,7 @@ def find_footage(folder: Path, name: str, first_number: int | None = None, count
     if not folder.is_dir():
         return None
     if (folder / name).is_dir():
-        return open_images(folder / name, first_number)
+        return _open_folder(folder / name, first_number, count)
     for path in sorted(folder.iterdir()):
         if path.stem == name and path.suffix.lower() in VIDEO_SUFFIXES:
             return open_video(path, count)
@@ -124,12 +124,24 @@ def open_files(files: Sequence[Path], first_number: int | None = None, count: bo
         return None
     path = files[0]
     if path.is_dir():
-        return open_images(path, first_number)
+        return _open_folder(path, first_number, count)
     if path.suffix.lower() not in IMAGE_SUFFIXES:
         return open_video(path, count)
     if len(files) == 1:
         return _footage_of_images(path, {0: path})
     return _footage_of_images(path.parent, number_files(files), first_number or 0)
+
+
+def _open_folder(folder: Path, first_number: int | None, count: bool) -> Footage:
+    """A camera's folder: its images, or the one video in it, as cameras that name files themselves leave it."""
+    videos = sorted(path for path in folder.iterdir() if path.suffix.lower() in VIDEO_SUFFIXES)
+    if not videos or number_images(folder):
+        return open_images(folder, first_number)
+    if len(videos) > 1:
+        raise InputError(
+            f"{folder}: {len(videos)} videos in a camera's folder ({videos[0].name}, {videos[1].name}); leave one, or join them"
+        )
+    return open_video(videos[0], count)
 
 
 def open_video(path: Path, count: bool = True) -> Footage:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import glob
 import re
+import unicodedata
 from collections.abc import Mapping, Sequence
 from os.path import realpath
 from pathlib import Path
@@ -107,7 +108,8 @@ def item_name(item: Path) -> str:
 
 def tokens_of(name: str) -> tuple[str, ...]:
     """A name's words and numbers, without case, punctuation and leading zeros: ``Camera_01`` and ``cam1`` are ("cam", "1")."""
-    parts = re.findall(r"[^\W\d_]+|\d+", name.casefold())
+    # Some systems write an umlaut as two signs, which look the same and are not.
+    parts = re.findall(r"[^\W\d_]+|\d+", unicodedata.normalize("NFC", name).casefold())
     return tuple(part.lstrip("0") or "0" if part.isdigit() else SAME_WORDS.get(part, part) for part in parts)
 
 
@@ -134,9 +136,23 @@ def _guess(recording: Path, kind: str, names: Sequence[str], items: Sequence[Pat
         if len(candidates) > 1 or rivals:
             what = f"camera '{name}' may be {' or '.join(item.name for item in candidates[:2])}" if len(candidates) > 1 else ""
             what = what or f"{candidates[0].name} may be camera '{name}' or '{rivals[0]}'"
+            pattern = _pattern_of(recording, kind, names, candidates[0])
+            if pattern is not None:
+                raise InputError(f'{recording / kind}: {what}; if these are numbered images, write in recording.toml: {kind} = "{pattern}"')
             file = candidates[0].relative_to(recording).as_posix()
             raise InputError(f'{recording / kind}: {what}; say which in recording.toml: {kind} = {{ "{name}" = "{file}", ... }}')
     return {name: candidates[0] for name, candidates in fitting.items() if candidates}
+
+
+def _pattern_of(recording: Path, kind: str, names: Sequence[str], image: Path) -> str | None:
+    """The pattern by which each camera has images of its own, of those that begin with its name; None where there is none."""
+    if image.suffix.lower() not in IMAGE_SUFFIXES or not image.is_file():
+        return None
+    for part in ("_", "-", "."):
+        pattern = f"{kind}/{PLACE}{part}*{image.suffix}"
+        if all(next(recording.glob(pattern.replace(PLACE, glob.escape(name))), None) is not None for name in names):
+            return pattern
+    return None
 
 
 def _in_place(path: Path) -> tuple[Path, ...]:

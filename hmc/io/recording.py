@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from shlex import quote
 from typing import Any
 
 import numpy as np
@@ -225,7 +226,7 @@ def open_recording(
         rig = Rig(tuple(fitted(build_camera(entry, sizes, world), sizes, settings) for entry in entries))
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-    units = () if any_world else wrong_units(rig)
+    units = () if any_world else wrong_units(rig, path)
     for problem in (*missing_views(path, names, both), *wrong_sizes(rig, footage), *wrong_sizes(rig, silhouettes), *units):
         raise InputError(problem)
 
@@ -414,21 +415,22 @@ def wrong_sizes(rig: Rig, views: Sequence[Footage | None]) -> list[str]:
     """One sentence for each camera whose images have not the size of its calibration."""
     return [
         f"{view.path}: images are {_by(view.size)} but the calibration of '{camera.name}' says {_by(camera.size)}; "
-        f"{size_cure(camera.size, view.size)}"
+        f"{size_cure(camera.size, view.size, camera.matrix[:2, 2])}"
         for camera, view in zip(rig, views, strict=True)
         if view is not None and view.size != camera.size
     ]
 
 
-def wrong_units(rig: Rig) -> list[str]:
-    """A sentence when the cameras stand so far away that the calibration must be in millimetres or centimetres."""
+def wrong_units(rig: Rig, path: Path | None = None) -> list[str]:
+    """A sentence, with the command to run, when cameras stand so far away that the calibration must be in millimetres or centimetres."""
     distance = float(np.median(np.linalg.norm([camera.translation for camera in rig], axis=1)))
     if distance <= MAX_CAMERA_DISTANCE_M:
         return []
     unit, name, other = ("cm", "centimetres", "mm") if distance < LEAST_MM else ("mm", "millimetres", "cm")
     return [
         f"calibration: cameras stand {distance:,.0f} m from the origin, which looks like {name}; "
-        f'write units = "{unit}" (or "{other}") in recording.toml, or let it be found out by: hmc world RECORDING'
+        f'write units = "{unit}" (or "{other}") in recording.toml, or let it be found out by: '
+        f"hmc world {quote(str(path)) if path else 'RECORDING'}"
     ]
 
 

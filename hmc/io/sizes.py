@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+
+import numpy as np
 
 from hmc.camera.model import Camera
 from hmc.errors import InputError
@@ -14,6 +17,8 @@ __all__ = ["FITS", "fit_size", "size_cure"]
 FITS = ("scaled", "padded")
 #: Codecs fill images up to multiples of 8, 16 or 32.
 MAX_PADDING_PX = 31
+#: Share of a side by which an optical centre may be off the middle.
+MIDDLE = 0.12
 #: Nobody scales images by less than this.
 NEARLY_ONE = 0.05
 
@@ -48,9 +53,13 @@ def fit_size(camera: Camera, size: tuple[int, int], fit: str) -> Camera:
     )
 
 
-def size_cure(calibrated: tuple[int, int], size: tuple[int, int]) -> str:
-    """What to do about images of another size than the calibration's: a clause."""
+def size_cure(calibrated: tuple[int, int], size: tuple[int, int], optical_centre: Sequence[float] | np.ndarray) -> str:
+    """What to do about images of another size than the calibration's: a clause. The optical centre (u, v) is the calibration's, pixels."""
     if size == calibrated[::-1] and size[0] != size[1]:
+        # Whose optical centre is in the middle of the images was calibrated with such, and height and width changed places in the file.
+        off = [float(np.abs(np.divide(optical_centre, sides) - 0.5).max()) for sides in (calibrated, size)]
+        if off[1] < MIDDLE < off[0]:
+            return f"their middle is the optical centre: write size = [{size[0]}, {size[1]}] (width, height) in the calibration"
         return "they are turned by 90 degrees (a phone's rotation flag?): turn them back, or calibrate with images that are turned alike"
     factor = common_factor(calibrated, size)
     padded = is_padded(calibrated, size)

@@ -13,6 +13,7 @@ import numpy as np
 from hmc.camera.model import Rig
 from hmc.errors import InputError
 from hmc.io.footage import Footage, find_footage, in_time, number_files, number_images, open_files, starting_at
+from hmc.io.layouts import layout_line, shifted_line
 from hmc.io.naming import Found, find_files, footage_items, item_name
 from hmc.io.timing import nearest_frames
 
@@ -197,6 +198,15 @@ def missing_views(path: Path, names: Sequence[str], views: Sequence[Footage | No
         return []
     used = {view.path for view in views if view is not None}
     spare = next((item for item in footage_items(path / "videos") if item not in used and item_name(item) not in names), None)
+    shifted = shifted_line(path, names)
+    if shifted is not None and not told:
+        return [
+            f"{path}: videos and cameras are numbered from different numbers, so the same name may mean different cameras; if both are "
+            f"in the same order, write in recording.toml: {shifted}"
+        ]
+    line = None if any(views) else layout_line(path, names)
+    if line is not None and not told:
+        return [f"{path}: no videos/, images/ or silhouettes/ with the cameras' names; write in recording.toml: {line}"]
     cure = f'say whose is whose in recording.toml: videos = {{ "{lost[0]}" = "videos/{spare.name if spare else "FILE.mp4"}", ... }}'
     if not any(views) and not told:
         return [f"{path}: no videos/, images/ or silhouettes/ with the cameras' names ({', '.join(names)}); name them so, or {cure}"]

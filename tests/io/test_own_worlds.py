@@ -296,7 +296,7 @@ def test_turned_images_are_called_so(recording_folder, ring):
 def test_the_cure_that_is_proposed_works(ring, calibrated, size, words):
     from hmc.io.sizes import size_cure
 
-    cure = size_cure(calibrated, size)
+    cure = size_cure(calibrated, size, np.divide(calibrated, 2))
     assert words in cure
     fit = re.search(r'image_size = "(\w+)"', cure)
     if fit:

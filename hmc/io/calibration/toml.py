@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import re
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -86,8 +88,8 @@ def write_calibration(path: str | Path, rig: Iterable[Camera]) -> None:
         distortions = camera.distortions if camera.distortions[4] else camera.distortions[:4]
         rows = ", ".join(_numbers(row) for row in camera.matrix)
         blocks.append(
-            f"[{camera.name}]\n"
-            f'name = "{camera.name}"\n'
+            f"[{_key(camera.name)}]\n"
+            f"name = {_text(camera.name)}\n"
             f"size = [{camera.size[0]}, {camera.size[1]}]\n"
             f"matrix = [{rows}]\n"
             f"distortions = {_numbers(distortions)}\n"
@@ -96,6 +98,15 @@ def write_calibration(path: str | Path, rig: Iterable[Camera]) -> None:
             f"fisheye = false\n"
         )
     Path(path).write_text("\n".join(blocks), encoding="utf-8")
+
+
+def _key(name: str) -> str:
+    """A name as a key: bare where TOML allows that, as a dot in it would make a table in a table, and a space none at all."""
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _text(name)
+
+
+def _text(name: str) -> str:
+    return json.dumps(name, ensure_ascii=False)
 
 
 def _numbers(values: np.ndarray) -> str:
