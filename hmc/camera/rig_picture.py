@@ -19,6 +19,8 @@ __all__ = ["draw_rig", "draw_view", "rig_figure"]
 LINE_POINTS = 60
 #: Below the title of a picture stand so many lines of so many letters, at most.
 MOST_LINES, MOST_LETTERS = 5, 150
+#: Width of a bold letter, and where a camera's name may stand above its place, first choice first; points.
+LETTER_POINTS, OFFSETS_POINTS = 7.0, (7.0, -19.0, 22.0, -34.0, 37.0)
 
 
 def draw_rig(rig: Rig, room: np.ndarray, ax=None):
@@ -53,6 +55,8 @@ def draw_rig(rig: Rig, room: np.ndarray, ax=None):
     (x0, y0), (x1, y1) = room[:, :2]
     ax.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, fill=False, color="tab:red", linewidth=2, label="room"))
     length = 0.5 * float(np.ptp(corners, axis=0).max())
+    point_m = float(np.ptp([low, high], axis=0).max()) / (min(ax.bbox.width, ax.bbox.height) * 72 / ax.figure.dpi)
+    taken: list[np.ndarray] = []
     for index, camera in enumerate(rig):
         color = f"C{index % 10}"
         x, y, z = camera.centre
@@ -61,9 +65,11 @@ def draw_rig(rig: Rig, room: np.ndarray, ax=None):
         ax.plot(*cone.T, color=color, linewidth=0.8)
         ax.plot(x, y, "o", color=color, markersize=8)
         side = 1 if x < corners[:, 0].mean() else -1
-        where = {"xytext": (7 * side, 7), "textcoords": "offset points", "ha": "left" if side > 0 else "right"}
+        name = f"{camera.name} ({z:.1f} m)"
+        above = _free_offset(name, np.array([x, y]), side, point_m, taken)
+        where = {"xytext": (7 * side, above), "textcoords": "offset points", "ha": "left" if side > 0 else "right"}
         box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 1.5}
-        ax.annotate(f"{camera.name} ({z:.1f} m)", (x, y), color=color, weight="bold", bbox=box, **where)
+        ax.annotate(name, (x, y), color=color, weight="bold", bbox=box, **where)
     ax.plot(0, 0, "k+", markersize=12, label="origin")
     for axis, (x, y) in (("x", (1, 0)), ("y", (0, 1))):
         ax.annotate("", (x, y), (0, 0), arrowprops={"arrowstyle": "->", "color": "black"})
@@ -107,6 +113,18 @@ def view_cone(camera: Camera, length: float, floor: float = 0.0) -> np.ndarray:
     points = camera.centre[:2] + np.vstack([rays[:, :2] * (distance / across)[:, None], 1e-3 * np.eye(2), -1e-3 * np.eye(2)])
     outline = points[ConvexHull(points).vertices]
     return np.vstack([outline, outline[:1]])
+
+
+def _free_offset(name: str, place: np.ndarray, side: int, point_m: float, taken: list[np.ndarray]) -> float:
+    """How many points above a camera its name stands so that it covers none of `taken`, which grows by it; by usual widths of letters."""
+    width, height = LETTER_POINTS * np.array([len(name) * point_m, 2 * point_m])
+    for above in OFFSETS_POINTS:
+        low = place + [7 * side * point_m - (width if side < 0 else 0), above * point_m]
+        box = np.array([low, low + [width, height]])
+        if not any((box[0] < other[1]).all() and (other[0] < box[1]).all() for other in taken):
+            break
+    taken.append(box)
+    return above
 
 
 def draw_view(camera: Camera, room: np.ndarray, image: np.ndarray | None, ax=None):

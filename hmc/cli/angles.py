@@ -38,9 +38,11 @@ def run(args: argparse.Namespace) -> int:
     print(f"wrote {out}")
     if args.plot is not None:
         from hmc.io.files import atomic_write
+        from hmc.io.results import read_joints
+        from hmc.motion.clinical import doubtful_angles
         from hmc.view.motion_plots import draw_angles
 
-        figure = draw_angles(table)
+        figure = draw_angles(table, doubtful=doubtful_angles(table, read_joints(args.result / "joints.csv")))
         with atomic_write(args.plot, "wb") as file:
             figure.savefig(file, format=args.plot.suffix[1:].lower(), dpi=110)
         print(f"wrote {args.plot}")

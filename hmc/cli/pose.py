@@ -216,7 +216,8 @@ def _run(args: argparse.Namespace, held: ExitStack) -> int:
     faults: list[CameraFault] = []
 
     stages = [TRACKING] * (given is None) + [FIRST_POSE, FOLLOWING] + [FITTING, SECOND_PASS] * (method.back is not None) + [VIEWS]
-    bar = RunBar(stages, recording.n_frames, recording.persons or 1, args.quiet)
+    megapixels = sum(camera.size[0] * camera.size[1] for camera in recording.rig) / 1e6
+    bar = RunBar(stages, recording.n_frames, recording.persons or 1, args.quiet, megapixels=megapixels)
 
     def kept(journal: str, stage: str, first: str | None = None) -> RunOptions:
         """The run of a stage; the tracker leaves its silhouettes for the poses."""

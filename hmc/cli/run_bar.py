@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
@@ -14,10 +15,13 @@ T = TypeVar("T")
 LEARNING, TRACKING, FIRST_POSE, FOLLOWING = "learning the empty scene", "tracking", "first pose", "following"
 FITTING, SECOND_PASS, VIEWS = "fitting bodies", "second pass", "counting views"
 
-#: What a frame of a stage costs beside a frame that is tracked, and a halt for each person: in the midst of five runs of 1 and 2 people, 4
-#: and 7 cameras, 1 and 2 processes. As soon as something is measured, these say only how the rest compares with it.
-FRAME_COSTS = {TRACKING: 1.0, FOLLOWING: 0.5, SECOND_PASS: 0.35, VIEWS: 0.1}
-HALT_COSTS = {FIRST_POSE: 60.0, FITTING: 18.0}
+#: What a frame of a stage costs beside a tracked frame of `USUAL_MEGAPIXELS`, and a halt for each person: in the midst of eight runs of 1
+#: to 3 people and 4 to 7 cameras. As soon as something is measured, these say only how the rest compares with it.
+FRAME_COSTS = {TRACKING: 1.0, FOLLOWING: 0.5, SECOND_PASS: 0.75, VIEWS: 0.05}
+HALT_COSTS = {FIRST_POSE: 42.0, FITTING: 30.0}
+#: Five images of 640 x 480, and the share of a tracked frame's cost that does not grow with the images; fitting bodies knows no images.
+USUAL_MEGAPIXELS, SAME_SHARE = 1.5, 0.6
+USUAL_COLUMNS = 100
 #: Those that cost more with more people.
 OF_PEOPLE = (FOLLOWING, SECOND_PASS, VIEWS)
 #: Frames of a stage from which on its own speed is believed, and the share of a halt that is left at least while it lasts.
@@ -38,12 +42,21 @@ class RunBar:
         Nothing is shown.
     clock : callable
         Gives seconds.
+    megapixels : float
+        Of the images of all cameras in one frame, millions of pixels.
     """
 
     def __init__(
-        self, stages: Iterable[str], frames: int, people: int = 1, quiet: bool = False, clock: Callable[[], float] = time.monotonic
+        self,
+        stages: Iterable[str],
+        frames: int,
+        people: int = 1,
+        quiet: bool = False,
+        clock: Callable[[], float] = time.monotonic,
+        megapixels: float = USUAL_MEGAPIXELS,
     ) -> None:
         self.people = max(1, people)
+        self._tracked = SAME_SHARE + (1 - SAME_SHARE) * megapixels / USUAL_MEGAPIXELS
         self._stages, self._frames, self._quiet, self._clock = list(stages), frames, quiet, clock
         self._begun = self._since = clock()
         self._name: str | None = None
@@ -102,14 +115,25 @@ class RunBar:
             return max(left * one - max(0.0, spent), LEAST_SHARE * one * (stage == self._name))
         if stage not in FRAME_COSTS:
             return 0.0
-        done = self._done.get(stage, 0)
+        rate = self._rate(stage)
+        followed = self._rate(FOLLOWING)
+        # The same work again: people who are near each other are slow in both.
+        if rate is None and stage == SECOND_PASS and followed is not None:
+            rate = followed * FRAME_COSTS[SECOND_PASS] / FRAME_COSTS[FOLLOWING]
+        if rate is None:
+            rate = self._cost(stage) * unit
+        return rate * max(0, self._totals.get(stage, self._frames) - self._done.get(stage, 0))
+
+    def _rate(self, stage: str) -> float | None:
+        """Seconds a frame, as measured in the stage itself; None before there is enough of it."""
         # Frames of which nobody has a pose yet tell nothing of the speed at which people are followed.
         before, seconds = self._before if stage == FOLLOWING else (0, 0.0)
-        enough = done - before >= ENOUGH_FRAMES
-        rate = (self._seconds.get(stage, 0.0) - seconds) / (done - before) if enough else self._cost(stage) * unit
-        return rate * max(0, self._totals.get(stage, self._frames) - done)
+        done = self._done.get(stage, 0) - before
+        return (self._seconds.get(stage, 0.0) - seconds) / done if done >= ENOUGH_FRAMES else None
 
     def _cost(self, stage: str) -> float:
+        if stage == TRACKING:
+            return FRAME_COSTS[stage] * self._tracked
         return FRAME_COSTS[stage] * (self.people if stage in OF_PEOPLE else 1)
 
     def _unit(self) -> float | None:
@@ -145,7 +169,9 @@ class RunBar:
         from tqdm import tqdm
 
         counted = ": {percentage:3.0f}%|{bar}| {n_fmt}/{total_fmt} frames" if total else ""
-        self._bar = tqdm(total=total, desc=name, dynamic_ncols=True, file=sys.stderr, bar_format="{desc}" + counted + "{postfix}")
+        # A terminal that says it has no columns (some pseudo-terminals do) would be shown nothing at all.
+        width: dict[str, Any] = {"dynamic_ncols": True} if _columns() != 0 else {"ncols": USUAL_COLUMNS}
+        self._bar = tqdm(total=total, desc=name, file=sys.stderr, bar_format="{desc}" + counted + "{postfix}", **width)
         self._show(0)
 
     def _close(self) -> None:
@@ -162,6 +188,14 @@ class RunBar:
         self._bar.set_postfix_str(words, refresh=not frames)
         if frames:
             self._bar.update(frames)
+
+
+def _columns() -> int | None:
+    """Columns of the terminal at stderr; None where it is none."""
+    try:
+        return os.get_terminal_size(sys.stderr.fileno()).columns
+    except (OSError, ValueError):
+        return None
 
 
 def _clock_words(seconds: float) -> str:

@@ -11,18 +11,19 @@ axis, then sideways about the floating axis, then rotation about the segment: Gr
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from hmc.body.joints import dof_index
 from hmc.body.proportions import SOLE_PITCH
 from hmc.errors import InputError
+from hmc.io.results import PoseTable
 from hmc.landmarks import ENOUGH_VIEWS, LANDMARKS, landmark_index
 from hmc.metrics.angles import LEAST_BEND_RAD, LEAST_OFF_SIDE_RAD, landmark_frame, limb_angles
 from hmc.motion.trajectory import Trajectory
 
-__all__ = ["CLINICAL_ANGLES", "angle_table", "clinical_angles", "state_angles"]
+__all__ = ["CLINICAL_ANGLES", "angle_table", "clinical_angles", "doubtful_angles", "state_angles"]
 
 _SIDES = {"l": 1.0, "r": -1.0}
 
@@ -37,6 +38,16 @@ CLINICAL_ANGLES: tuple[str, ...] = (
         "shoulder_plane_of_elevation", "shoulder_elevation", "shoulder_internal_rotation", "elbow_flexion",
     )),
 )  # fmt: skip
+
+_HIPS = ("l_hip", "r_hip")
+#: The landmarks that an angle rests on; SIDE is the side's letter.
+_RESTS_ON: dict[str, tuple[str, ...]] = {
+    "pelvis": _HIPS, "trunk": (*_HIPS, "neck"), "trunk_rotation": (*_HIPS, "neck", "l_shoulder", "r_shoulder"),
+    "hip": (*_HIPS, "SIDE_knee"), "hip_internal_rotation": (*_HIPS, "SIDE_knee", "SIDE_ankle"),
+    "knee": ("SIDE_hip", "SIDE_knee", "SIDE_ankle"), "ankle": ("SIDE_knee", "SIDE_ankle"), "foot": ("SIDE_ankle",),
+    "shoulder": ("neck", "SIDE_shoulder", "SIDE_elbow"), "shoulder_internal_rotation": ("SIDE_shoulder", "SIDE_elbow", "SIDE_wrist"),
+    "elbow": ("SIDE_shoulder", "SIDE_elbow", "SIDE_wrist"),
+}  # fmt: skip
 
 
 def clinical_angles(positions: np.ndarray) -> dict[str, np.ndarray]:
@@ -140,6 +151,33 @@ def angle_table(found: Sequence[Trajectory]) -> dict[str, np.ndarray]:
         "person": np.concatenate([np.full(len(one.frames), one.person) for one in found]),
         **{name: np.concatenate([of_one[name] for of_one in angles]) for name in CLINICAL_ANGLES},
     }
+
+
+def doubtful_angles(table: Mapping[str, np.ndarray], poses: PoseTable) -> dict[str, np.ndarray]:
+    """Which angles rest on a doubtful landmark.
+
+    Parameters
+    ----------
+    table : mapping
+        As `angle_table` has it.
+    poses : PoseTable
+        The landmarks of the same result, with their views and trust.
+
+    Returns
+    -------
+    dict
+        Of each angle of the table a bool array, shape (rows,); all False where nothing is known of the landmarks.
+    """
+    doubtful = poses.doubtful
+    rows = dict(zip(zip(poses.persons.tolist(), poses.frames.tolist(), strict=True), range(len(poses.frames)), strict=True))
+    places = np.array([rows.get(one, -1) for one in zip(table["person"].tolist(), table["frame"].tolist(), strict=True)], int)
+    known = np.zeros((len(places), len(LANDMARKS)), bool) if doubtful is None else np.where(places[:, None] >= 0, doubtful[places], False)
+    found: dict[str, np.ndarray] = {}
+    for column in (name for name in CLINICAL_ANGLES if name in table):
+        side, name = (column[0], column[2:]) if column[1] == "_" else ("", column)
+        names = _RESTS_ON.get(name.removesuffix("_deg")) or _RESTS_ON[name.partition("_")[0]]
+        found[column] = np.asarray(known[:, [landmark_index(one.replace("SIDE", side)) for one in names]].any(axis=1))
+    return found
 
 
 def _pelvis(at: dict[str, np.ndarray]) -> np.ndarray:

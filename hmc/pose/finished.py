@@ -129,9 +129,11 @@ class FinishedPeople:
         InputError
             When there is no such angle, the frame rate is not known, or nobody has a pose.
         """
+        from hmc.motion.clinical import doubtful_angles
         from hmc.view.motion_plots import draw_angles
 
-        return draw_angles(self._angle_table(fps), names)
+        table = self._angle_table(fps)
+        return draw_angles(table, names, doubtful_angles(table, self.poses))
 
     def animate(self, step: int = 1, fps: float | None = None) -> FuncAnimation:
         """Moving stick figures; in a notebook ``HTML(people.animate().to_jshtml())`` shows them.

@@ -30,6 +30,10 @@ _LEGEND = (
     "only. Trusted: share of the landmarks that are not doubtful (trust in joints.csv; where it is not known, two views or more). Time: "
     "that of the run which finished the trial."
 )
+_MOMENTS_LEGEND = (
+    "Left limbs orange, right blue, the trunk in the person's color, the body's flesh as a thin outline; broken lines without white dots: "
+    "doubtful."
+)
 _CHIP = {DONE: "good", FAILED: "bad"}
 
 _STYLE = """
@@ -195,7 +199,7 @@ def _pictures(row: _Row, result: TrialResult) -> Iterator[str]:
         for picture in pictures:
             when = f"{int(picture.stem) / result.fps:.2f} s"
             yield f"<figure>{_image(picture.read_bytes(), 'jpeg', when)}<figcaption>{when}, frame {int(picture.stem)}</figcaption></figure>"
-        yield "</div>"
+        yield f'</div><p class="small">{_MOMENTS_LEGEND}</p>'
     if result.n_persons:
         words = "speed of the centroid, how far knees and elbows are bent, and cost over time"
         yield _image(curves_svg(result).encode(), "svg+xml", words, "curves")

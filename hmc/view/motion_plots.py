@@ -21,6 +21,8 @@ __all__ = ["animate_sticks", "draw_angles"]
 MOST_FRAMES = 300
 _STYLES = ("-", "--", ":", "-.")
 _COLUMNS = 4
+#: How opaque a doubtful stretch of a curve is.
+PALE = 0.35
 
 
 class ShownFigure(Figure):
@@ -32,7 +34,9 @@ class ShownFigure(Figure):
             return file.getvalue()
 
 
-def draw_angles(table: Mapping[str, np.ndarray], names: Sequence[str] | None = None) -> Figure:
+def draw_angles(
+    table: Mapping[str, np.ndarray], names: Sequence[str] | None = None, doubtful: Mapping[str, np.ndarray] | None = None
+) -> Figure:
     """Draw angles over time: a panel an angle, left (orange) and right (blue) in one; persons differ by the style of the line.
 
     Parameters
@@ -41,6 +45,8 @@ def draw_angles(table: Mapping[str, np.ndarray], names: Sequence[str] | None = N
         ``time_s``, ``person`` and angles in degrees (``..._deg``), shape (n,), as `hmc.motion.clinical.angle_table` has.
     names : sequence of str, optional
         These angles alone, with or without ``l_``, ``r_`` and ``_deg``; by default all that are known somewhere.
+    doubtful : mapping, optional
+        Of each angle which rows rest on a doubtful landmark, bool, shape (n,), as `hmc.motion.clinical.doubtful_angles` has: drawn pale.
 
     Raises
     ------
@@ -52,9 +58,10 @@ def draw_angles(table: Mapping[str, np.ndarray], names: Sequence[str] | None = N
     across = min(len(panels), _COLUMNS)
     figure = ShownFigure(figsize=(3.6 * across, 2.2 * rows + 0.4), layout="constrained")
     FigureCanvasAgg(figure)
-    persons = np.unique(table["person"]).tolist()
+    persons, some_pale = np.unique(table["person"]).tolist(), False
     for place, (title, columns) in enumerate(panels.items()):
         ax = figure.add_subplot(rows, across, place + 1)
+        sure = []
         for k, person in enumerate(persons):
             own = table["person"] == person
             for column in columns:
@@ -62,7 +69,14 @@ def draw_angles(table: Mapping[str, np.ndarray], names: Sequence[str] | None = N
                 times, values = _broken(table["time_s"][own], table[column][own])
                 side = {"l_": "left", "r_": "right"}.get(column[:2], "")
                 label = " ".join(part for part in (side, f"person {person}" if len(persons) > 1 else "") if part)
-                ax.plot(times, values, _STYLES[k % len(_STYLES)], color=color, linewidth=1.2, label=label)
+                style = _STYLES[k % len(_STYLES)]
+                pale = np.zeros(own.sum(), bool) if doubtful is None else doubtful[column][own]
+                ax.plot(times, values, style, color=color, linewidth=1.2, label=label, alpha=PALE if pale.any() else 1.0)
+                if pale.any():
+                    sure.append((*_broken(table["time_s"][own], np.where(pale, np.nan, table[column][own])), style, color))
+        for times, values, style, color in sure:  # over all pale ones
+            ax.plot(times, values, style, color=color, linewidth=1.6)
+        some_pale |= bool(sure)
         ax.set_title(title, fontsize=9)
         ax.tick_params(labelsize=8)
         ax.axhline(0, color="0.8", linewidth=0.8, zorder=0)
@@ -72,7 +86,10 @@ def draw_angles(table: Mapping[str, np.ndarray], names: Sequence[str] | None = N
             ax.set_xlabel("s", fontsize=8)
     widest = max(figure.axes, key=lambda ax: len(ax.get_legend_handles_labels()[1]))
     if any(widest.get_legend_handles_labels()[1]):
-        widest.legend(fontsize=7)
+        for handle in widest.legend(fontsize=7).get_lines():
+            handle.set_alpha(1.0)
+    if some_pale:
+        figure.supxlabel("pale: rests on a landmark that is doubtful (its trust in joints.csv)", fontsize=8)
     return figure
 
 

@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from hmc.camera.model import Camera, Rig, look_at, project
-from hmc.camera.rig_picture import draw_rig, draw_view, rig_figure, view_cone
+from hmc.camera.rig_picture import _free_offset, draw_rig, draw_view, rig_figure, view_cone
 from hmc.check import check_recording, inspect_recording
 from hmc.io.calibration import write_calibration
 from hmc.io.files import write_figure
@@ -261,3 +261,12 @@ def test_picture(tmp_path, ring):
     assert sorted(text.split()[0] for text in written) == sorted([*ring.names, "x", "y"])
     assert {"room", "origin"} <= {text.get_text() for text in drawn.get_legend().get_texts()}
     assert any(text.get_text() == "no image" for text in draw_view(ring[1], room, None).texts)
+
+
+def test_names_of_cameras_do_not_cover_each_other():
+    """Two at the top whose names both run inwards, as in a ring of seven."""
+    taken = []
+    offsets = [_free_offset("cam_0 (2.2 m)", np.array([x, 2.4]), side, 0.02, taken) for x, side in ((1.1, -1), (-1.2, 1), (1.1, -1))]
+    assert len(set(offsets)) == 3
+    for k, (low, high) in enumerate(taken):
+        assert not any((low < other[1]).all() and (other[0] < high).all() for other in taken[:k])

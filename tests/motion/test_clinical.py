@@ -15,9 +15,9 @@ from hmc.body.joints import dof_index
 from hmc.cli import main
 from hmc.errors import InputError
 from hmc.io.door import read_image
-from hmc.io.results import write_joints, write_pose
+from hmc.io.results import PoseTable, write_joints, write_pose
 from hmc.landmarks import LANDMARKS, landmark_index
-from hmc.motion.clinical import CLINICAL_ANGLES, clinical_angles
+from hmc.motion.clinical import CLINICAL_ANGLES, clinical_angles, doubtful_angles
 
 FORWARD, LEFT, UP = np.eye(3)
 FROM_LANDMARKS = [name for name in CLINICAL_ANGLES if not any(word in name for word in ("tilt", "ankle", "foot"))]
@@ -261,3 +261,13 @@ def test_a_small_table_is_shown():
     assert table["frames"].tolist() == ["5–16", "5–16"] and table["stature (m)"].tolist() == ["1.71", "1.71"]
     assert table["mean cost"].tolist() == ["8.44e-05", "8.44e-05"]
     assert table["mean views"].tolist() == ["3.98", "4.00"] and table["mean trust"].tolist() == ["–", "–"]
+
+
+def test_angles_that_rest_on_doubtful_landmarks_are_told():
+    """The left wrist of frame 1 alone is doubtful: the left elbow and the upper arm's rotation there, and nothing else."""
+    trust = np.ones((2, 15))
+    trust[1, landmark_index("l_wrist")] = 0.5
+    poses = PoseTable(np.array([3, 4]), np.array([0, 0]), np.zeros((2, 15, 3)), np.full((2, 15), 3), trust=trust)
+    table = {"frame": np.array([2, 3, 4]), "person": np.zeros(3, int)} | {name: np.zeros(3) for name in CLINICAL_ANGLES}
+    told = {name: rows.tolist() for name, rows in doubtful_angles(table, poses).items() if rows.any()}
+    assert told == {"l_elbow_flexion_deg": [False, False, True], "l_shoulder_internal_rotation_deg": [False, False, True]}
