@@ -169,7 +169,7 @@ class _Pass:
     states: PoseStates
     bodies: Mapping[int, BodyModel]
     places: HiddenPlaces | None
-    standing: Mapping[int, Mapping[int, tuple[bool, bool]]]
+    standing: Mapping[int, Mapping[int, tuple[bool, ...]]]
 
     def each(self, make: Callable[[Sequence[int]], Iterator[T]], frames: Sequence[int]) -> Iterator[T]:
         """What is made of each of some frames, made ahead by processes."""
@@ -195,7 +195,7 @@ class _Pass:
 
     def _on_their_feet(self, frame: int, views: dict[int, PersonView]) -> dict[int, PersonView]:
         """The same with what is known of who stands."""
-        known = {person: self.standing.get(person, {}).get(frame, (False, False)) for person in views}
+        known = {person: self.standing.get(person, {}).get(frame, (False,) * 4) for person in views}
         return {
             person: replace(view, target=replace(view.target, standing=known[person]))
             if view.target is not None and any(known[person])

@@ -21,9 +21,11 @@ from hmc.landmarks import LANDMARKS
 
 __all__ = ["standing_feet", "standing_frames"]
 
-#: A foot stands where its ankle, over so many seconds, is slower than so much, metres a second, or than this share of its fastest within
-#: so many seconds before and after: a runner's ankle rolls on while the foot stands.
-OVER_S, SLOW_M_S, SLOW_SHARE, STRIDE_S = 0.13, 0.45, 0.25, 1.0
+#: The sole is flat on the floor where the ankle, over so many seconds, is slower than this, metres a second.
+OVER_S, SLOW_M_S = 0.13, 0.3
+#: The ball is where the ankle is slower than the first, or than this share of its fastest within so many seconds before and after: before a
+#: foot leaves, its heel rises and the ankle rolls on.
+ROLLING_M_S, ROLLING_SHARE, STRIDE_S = 0.45, 0.25, 1.0
 #: No higher than so far above the lowest that it is within these seconds, metres ...
 LIFTED_M = 0.08
 #: ... and with its sole no farther than this from the floor, metres: what stands on a chair's rung or a step stands elsewhere.
@@ -34,7 +36,7 @@ _ANKLES = [LANDMARKS.index("l_ankle"), LANDMARKS.index("r_ankle")]
 
 def standing_feet(
     states: PoseStates, bodies: Mapping[int, BodyModel], fps: float, floor_z: float
-) -> dict[int, dict[int, tuple[bool, bool]]]:
+) -> dict[int, dict[int, tuple[bool, ...]]]:
     """Which feet of each person stand in each frame.
 
     Parameters
@@ -50,7 +52,7 @@ def standing_feet(
     Returns
     -------
     dict of int to dict of int to tuple of bool
-        By person and frame: the left foot and the right one.
+        By person and frame: whether heel and ball of the left foot, and those of the right one, are on the floor.
     """
     found = {}
     for person, body in bodies.items():
@@ -61,13 +63,13 @@ def standing_feet(
         own = states.states[rows]
         ankles = landmarks(body, own)[:, _ANKLES]
         lowest = foot_points(body, own)[..., 2].reshape(len(rows), 2, 2).min(axis=2) - floor_z
-        stand = standing_frames(states.frames[rows] / fps, ankles) & (np.abs(lowest) < FROM_FLOOR_M)
-        found[person] = {int(frame): (bool(left), bool(right)) for frame, (left, right) in zip(states.frames[rows], stand, strict=True)}
+        stand = standing_frames(states.frames[rows] / fps, ankles) & (np.abs(lowest) < FROM_FLOOR_M)[..., None]
+        found[person] = {int(frame): tuple(parts.ravel().tolist()) for frame, parts in zip(states.frames[rows], stand, strict=True)}
     return found
 
 
 def standing_frames(times: np.ndarray, ankles: np.ndarray) -> np.ndarray:
-    """When each foot is at rest, and as low as it comes.
+    """When heel and ball of each foot are at rest, as low as the foot comes.
 
     Parameters
     ----------
@@ -78,7 +80,7 @@ def standing_frames(times: np.ndarray, ankles: np.ndarray) -> np.ndarray:
 
     Returns
     -------
-    ndarray of bool, shape (n, k)
+    ndarray of bool, shape (n, k, 2)
     """
     speed = np.zeros(ankles.shape[:2])
     for row, time in enumerate(times):
@@ -87,9 +89,10 @@ def standing_frames(times: np.ndarray, ankles: np.ndarray) -> np.ndarray:
         t = times[near] - times[near].mean()
         if t.any():  # the slope of a straight line through them
             speed[row] = np.linalg.norm(np.tensordot(t, ankles[near], axes=(0, 0)) / (t @ t), axis=-1)
-    rest = np.zeros(ankles.shape[:2], bool)
+    rest = np.zeros((*ankles.shape[:2], 2), bool)
     for row, time in enumerate(times):
         stride = np.abs(times - time) <= STRIDE_S
-        slow = np.maximum(SLOW_M_S, SLOW_SHARE * speed[stride].max(axis=0))
-        rest[row] = (speed[row] < slow) & (ankles[row, :, 2] < ankles[stride][..., 2].min(axis=0) + LIFTED_M)
+        low = ankles[row, :, 2] < ankles[stride][..., 2].min(axis=0) + LIFTED_M
+        rolling = np.maximum(ROLLING_M_S, ROLLING_SHARE * speed[stride].max(axis=0))
+        rest[row] = np.stack([speed[row] < SLOW_M_S, speed[row] < rolling], axis=-1) & low[:, None]
     return rest

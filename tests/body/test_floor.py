@@ -109,21 +109,21 @@ def test_heel_and_ball_lie_between_the_ends_of_the_sole():
     assert [SEGMENTS[k].name for k in carriers] == ["l_foot", "l_foot", "r_foot", "r_foot"]
 
 
-@pytest.mark.parametrize("feet", [(True, False), (False, True), (True, True)])
+@pytest.mark.parametrize("feet", [(True, True, False, False), (False, False, False, True), (True,) * 4])
 def test_feet_that_stand_cost_what_their_soles_are_off_the_floor(feet):
     objective, state = on_one_foot(feet)
-    nobody, _ = on_one_foot((False, False))
-    heights = sole_places(BODY, *segment_transforms(BODY, state[None]))[0][0, np.repeat(feet, 2), 2]
+    nobody, _ = on_one_foot((False,) * 4)
+    heights = sole_places(BODY, *segment_transforms(BODY, state[None]))[0][0, np.array(feet), 2]
     off = [max(0.0, abs(height) - STANDING_M) for height in heights]
     assert max(off) > 0.02
     extra = objective.settings.standing_weight * sum(one**2 for one in off)
     assert_allclose(objective.cost(state[None]) - nobody.cost(state[None]), extra, rtol=1e-3)
 
 
-@pytest.mark.parametrize("feet", [(True, False), (True, True)])
+@pytest.mark.parametrize("feet", [(False, True, False, False), (True,) * 4])
 def test_the_pull_of_feet_that_stand_is_the_slope_of_what_they_cost(feet):
     objective, state = on_one_foot(feet)
-    nobody, _ = on_one_foot((False, False))
+    nobody, _ = on_one_foot((False,) * 4)
 
     def squares(one):
         residuals, jacobian = residual_rows(one.linearise(state))

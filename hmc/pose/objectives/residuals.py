@@ -129,7 +129,7 @@ def distances(objective: Symmetric, state: np.ndarray, before: Candidates | None
         gap = np.sqrt(settings.floor_weight) * above_floor(floor[0], target.floor_z)
         if any(target.standing):
             soles, feet = sole_places(body, rotations[None], positions[None])
-            stands = np.repeat(target.standing, 2)[: len(feet)]
+            stands = np.array(target.standing)[: len(feet)]
             bearing = soles[0, stands]
             gap = np.r_[gap, np.sqrt(settings.standing_weight) * off_floor(bearing[:, 2], target.floor_z)]
             floor = np.r_[floor[0], bearing[:, 2]], np.concatenate([floor[1], bearing]), np.r_[floor[2], feet[stands]]

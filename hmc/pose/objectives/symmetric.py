@@ -317,7 +317,8 @@ class Symmetric:
             floor_z = self.target.floor_z - origin[2]
             gap = settings.floor_weight * floor_gap(body, rotations, positions, floor_z) ** 2
             if any(self.target.standing):
-                soles = sole_places(body, rotations, positions)[0][:, np.repeat(self.target.standing, 2), 2]
+                soles = sole_places(body, rotations, positions)[0][..., 2]
+                soles = soles[:, np.array(self.target.standing)[: soles.shape[1]]]
                 gap += settings.standing_weight * np.square(off_floor(soles, floor_z)).sum(axis=1)
         posture = settings.posture_weight * ((states - POSTURE[0]) / posture_spread(states)) ** 2
         return outside, uncovered, asking, depth, gap, posture

@@ -54,7 +54,7 @@ class HullTarget:
     rays : ndarray, shape (m, 6), or None
         Rays of the silhouettes that show the person (`hmc.pose.views.rays`), where these are known.
     standing : tuple of bool
-        Whether the left foot and the right one are known to stand on the floor (`hmc.pose.contacts`).
+        Whether heel and ball of the left foot, and of the right one, are known to be on the floor (`hmc.pose.contacts`).
     """
 
     distance: np.ndarray
@@ -67,7 +67,7 @@ class HullTarget:
     volume_m3: float
     floor_z: float | None = None
     rays: np.ndarray | None = None
-    standing: tuple[bool, bool] = (False, False)
+    standing: tuple[bool, ...] = (False,) * 4
 
 
 def sound_hull(strict: np.ndarray, tolerant: np.ndarray) -> np.ndarray:
