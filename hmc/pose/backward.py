@@ -4,7 +4,7 @@ A filter knows only the frames before: a limb that it loses stays lost until the
 first second and a half. When the recording is over more is known:
 
 1. What the scene hides from single cameras is learnt from the first pass's poses (`hmc.pose.occluders`); and what another's pose
-   covers asks nothing of a person.
+   covers asks nothing of a person. Feet that stand, as their motion tells, are held to the floor (`hmc.pose.contacts`).
 2. The person's dimensions are fitted anew, to frames of the whole run (`hmc.pose.starts.own_body`).
 3. Each person is followed from the last frame to the first. Nothing is drawn at random but limbs that are lost: the pose of the frame after
    and the first pass's are refined side by side, so that a limb that was found again is followed back to where it was lost. Where a

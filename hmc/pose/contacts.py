@@ -30,8 +30,10 @@ ROLLING_M_S, ROLLING_SHARE, STRIDE_S = 0.45, 0.25, 1.0
 LIFTED_M = 0.08
 #: ... and with its sole no farther than this from the floor, metres: what stands on a chair's rung or a step stands elsewhere.
 FROM_FLOOR_M = 0.12
+#: Who kneels or lies has feet at rest whose soles are anywhere: the knee is above the ankle by this share of the shank at least.
+UPRIGHT = 0.5
 
-_ANKLES = [LANDMARKS.index("l_ankle"), LANDMARKS.index("r_ankle")]
+_ANKLES, _KNEES = ([LANDMARKS.index(f"{side}_{joint}") for side in "lr"] for joint in ("ankle", "knee"))
 
 
 def standing_feet(
@@ -61,9 +63,11 @@ def standing_feet(
         if not len(rows):
             continue
         own = states.states[rows]
-        ankles = landmarks(body, own)[:, _ANKLES]
+        places = landmarks(body, own)
+        ankles, shanks = places[:, _ANKLES], places[:, _KNEES] - places[:, _ANKLES]
         lowest = foot_points(body, own)[..., 2].reshape(len(rows), 2, 2).min(axis=2) - floor_z
-        stand = standing_frames(states.frames[rows] / fps, ankles) & (np.abs(lowest) < FROM_FLOOR_M)[..., None]
+        able = (np.abs(lowest) < FROM_FLOOR_M) & (shanks[..., 2] > UPRIGHT * np.linalg.norm(shanks, axis=-1))
+        stand = standing_frames(states.frames[rows] / fps, ankles) & able[..., None]
         found[person] = {int(frame): tuple(parts.ravel().tolist()) for frame, parts in zip(states.frames[rows], stand, strict=True)}
     return found
 

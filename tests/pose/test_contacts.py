@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from hmc.body.feet import foot_points
 from hmc.body.joints import DOF_NAMES, N_DOF, dof_index
 from hmc.body.model import neutral_state
 from hmc.body.proportions import default_body
@@ -73,6 +74,14 @@ def test_who_stands_still_stands_on_both_feet_and_who_lifts_one_on_the_other():
 def test_who_is_high_above_the_floor_stands_on_something_else():
     assert set(standing_feet(states_of(poses(LEGS + 0.3)), {0: BODY}, 30.0, 0.0)[0].values()) == {(False,) * 4}
     assert set(standing_feet(states_of(poses(LEGS + 0.3)), {0: BODY}, 30.0, 0.3)[0].values()) == {(True,) * 4}
+
+
+def test_who_kneels_may_have_the_feet_anywhere():
+    state = neutral_state()
+    state[2] = BODY.dimensions["thigh"] + 0.12  # on a mat
+    state[dof_index("r_knee_y", "l_knee_y")], state[dof_index("r_ankle_y", "l_ankle_y")] = np.radians(85), np.radians(45)
+    assert abs(foot_points(BODY, state)[:, 2].min()) < 0.1  # soles no farther from the floor than of who stands
+    assert set(standing_feet(states_of([state] * 20), {0: BODY}, 30.0, 0.0)[0].values()) == {(False,) * 4}
 
 
 def test_frames_without_a_pose_tell_nothing():
