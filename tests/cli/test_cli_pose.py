@@ -1,12 +1,11 @@
 """The pose command on the small rendered clip: results, resuming, repeated runs and wrong input."""
 
 import csv
+import re
 import shutil
 from dataclasses import replace
 
 import cv2
-import re
-
 import numpy as np
 import pytest
 from drawn import draw_recording
