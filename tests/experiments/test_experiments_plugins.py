@@ -22,7 +22,7 @@ from hmc.pose.follow import FollowOptions, follow
 from hmc.pose.registry import METHODS, pose_method
 
 #: So far off may random search be: it loses limbs.
-FAR_MM = 180
+FAR_MM = 150
 TINY = Path(__file__).resolve().parents[2] / "data" / "synthetic" / "tiny"
 METHOD = """
 from dataclasses import replace
@@ -45,7 +45,7 @@ def step(rng, tracked, view):
     objective, limits = fine_objective(rng, tracked.subject, view, HOUSE.polish), tracked.subject.body.limits
     state = tracked.state
     for width in (0.2, 0.1, 0.1, 0.05):
-        moved = rng.standard_normal((60, len(state))) * (rng.random((60, len(state))) < 0.1)
+        moved = rng.standard_normal((120, len(state))) * (rng.random((120, len(state))) < 0.1)
         states = np.concatenate([state[None], np.clip(state + width * moved, limits.low, limits.high)])
         costs = objective.cost(states)
         state = states[costs.argmin()]

@@ -123,19 +123,19 @@ def distances(objective: Symmetric, state: np.ndarray, before: Candidates | None
     pairs = candidates(body.cones, maps, objective.asked, settings.cap_m, before)
     nearest = nearest_cones(body.cones, maps, pairs)
     depth, outward, axis_points, segment, other = penetration_rows(body, samples.axes, rotations, positions, maps)
+    sizes = np.array([len(outside), len(nearest.distance), len(depth), 1, 1])
+    floor_weights = settings.floor_weight, settings.standing_weight
+    weights = np.sqrt(np.array([1, settings.uncovered_weight, settings.overlap_weight, *floor_weights]) / sizes)
     gap, floor = np.zeros(0), (np.zeros(0), np.zeros((0, 3)), np.zeros(0, int))
     if target.floor_z is not None:
         floor = lowest_support(body, rotations[None], positions[None])
-        gap = np.sqrt(settings.floor_weight) * above_floor(floor[0], target.floor_z)
+        gap = weights[3] * above_floor(floor[0], target.floor_z)
         if any(target.standing):
             soles, feet = sole_places(body, rotations[None], positions[None])
             stands = np.array(target.standing)[: len(feet)]
             bearing = soles[0, stands]
-            gap = np.r_[gap, np.sqrt(settings.standing_weight) * off_floor(bearing[:, 2], target.floor_z)]
+            gap = np.r_[gap, weights[4] * off_floor(bearing[:, 2], target.floor_z)]
             floor = np.r_[floor[0], bearing[:, 2]], np.concatenate([floor[1], bearing]), np.r_[floor[2], feet[stands]]
-    sizes = np.array([len(outside), len(nearest.distance), len(depth), 1, 1])
-    floor_weights = settings.floor_weight, settings.standing_weight
-    weights = np.sqrt(np.array([1, settings.uncovered_weight, settings.overlap_weight, *floor_weights]) / sizes)
     spread = posture_spread(state)
     residuals = [
         weights[0] * np.minimum(outside, settings.cap_m),
