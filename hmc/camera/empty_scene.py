@@ -146,8 +146,7 @@ def scenes_behind(samples: Sequence[Masks], people: SamplePeople, pool: Executor
 
 def replace_people(image: np.ndarray, scene: np.ndarray) -> np.ndarray:
     """The image with the scene wherever it is far from it: as if no person were there, with the image's own noise elsewhere."""
-    far = cv2.absdiff(image, scene).max(axis=2) > DISTANCE
-    return np.where(far[..., None], scene, image)
+    return np.where(_far(image, scene)[..., None], scene, image)
 
 
 def _of(frames: Sequence[Masks], camera: int) -> list[np.ndarray]:
@@ -189,9 +188,14 @@ def _cut_all(views: Sequence[View], colors: PeopleColors | None) -> list[np.ndar
     return [np.zeros(view.unseen.shape, bool) if colors is None else cut_people(view, colors) for view in views]
 
 
+def _far(image: np.ndarray, scene: np.ndarray) -> np.ndarray:
+    """Where the two are further apart than `DISTANCE` in some channel."""
+    return cv2.inRange(cv2.absdiff(image, scene), (0, 0, 0), (DISTANCE,) * 3) == 0
+
+
 def _differs(image: np.ndarray, scene: np.ndarray, unseen: np.ndarray) -> np.ndarray:
     """Where the image is not the scene, or the scene is not known; gaps closed."""
-    far = cv2.absdiff(cv2.blur(image, (3, 3)), cv2.blur(scene, (3, 3))).max(axis=2) > DISTANCE
+    far = _far(cv2.blur(image, (3, 3)), cv2.blur(scene, (3, 3)))
     return cv2.morphologyEx((far | unseen).view(np.uint8), cv2.MORPH_CLOSE, disc(image, 3)).view(bool)
 
 
@@ -211,6 +215,6 @@ def _scene(images: Sequence[np.ndarray], people: Sequence[np.ndarray]) -> tuple[
     # Where the margins leave too little, what is next to people is better than nothing.
     np.copyto(near, taken, where=len(images) - near.sum(axis=0) < least)
     scene = masked_median(images, list(near))
-    alike = np.stack([cv2.absdiff(image, scene).max(axis=2) <= DISTANCE for image in images])
+    alike = np.stack([~_far(image, scene) for image in images])
     still = (alike.sum(axis=0) > STILL * len(images)) & (2 * (alike & taken).sum(axis=0) > alike.sum(axis=0))
     return scene, still | (len(images) - taken.sum(axis=0) < least)

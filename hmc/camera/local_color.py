@@ -68,7 +68,7 @@ def learn_palette(pixels: Sequence[np.ndarray]) -> Palette | None:
     return Palette(clusters.cluster_centers_, np.bincount(clusters.labels_, minlength=COLORS) / len(colors))
 
 
-def looks_like_people(image: np.ndarray, people: np.ndarray, palette: Palette, log_ratio: float = 1.0) -> np.ndarray:
+def looks_like_people(image: np.ndarray, people: np.ndarray, palette: Palette, where: np.ndarray, log_ratio: float = 1.0) -> np.ndarray:
     """Where a pixel has the color of people rather than that of its surroundings.
 
     Parameters
@@ -77,56 +77,88 @@ def looks_like_people(image: np.ndarray, people: np.ndarray, palette: Palette, l
     people : ndarray of bool, shape (height, width)
         Where people may be, as far as is known: these pixels are no person's surroundings.
     palette : Palette
+    where : ndarray of bool, shape (height, width)
+        The pixels that are asked.
     log_ratio : float
         Natural logarithm of the likelihood ratio from which a pixel counts.
 
     Returns
     -------
     ndarray of bool, shape (height, width)
+        False of pixels that are not asked.
     """
-    theirs, here = _densities(image, people, palette, *LIMB_RINGS)
-    return theirs > np.exp(log_ratio) * here
+    theirs, here = _densities(image, people, palette, where, LIMB_RINGS)
+    return _at(where, theirs > np.exp(log_ratio) * here)
 
 
-def looks_like_surroundings(image: np.ndarray, people: np.ndarray, palette: Palette, log_ratio: float = 1.5) -> np.ndarray:
+def looks_like_surroundings(
+    image: np.ndarray, people: np.ndarray, palette: Palette, where: np.ndarray, log_ratio: float = 1.5
+) -> np.ndarray:
     """Where a pixel has the color of what surrounds the people, further away, rather than that of people.
 
     Parameters
     ----------
-    image, people, palette, log_ratio
+    image, people, palette, where, log_ratio
         As of `looks_like_people`.
 
     Returns
     -------
     ndarray of bool, shape (height, width)
     """
-    theirs, here = _densities(image, people, palette, *PERSON_RINGS)
-    return here > np.exp(log_ratio) * theirs
+    theirs, here = _densities(image, people, palette, where, PERSON_RINGS)
+    return _at(where, here > np.exp(log_ratio) * theirs)
 
 
-def _densities(image: np.ndarray, people: np.ndarray, palette: Palette, radii: tuple[int, ...], n: int) -> tuple[np.ndarray, np.ndarray]:
-    """Density of each pixel's color among people's, and among what is on rings around it and no person."""
-    picture = image.astype(np.float32)
-    theirs = sum(share * _kernel(picture - color.astype(np.float32)) for share, color in zip(palette.shares, palette.colors, strict=True))
-    return theirs + ANY_COLOR, _surroundings(picture, (~people).astype(np.float32), radii, n) + ANY_COLOR
+def _at(where: np.ndarray, answers: np.ndarray) -> np.ndarray:
+    mask = np.zeros(where.shape, bool)
+    mask[where] = answers
+    return mask
 
 
-def _surroundings(picture: np.ndarray, free: np.ndarray, radii: tuple[int, ...], n: int) -> np.ndarray:
-    """Density of each pixel's color among those pixels of rings around it, `n` on each, that are free of people."""
-    height, width = free.shape
-    density, weight = np.zeros_like(free), np.zeros_like(free)
-    reach = max(height, width) / 320
+def _densities(
+    image: np.ndarray, people: np.ndarray, palette: Palette, where: np.ndarray, rings: tuple[tuple[int, ...], int]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Density of some pixels' colors among people's, and among what is on rings around each and no person; shapes (n,)."""
+    own = _planes(image[where])
+    theirs = np.zeros(own.shape[1], np.float32)
+    for share, color in zip(palette.shares, palette.colors, strict=True):
+        theirs += np.float32(share) * _kernel(own, _planes(color[None]))
+    return theirs + ANY_COLOR, _surroundings(image, people, where, rings) + ANY_COLOR
+
+
+def _surroundings(image: np.ndarray, people: np.ndarray, where: np.ndarray, rings: tuple[tuple[int, ...], int]) -> np.ndarray:
+    """Density of some pixels' colors among those pixels of rings around each that are in the image and free of people; shape (n,)."""
+    radii, n = rings
+    reach = max(where.shape) / 320
+    # With nothing that counts all around the image, no ring needs a test of where it ends.
+    margin = 4 * (round(max(radii) * reach),)
+    picture = _planes(cv2.copyMakeBorder(image, *margin, cv2.BORDER_CONSTANT).reshape(-1, 3))
+    free = cv2.copyMakeBorder((~people).astype(np.float32), *margin, cv2.BORDER_CONSTANT).ravel()
+    rows, columns = np.nonzero(where)
+    width = where.shape[1] + 2 * margin[0]
+    pixels = (rows + margin[0]) * width + columns + margin[0]
+    own = picture[:, pixels]
+    density, weight = np.zeros((2, len(pixels)), np.float32)
     for turn, radius in enumerate(radii):
         for angle in 2 * np.pi * (np.arange(n) + turn / len(radii)) / n:
-            right, down = round(radius * reach * np.cos(angle)), round(radius * reach * np.sin(angle))
-            # What a pixel has to its left and above is the picture moved right and down.
-            here = np.s_[max(0, down) : height + min(0, down), max(0, right) : width + min(0, right)]
-            there = np.s_[max(0, -down) : height + min(0, -down), max(0, -right) : width + min(0, -right)]
-            density[here] += free[there] * _kernel(picture[here] - picture[there])
-            weight[here] += free[there]
+            there = pixels - (round(radius * reach * np.sin(angle)) * width + round(radius * reach * np.cos(angle)))
+            counts = free.take(there)
+            weight += counts
+            counts *= _kernel(own, [plane.take(there) for plane in picture])
+            density += counts
     return density / np.maximum(weight, 1)
 
 
-def _kernel(difference: np.ndarray) -> np.ndarray:
-    """Gaussian of a difference of colors, 1 at none."""
-    return cv2.exp(cv2.transform(cv2.multiply(difference, difference), np.full((1, 3), -0.5 / SPREAD**2)))
+def _planes(colors: np.ndarray) -> np.ndarray:
+    """Colors (n, 3) channel by channel, (3, n), such that the kernel's exponent is their squared distance."""
+    return np.ascontiguousarray(colors.T, np.float32) / np.float32(np.sqrt(2) * SPREAD)
+
+
+def _kernel(one: Sequence[np.ndarray], other: Sequence[np.ndarray]) -> np.ndarray:
+    """Gaussian of the difference of colors as of `_planes`, 1 at none; shape (n,)."""
+    squares = np.zeros(one[0].shape, np.float32)
+    for here, there in zip(one, other, strict=True):
+        apart = here - there
+        apart *= apart
+        squares -= apart
+    return np.exp(squares, out=squares)

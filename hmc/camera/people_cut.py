@@ -134,7 +134,7 @@ def _near(labels: np.ndarray) -> np.ndarray:
 def _limbs(view: View, labels: np.ndarray, palette: Palette) -> np.ndarray:
     """Solid parts that look like people where they are, and touch people."""
     people = _near(labels)
-    found = looks_like_people(view.image, people, palette) & view.possibly
+    found = looks_like_people(view.image, people, palette, view.possibly)
     solid = cv2.morphologyEx(found.view(np.uint8), cv2.MORPH_OPEN, disc(found, THIN_PX))
     _, pieces = cv2.connectedComponents(solid | people.view(np.uint8), connectivity=8)
     return (solid > 0) & np.isin(pieces, np.unique(pieces[people]))
@@ -145,8 +145,11 @@ def _ground(view: View, palette: Palette) -> np.ndarray:
 
     The cut's mixtures are of the whole image and too coarse for that: the floor between two people was people's.
     """
-    found = looks_like_surroundings(view.image, view.possibly, palette) & ~view.differs
-    return cv2.morphologyEx(found.view(np.uint8), cv2.MORPH_OPEN, disc(found, THIN_PX)).view(bool)
+    thin = disc(view.possibly, THIN_PX)
+    # Elsewhere it is scene anyway; what is thin is told with what is around it.
+    asked = cv2.dilate(view.possibly.view(np.uint8), thin, iterations=2).view(bool) & ~view.differs
+    found = looks_like_surroundings(view.image, view.possibly, palette, asked)
+    return cv2.morphologyEx(found.view(np.uint8), cv2.MORPH_OPEN, thin).view(bool)
 
 
 def _hints(view: View, limbs: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
