@@ -8,7 +8,7 @@ kernel density estimates (Elgammal et al. (2000), "Non-parametric model for back
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -154,11 +154,11 @@ def _planes(colors: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(colors.T, np.float32) / np.float32(np.sqrt(2) * SPREAD)
 
 
-def _kernel(one: Sequence[np.ndarray], other: Sequence[np.ndarray]) -> np.ndarray:
+def _kernel(one: Iterable[np.ndarray], other: Iterable[np.ndarray]) -> np.ndarray:
     """Gaussian of the difference of colors as of `_planes`, 1 at none; shape (n,)."""
-    squares = np.zeros(one[0].shape, np.float32)
+    exponent = np.float32(0)
     for here, there in zip(one, other, strict=True):
         apart = here - there
         apart *= apart
-        squares -= apart
-    return np.exp(squares, out=squares)
+        exponent = exponent - apart
+    return np.exp(exponent)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -38,6 +38,7 @@ __all__ = [
     "progress",
     "recording_source",
     "selected_workers",
+    "unlike_its_run",
     "was_finished",
     "whole_number",
     "written_digests",
@@ -281,6 +282,17 @@ def written_digests(written: Sequence[Path]) -> dict[str, str]:
     return {path.name: file_digest(path) for path in written}
 
 
+def unlike_its_run(folder: Path, names: Collection[str] = ()) -> list[str]:
+    """A sentence for each file of a result, or for those of some names, that is not as its run wrote it; none where no run tells."""
+    from hmc.io.results import read_run
+
+    run = folder / "run.toml"
+    said = read_run(run).get("written", {}) if run.is_file() else {}
+    digests = {folder / name: said[name] for name in names or said if name in said} if isinstance(said, dict) else {}
+    changed = [path for path, digest in digests.items() if path.is_file() and digest != file_digest(path)]
+    return [f"{path}: is not as its run wrote it (changed, or damaged)" for path in changed]
+
+
 def note_changes(recording, source: Mapping[str, Any], problems: list[str]) -> None:
     """Add to the problems that files of a recording are not those that a run began with."""
     if recording_source(recording)["recording_changed"] != source["recording_changed"]:
@@ -311,10 +323,8 @@ def was_finished(written: Sequence[Path], run_path: Path, depends_on: Mapping[st
     if not all(path.exists() for path in (*written, run_path)):
         return False
     before = read_run(run_path)
-    for path in written:
-        said = before.get("written", {})
-        if isinstance(said, dict) and path.name in said and said[path.name] != file_digest(path):
-            raise InputError(f"{path}: is not as its run wrote it (changed, or damaged); delete it to compute it again")
+    for sentence in unlike_its_run(run_path.parent, [path.name for path in written]):
+        raise InputError(f"{sentence}; delete it to compute it again")
     if to_toml({name: before.get(name) for name in depends_on}) != to_toml(depends_on):
         print(f"{run_path.parent}: its result has other parameters or another recording; starting anew")
         return False

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
 
-from hmc.cli.common import whole_number
+from hmc.cli.common import unlike_its_run, whole_number
 from hmc.errors import InputError
 from hmc.io.files import atomic_write, real_path, write_toml
 
@@ -151,7 +151,7 @@ def run(args: argparse.Namespace) -> int:
             f"positives, {tracks.mismatches} mismatches in {tracks.objects} person-frames{tracks_note}"
         )
         report["tracks"] = track_summary(tracks)
-    notes += made_from(args.directory, args.recording)
+    notes += unlike_its_run(args.directory) + made_from(args.directory, args.recording)
     for note in notes:
         print(f"note: {note}")
     report["notes"] = notes

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from hmc.cli.common import positive_float, print_problems, whole_number
+from hmc.cli.common import positive_float, print_problems, unlike_its_run, whole_number
 
 __all__ = ["add_parser", "add_result_options", "read_result_asked", "run"]
 
@@ -46,6 +46,7 @@ def read_result_asked(args: argparse.Namespace):
     from hmc.motion.trajectory import read_trajectories
 
     found = read_trajectories(args.result, args.fps, args.person)
+    print_problems(unlike_its_run(args.result))
     if args.smooth is None:
         return found
     how = Smoothing(args.smooth, args.cutoff, args.window)

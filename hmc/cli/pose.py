@@ -24,6 +24,7 @@ from hmc.cli.common import (
     print_problems,
     recording_source,
     selected_workers,
+    unlike_its_run,
     was_finished,
     whole_number,
     written_digests,
@@ -212,7 +213,7 @@ def _run(args: argparse.Namespace, held: ExitStack) -> int:
     if was_finished([paths[name] for name in RESULTS[:3]], paths["run.toml"], depends_on):
         return 0
 
-    problems: list[str] = [*recording.problems]
+    problems: list[str] = [*recording.problems, *([] if given is None else unlike_its_run(args.tracks.parent, [args.tracks.name]))]
     faults: list[CameraFault] = []
 
     stages = [TRACKING] * (given is None) + [FIRST_POSE, FOLLOWING] + [FITTING, SECOND_PASS] * (method.back is not None) + [VIEWS]

@@ -5,7 +5,16 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from hmc.cli.common import add_selection_options, open_selected, output_path, positive_float, print_problems, progress, whole_number
+from hmc.cli.common import (
+    add_selection_options,
+    open_selected,
+    output_path,
+    positive_float,
+    print_problems,
+    progress,
+    unlike_its_run,
+    whole_number,
+)
 from hmc.errors import InputError
 
 __all__ = ["add_parser", "run"]
@@ -48,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
     if not args.start and args.frames is None:
         args.start, args.frames = run_selection(args.directory)
     recording = open_selected(args)
-    problems = list(recording.problems)
+    problems = [*recording.problems, *unlike_its_run(args.directory)]
     write_view(
         args.out,
         recording,

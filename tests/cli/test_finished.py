@@ -4,7 +4,7 @@ import argparse
 
 import pytest
 
-from hmc.cli.common import output_path, was_finished, written_digests
+from hmc.cli.common import output_path, unlike_its_run, was_finished, written_digests
 from hmc.errors import InputError
 from hmc.io.results import write_run
 
@@ -32,6 +32,17 @@ def test_a_changed_one_is_told_and_left(result, text):
     with pytest.raises(InputError, match=r"tracks\.csv: is not as its run wrote it"):
         was_finished([path], result / "run.toml", RUN)
     assert path.read_text() == text
+
+
+def test_whoever_reads_a_changed_one_is_told(result):
+    other = result / "other.csv"
+    other.write_text("of no run")
+    assert unlike_its_run(result) == unlike_its_run(result, ["tracks.csv", "other.csv"]) == []
+    (result / "tracks.csv").write_text("frame,person,x,y,z\n")
+    assert unlike_its_run(result) == [f"{result / 'tracks.csv'}: is not as its run wrote it (changed, or damaged)"]
+    assert unlike_its_run(result, ["other.csv"]) == []
+    (result / "run.toml").unlink()
+    assert unlike_its_run(result) == []
 
 
 @pytest.mark.parametrize("text", ["cam_00 ", "-inf", " a", "out/ /b", "a\nb", ""])
