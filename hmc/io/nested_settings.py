@@ -63,9 +63,12 @@ def read_settings_table(path: str | Path) -> SettingsTable:
     Raises
     ------
     InputError
-        When it cannot be read.
+        When it cannot be read, or there is nothing in it.
     """
-    return SettingsTable(str(path), read_toml_file(path))
+    values = read_toml_file(path)
+    if not values:
+        raise InputError(f"{path}: has no settings in it; leave it out, or name values of the preset (run.toml of a result has them all)")
+    return SettingsTable(str(path), values)
 
 
 def changed(value: T, tables: Sequence[SettingsTable]) -> T:

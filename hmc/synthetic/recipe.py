@@ -43,6 +43,10 @@ STEPS = ("walk", "turn", "stand", "gesture", "box", "throw_catch", "pick_up", "h
 VARIED = re.compile(r"varied-(\d{1,9})")
 #: So many people can be told apart in silhouettes, by 85 or 51 x (person + 1).
 MOST_ACTORS = 5
+#: No room, and nothing in it, is longer (metres), and no more posters hang on its walls: the floor and the walls are drawn in small cells.
+MOST_SIDE_M, MOST_POSTERS = 60.0, 60
+#: Longest side of a rendered image.
+MOST_PX = 8192
 
 
 @dataclass(frozen=True)
@@ -373,6 +377,12 @@ def check_recipe(recipe: Recipe, where: str) -> None:
     within(recipe.silhouette_every, 1, 10**6, "silhouette_every")
     within(recipe.cell_m, 0.008, 0.03, "cell_m")
     within(recipe.light.lamps, 1, 6, "lamps")
+    for side in recipe.rig.size_px:
+        within(side, 8, MOST_PX, "each side of the images, size_px,")
+    within(recipe.rig.field_of_view_deg, 0, 150, "field_of_view_deg")
+    for side in recipe.room.size_m:
+        within(side, 1, MOST_SIDE_M, "each side of the room, size_m,")
+    within(recipe.room.posters, 0, MOST_POSTERS, "posters")
     among(recipe.rig.kind, RIGS, "rig kind")
     for texture in (*recipe.room.walls, recipe.room.floor, *(item.texture for item in recipe.furniture)):
         among(texture, TEXTURES, "texture")
@@ -381,6 +391,8 @@ def check_recipe(recipe: Recipe, where: str) -> None:
             raise InputError(f"{where}: [room] takes one wall texture and color or four of each; got {count}")
     for item in recipe.furniture:
         among(item.kind, FURNITURE, "furniture")
+        for side in item.size_m or ():
+            within(side, 0.01, MOST_SIDE_M, "each side of a piece of furniture, size_m,")
     for wall, _ in recipe.room.doors:
         within(wall, 0, 3, "the wall of a door")
     if len(recipe.actors) > MOST_ACTORS:
@@ -392,6 +404,8 @@ def check_recipe(recipe: Recipe, where: str) -> None:
         among(actor.sleeves, ("long", "short"), "sleeves")
         among(actor.legs, ("long", "short"), "legs")
         within(actor.height_m, 1.2, 2.2, "height_m")
+        within(actor.loose_m, 0, 0.1, "loose_m")
+        within(actor.cube_m, 0, 1, "cube_m")
         girth_of(actor.build)
         if (actor.motion == "bvh") != bool(actor.bvh):
             raise InputError(f"{where}: motion = 'bvh' and the key 'bvh' (a file) go together")

@@ -74,6 +74,10 @@ def test_files_that_cannot_be_read(tmp_path):
     (tmp_path / "bad.toml").write_text("a = ")
     with pytest.raises(InputError, match="not a TOML file"):
         read_settings_table(tmp_path / "bad.toml")
+    for nothing in ("", "# draws = 7\n"):
+        (tmp_path / "empty.toml").write_text(nothing)
+        with pytest.raises(InputError, match=r"empty\.toml: has no settings in it; leave it out"):
+            read_settings_table(tmp_path / "empty.toml")
     (tmp_path / "good.toml").write_text("[search]\ndraws = 7\n")
     assert changed(pose_method("apf").settings, [read_settings_table(tmp_path / "good.toml")]).search.draws == 7
 
