@@ -2,8 +2,9 @@
 
 A pixel that is darker than the empty scene and of its color is a person's or a shadow's, and one camera can only guess
 (`hmc.camera.shade`). Where it looks at the floor, the others know: a shadow darkens the spot for whoever looks at it, and by as much,
-as a floor scatters light all ways; behind a trouser leg they see the bare floor. So the guess is weighed with how much brighter the
-others see the spot, by a logistic regression over these two numbers.
+as a floor scatters light all ways; behind a trouser leg they see the bare floor, brighter by all that this camera has lost of it. So the
+guess is multiplied by the ratio of two likelihoods, of the light that the others see if it is a shadow and if it is a person. A pixel that
+has lost next to no light tells nothing by that, and the guess stands.
 
 Two cameras look at the same spot only where the empty scene has the same color there in both. Else one of them sees a table before it, or
 the wall behind.
@@ -31,9 +32,11 @@ SAME_LUMA, SAME_CHROMA = 0.25, 7.0
 LIGHT = (-0.7, 0.1)
 #: The guess is no surer than this, as a logit.
 MOST_LOGIT = 4.0
-#: Logit of a person: so much of the guess's, so much a unit by which the others see the spot brighter (in logarithms), and this. Fitted to
-#: five recordings; fitted to 24 rooms drawn at random (1.4, 6.2, -2.0) they leave silhouettes the same or a little worse.
-BY_GUESS, BY_LIGHT, BIAS = 0.8, 10.9, -2.2
+#: Deviation of what the others see (logarithms of shares of light), and the likelihood, against that of no deviation, of what is neither:
+#: a spot that a third person shades, or that is hidden.
+SPREAD, UNLIKE = 0.11, 0.13
+#: From this chance on it stays, as of the guess (`SegmentationSettings.least_chance`): one camera's shadow is in no hull, its lost leg is out.
+LEAST_CHANCE = 0.4
 #: The floor is asked of every so manieth pixel of each row and column.
 EVERY_PX = 2
 #: Side of the squares that pieces hold which come or go, pixels.
@@ -50,14 +53,15 @@ class FloorEvidence:
         Flat; shades behind which some other camera sees the floor.
     guess : ndarray of float32, shape (n,)
         Logits of the chances.
-    brighter : ndarray of float32, shape (n,)
-        By how much the others see the spot brighter than this camera sees the pixel: logarithms of shares of the empty scene's light, mean
-        over the cameras that see it.
+    light, others : ndarray of float32, shape (n,)
+        Logarithms of the shares of the empty scene's light that this camera sees in the pixel, and the others at the spot behind it, mean
+        over those that see it.
     """
 
     pixels: np.ndarray
     guess: np.ndarray
-    brighter: np.ndarray
+    light: np.ndarray
+    others: np.ndarray
 
 
 def floor_evidence(
@@ -103,7 +107,7 @@ def floor_evidence(
         told = np.flatnonzero((n > 0) & np.isfinite(floors[c].shade_light))
         chance = np.clip(known[c][1].ravel().take(pixels[told]) / np.float32(255), 1e-3, 1 - 1e-3)
         guess = np.clip(np.log(chance / (1 - chance)), -MOST_LOGIT, MOST_LOGIT)
-        found[c] = FloorEvidence(pixels[told], guess, light[told] / n[told] - floors[c].shade_light[told])
+        found[c] = FloorEvidence(pixels[told], guess, floors[c].shade_light[told], light[told] / n[told])
     return found
 
 
@@ -155,7 +159,13 @@ def _seen_by(cameras: Sequence[_Floor], spots: np.ndarray, scene: np.ndarray) ->
 
 def person_by_floor(evidence: FloorEvidence) -> np.ndarray:
     """How likely each pixel is a person's: float32, shape (n,)."""
-    return np.asarray(1 / (1 + np.exp(-(BY_GUESS * evidence.guess + BY_LIGHT * evidence.brighter + BIAS))), np.float32)
+
+    def likelihood(expected: np.ndarray | float) -> np.ndarray:
+        return np.asarray(np.exp(-np.square(evidence.others - expected) / (2 * SPREAD**2)) + UNLIKE)
+
+    # What is brighter than the empty scene is as bright as a spot can be.
+    shadow, person = likelihood(np.minimum(evidence.light, 0)), likelihood(0.0)
+    return np.asarray(person / (person + shadow * np.exp(-evidence.guess)), np.float32)
 
 
 def tell_shades(
@@ -204,7 +214,7 @@ def _spread(places: tuple[np.ndarray, np.ndarray], chances: np.ndarray, size: tu
     weight, chance = np.zeros((2, *(-(-side // EVERY_PX) for side in size)), np.float32)
     weight[places], chance[places] = 1, chances
     weight, chance = cv2.GaussianBlur(weight, (3, 3), 0), cv2.GaussianBlur(chance, (3, 3), 0)
-    answers = (2 * (weight > 0) + (chance > 0.5 * weight)).astype(np.uint8)
+    answers = (2 * (weight > 0) + (chance > LEAST_CHANCE * weight)).astype(np.uint8)
     whole = answers.repeat(EVERY_PX, axis=0).repeat(EVERY_PX, axis=1)[: size[0], : size[1]]
     return whole == 3, whole >= 2
 

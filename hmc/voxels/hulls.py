@@ -301,7 +301,12 @@ def settle(tables: CompletionTables | None, look: Look, settings: FrontendSettin
         masks, much = complete_masks(tables, masks, doubtful)
     if much:  # people who look like what is around them: what is dark on the floor there may be their shoes
         return masks, doubtful
-    return cut_floor_shadows(tables, views, masks) if settings.cut_shadows else masks, none
+    # Where each shade was weighed with what the floor tells of it, nothing is cut for the floor alone: it would be shoes of its color.
+    untold = [not settings.ask_floor or chance is None or not chance.any() for chance in look.chances]
+    if settings.cut_shadows and any(untold):
+        cut = cut_floor_shadows(tables, views, masks)
+        masks = tuple(after if bare else mask for after, mask, bare in zip(cut, masks, untold, strict=True))
+    return masks, none
 
 
 def _say_still(places: UnseenPlaces) -> Iterator[str]:

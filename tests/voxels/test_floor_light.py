@@ -121,7 +121,7 @@ def test_the_evidence_is_that_of_a_loop_over_pixels(tables, ring, people, shadow
         light.append(np.where(tint < 6, np.clip(np.log(share), -0.7, 0.1), np.nan))
     n_cells, n_told = len(tables.cell_pixels[0]), 0
     for c, one in found.items():
-        told = dict(zip(one.pixels.tolist(), one.brighter.tolist(), strict=True))
+        told = dict(zip(one.pixels.tolist(), zip(one.light.tolist(), one.others.tolist(), strict=True), strict=True))
         width = people[c].shape[1]
         for pixel in range(0, people[c].size, 7):
             cell = int(tables.pixel_cells[c].ravel()[pixel])
@@ -135,18 +135,35 @@ def test_the_evidence_is_that_of_a_loop_over_pixels(tables, ring, people, shadow
                     lights.append(light[other].ravel()[spot])
             asked = shadows[c].ravel()[pixel] and pixel // width % EVERY_PX == 0 and pixel % width % EVERY_PX == 0
             if asked and lights and np.isfinite(light[c].ravel()[pixel]):
-                assert told[pixel] == pytest.approx(np.mean(lights) - light[c].ravel()[pixel], abs=1e-4)
+                assert told[pixel] == pytest.approx((light[c].ravel()[pixel], np.mean(lights)), abs=1e-4)
                 n_told += 1
             else:
                 assert pixel not in told
     assert n_told > 30
 
 
+def chances_of(guess, light, others):
+    evidence = np.broadcast_arrays(*(np.atleast_1d(np.float32(one)) for one in (guess, light, others)))
+    return person_by_floor(FloorEvidence(np.arange(evidence[0].size), *evidence))
+
+
 def test_the_brighter_the_spot_to_others_the_likelier_a_person():
-    brighter = np.linspace(-0.3, 0.6, 10, dtype=np.float32)
+    others = np.linspace(-0.5, 0.0, 10)
     for guess in (-4.0, 0.0, 4.0):
-        chance = person_by_floor(FloorEvidence(np.arange(10), np.full(10, guess, np.float32), brighter))
-        assert (np.diff(chance) > 0).all() and chance[0] < 0.5 < chance[-1]
+        assert (np.diff(chances_of(guess, -0.5, others)) > 0).all()
+    even = chances_of(0.0, -0.5, others)
+    assert even[0] < 0.2 and even[-1] > 0.8 and even[4:6] == pytest.approx(0.5, abs=0.12)  # half way it may be either
+
+
+@pytest.mark.parametrize("guess", [-2.0, 0.0, 2.0])
+def test_what_has_lost_next_to_no_light_is_what_the_guess_says(guess):
+    """Grey trousers before a grey floor: whatever the others see, it cannot be less light than this camera sees."""
+    others = np.linspace(-0.3, 0.05, 8)
+    assert chances_of(guess, -0.01, others) == pytest.approx(1 / (1 + np.exp(-guess)), abs=0.06)
+
+
+def test_a_spot_that_others_see_dark_for_another_reason_does_not_outweigh_a_sure_guess():
+    assert chances_of(4.0, -0.6, -0.6)[0] > 0.8 and chances_of(-4.0, -0.6, 0.0)[0] < 0.2
 
 
 def test_cameras_without_an_empty_scene_or_a_mask_neither_tell_nor_are_told(tables, people, shadows, floors):
