@@ -7,10 +7,12 @@ itself is von Kries's model (1902).
 
 from __future__ import annotations
 
+import functools
+
 import cv2
 import numpy as np
 
-__all__ = ["FEW", "as_image", "brought_back", "in_light_of", "light_gains", "luma_chroma"]
+__all__ = ["FEW", "as_image", "brought_back", "gains_of", "in_light_of", "is_same_light", "light_gains", "luma_chroma"]
 
 #: Every so manieth pixel of each row and column tells of a whole image.
 FEW = (slice(None, None, 16),) * 2
@@ -45,13 +47,19 @@ def light_gains(image: np.ndarray, mean: np.ndarray, people: np.ndarray) -> np.n
     ndarray of float32, shape (rows, columns, 3)
         At the pixels `FEW`; blue, green, red; 1 where nothing tells.
     """
-    seen, empty = image[FEW], as_image(np.ascontiguousarray(mean[FEW]))
-    told = (seen < OVEREXPOSED) & (empty >= TOO_DARK) & ~people[FEW][..., None]
+    return gains_of(image[FEW], mean[FEW], people[FEW])
+
+
+def gains_of(seen: np.ndarray, mean: np.ndarray, people: np.ndarray | None = None) -> np.ndarray:
+    """`light_gains` of what an image, the empty scene and people are at the pixels `FEW`; by default nobody is there."""
+    empty = as_image(np.ascontiguousarray(mean))
+    told = (seen < OVEREXPOSED) & (empty >= TOO_DARK)
+    if people is not None:
+        told &= ~people[..., None]
     ratios = np.log(np.maximum(seen, 1) / np.maximum(empty, 1))
     gains = np.ones(seen.shape, np.float32)
-    y, x = (axis.ravel() for axis in np.meshgrid(*(np.linspace(-1, 1, n) for n in seen.shape[:2]), indexing="ij"))
-    for channel in np.flatnonzero(told.any(axis=(0, 1)) & ~_is_same(ratios, told)):
-        terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1)
+    for channel in np.flatnonzero(~_is_same(ratios, told)):
+        terms = _terms(*seen.shape[:2])
         here = told[..., channel].ravel()
         values = ratios[..., channel].ravel()[here]
         one = _fitted(terms[here, :1], values)
@@ -64,17 +72,31 @@ def light_gains(image: np.ndarray, mean: np.ndarray, people: np.ndarray) -> np.n
     return gains
 
 
+@functools.lru_cache(maxsize=8)
+def _terms(n_rows: int, n_columns: int) -> np.ndarray:
+    """What a polynomial of second order over an image is a sum of, shape (n_rows * n_columns, 6)."""
+    y, x = (axis.ravel() for axis in np.meshgrid(np.linspace(-1, 1, n_rows), np.linspace(-1, 1, n_columns), indexing="ij"))
+    terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1)
+    terms.setflags(write=False)
+    return terms
+
+
 def _is_same(ratios: np.ndarray, told: np.ndarray) -> np.ndarray:
-    """Of each channel, whether most logarithms of factors (h, w, 3) that tell something are those of the same light, in each quarter."""
+    """Of each channel, whether most logarithms of factors (h, w, 3) that tell something, if any, are of the same light, in each quarter."""
     least, (height, width) = np.log(LEAST_GAIN), ratios.shape[:2]
     up, down = told & (ratios < least), told & (ratios > -least)
     same = np.ones(3, bool)
     for rows in (slice(-(-height // 2)), slice(-(-height // 2), None)):
         for columns in (slice(-(-width // 2)), slice(-(-width // 2), None)):
-            half = np.count_nonzero(told[rows, columns], axis=(0, 1)) / 2
+            half = _counts(told[rows, columns]) / 2
             for side in (up, down):  # as of their median
-                same &= (np.count_nonzero(side[rows, columns], axis=(0, 1)) > half) | (half == 0)
+                same &= (_counts(side[rows, columns]) > half) | (half == 0)
     return same
+
+
+def _counts(marked: np.ndarray) -> np.ndarray:
+    """How many pixels are marked in each channel: (h, w, 3) to (3,). NumPy takes more than twice as long along so short an axis."""
+    return np.array(cv2.sumElems(marked.view(np.uint8))[:3])
 
 
 def _fitted(terms: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -99,11 +121,16 @@ def in_light_of(image: np.ndarray, mean: np.ndarray, people: np.ndarray) -> np.n
 
 def brought_back(image: np.ndarray, mean: np.ndarray, gains: np.ndarray | None) -> np.ndarray:
     """An image brought to the light of the empty scene by gains that are known; itself where they are None or nearly 1."""
-    if gains is None or np.all((gains > 1 / LEAST_GAIN) & (gains < LEAST_GAIN)):
+    if gains is None or is_same_light(gains):
         return image
     level = cv2.multiply(image, cv2.resize(1 / gains, image.shape[1::-1]), dtype=cv2.CV_8U)
     # What is overexposed may have been as bright as the scene is.
     return np.maximum(level, as_image(mean), out=level, where=image >= OVEREXPOSED)
+
+
+def is_same_light(gains: np.ndarray) -> bool:
+    """Whether gains (`light_gains`) are nearly 1."""
+    return bool(np.all((gains > 1 / LEAST_GAIN) & (gains < LEAST_GAIN)))
 
 
 def luma_chroma(image: np.ndarray) -> np.ndarray:

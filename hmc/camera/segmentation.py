@@ -19,7 +19,7 @@ import cv2
 import numpy as np
 
 from hmc.camera.image_signs import is_dark
-from hmc.camera.light import FEW, as_image, brought_back, in_light_of, light_gains, luma_chroma
+from hmc.camera.light import FEW, as_image, brought_back, gains_of, is_same_light, light_gains, luma_chroma
 from hmc.camera.mixture import SHADOW, ask_mixture, coarse
 from hmc.camera.noise import blur_for, blurred, is_grey, noise_floor
 from hmc.camera.segmentation_settings import SegmentationSettings
@@ -174,7 +174,8 @@ def train_background(
     for count, frame in enumerate(chain(first, frames), start=1):
         frame = blurred(frame, blur)
         if total is not None and frame.shape == total.shape:
-            frame = in_light_of(frame, total / (count - 1), np.zeros(total.shape[:2], bool))
+            gains = gains_of(frame[FEW], total[FEW] / (count - 1))
+            frame = frame if is_same_light(gains) else brought_back(frame, total / (count - 1), gains)
         mixture.apply(frame, learningRate=1.0 / count)
         color = cv2.cvtColor(frame, cv2.COLOR_BGR2YCrCb)
         if total is None or squares is None:
