@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -72,6 +73,11 @@ class LitView:
 
     image: np.ndarray
     scene: Scene
+
+    @cached_property
+    def colors(self) -> np.ndarray:
+        """Luma and chroma of the smoothed image, uint8, shape (height * width, 3): it is asked of ever other pixels of a frame."""
+        return cv2.GaussianBlur(cv2.cvtColor(self.image, cv2.COLOR_BGR2YCrCb), (3, 3), 0).reshape(-1, 3)
 
 
 def lit_views(
@@ -187,12 +193,7 @@ def darkness(view: LitView, pixels: np.ndarray) -> np.ndarray:
         Logarithms of the shares of that scene's light; `OTHER_COLOR` of pixels that have another color as well, or whose scene was never
         seen.
     """
-    if not len(pixels):
-        return np.zeros(0, np.float32)
-    image, scene = view.image, view.scene
-    box, places = _around(pixels, image.shape, 1)  # the blur takes in one pixel more
-    part = cv2.GaussianBlur(cv2.cvtColor(image[box], cv2.COLOR_BGR2YCrCb), (3, 3), 0)
-    color = part.reshape(-1, 3).take(places, axis=0).astype(np.float32)
+    scene, color = view.scene, view.colors.take(pixels, axis=0).astype(np.float32)
     luma, *chroma = (scene.mean[..., k].reshape(-1).take(pixels) for k in range(3))
     share = np.maximum(color[:, 0], 1) / luma
     lit = np.minimum(share, 1)  # chroma shrinks with the light
