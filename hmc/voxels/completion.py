@@ -169,9 +169,11 @@ def complete_masks(
         shapes = {c: shown(tables.carving.rig[c], there, pixels[c].take(agreed)) for c in telling}
         if turn == 0:
             telling = {c for c in telling if _doubted_beside(*shapes[c], done[c], possible[c]) <= MOST_DOUBT}
-            lost = [_join(*shapes[c], done[c], possible[c], grid.voxel_size_m, ANY)[1] for c in telling]
+        gaps = {c: _gap(*shapes[c], done[c], possible[c], grid.voxel_size_m) for c in telling}
+        if turn == 0:
+            lost = [_join(gaps[c], shapes[c][1], done[c], ANY)[1] for c in telling]
             pieces = ANY if sum(share > LEAST_LOSS for share in lost) >= LEAST_LOSERS else SOLID
-        joined = {c: _join(*shapes[c], done[c], possible[c], grid.voxel_size_m, pieces) for c in telling}
+        joined = {c: _join(gaps[c], shapes[c][1], done[c], pieces) for c in telling}
         losers |= {c for c, (_, share) in joined.items() if share > 0}
         last, done = done, done | {c: mask for c, (mask, _) in joined.items()}
         if all(done[c] is last[c] for c in given):  # another round would find the same
@@ -248,11 +250,9 @@ def doubted_floor(tables: CompletionTables, masks: Sequence[np.ndarray | None], 
     for pixels, mask, doubt in zip(tables.cell_pixels, masks, doubtful, strict=True):
         if mask is None or doubt is None:
             continue
-        told = np.full(mask.size + 1, 2, np.uint8)  # 0: bare, 1: doubted, 2: nothing, as a person hides it or it is not in the image
-        np.maximum(doubt.ravel().view(np.uint8), 2 * mask.ravel().view(np.uint8), out=told[:-1])
-        told = told.take(pixels)
-        doubting += told == 1
-        bare += told == 0
+        hidden, doubted = np.append(mask, True).take(pixels), np.append(doubt, False).take(pixels)  # beyond the image nothing is seen
+        doubting += doubted > hidden
+        bare += ~(doubted | hidden)
     return ((doubting >= 2) & (doubting > bare)).reshape(tables.cells)
 
 
@@ -289,37 +289,54 @@ def shown(camera: Camera, points: np.ndarray, pixels: np.ndarray) -> tuple[np.nd
 
 def _doubted_beside(shape: np.ndarray, scale: float, mask: np.ndarray, possible: np.ndarray) -> float:
     """The share of the image around people, but not near them, that is possibly a person."""
-    near = cv2.dilate(shape | mask, _square(NEAR_M * scale))
-    left, top, width, height = cv2.boundingRect(near)
-    box = slice(top, top + height), slice(left, left + width)
-    beside = 1 - near[box]
+    people, near = shape | mask, _square(NEAR_M * scale)
+    left, top, width, height = cv2.boundingRect(people)
+    if not width:
+        return 0.0
+    margin = len(near) // 2
+    box = slice(max(0, top - margin), top + height + margin), slice(max(0, left - margin), left + width + margin)
+    beside = 1 - cv2.dilate(people[box], near)
     return cv2.countNonZero(beside & possible[box].view(np.uint8)) / max(1, cv2.countNonZero(beside))
 
 
-def _join(
-    shape: np.ndarray, scale: float, mask: np.ndarray, possible: np.ndarray, voxel_m: float, pieces: Pieces
-) -> tuple[np.ndarray, float]:
-    """A mask with the possible pixels that lie deep in the agreed voxels' image, and their neighbours; the share of it that they are.
+@dataclass(frozen=True)
+class _Gap:
+    """Where a mask may be completed: a box of the image, and in it the agreed voxels' image, closed, the mask, and what is free to join."""
 
-    The very mask and 0 where there is nothing to join.
-    """
+    box: tuple[slice, slice]
+    shape: np.ndarray
+    old: np.ndarray
+    free: np.ndarray
+
+
+def _gap(shape: np.ndarray, scale: float, mask: np.ndarray, possible: np.ndarray, voxel_m: float) -> _Gap | None:
+    """What the image of agreed voxels leaves to a mask, at so many pixels a metre; None where it shows none of them."""
     left, top, columns, rows = cv2.boundingRect(shape)
     if not rows:
-        return mask, 0.0
+        return None
     margin = round((voxel_m + NEAR_M) * scale) + 4
     box = slice(max(0, top - margin), top + rows - 1 + margin), slice(max(0, left - margin), left + columns - 1 + margin)
     shape = cv2.morphologyEx(shape[box], cv2.MORPH_CLOSE, np.ones((round(voxel_m * scale) + 3,) * 2, np.uint8))
     old = np.ascontiguousarray(mask[box])
-    free = shape & possible[box].view(np.uint8) & (1 - old)
-    three = np.ones((3, 3), np.uint8)
-    deep = free & cv2.erode(shape, _square(pieces.deep_m * scale))
+    return _Gap(box, shape, old, shape & possible[box].view(np.uint8) & (1 - old))
+
+
+def _join(gap: _Gap | None, scale: float, mask: np.ndarray, pieces: Pieces) -> tuple[np.ndarray, float]:
+    """A mask with the possible pixels that lie deep in the agreed voxels' image, and their neighbours; the share of it that they are.
+
+    The very mask and 0 where there is nothing to join.
+    """
+    if gap is None:
+        return mask, 0.0
+    deep = gap.free & cv2.erode(gap.shape, _square(pieces.deep_m * scale))
     sure = cv2.morphologyEx(deep, cv2.MORPH_OPEN, _square(max(1.0, pieces.solid_m * scale)))
     if not sure.any():
         return mask, 0.0
-    grown = cv2.morphologyEx((cv2.dilate(sure, _square(NEAR_M * scale)) & free) | old, cv2.MORPH_OPEN, three) | old
+    grown = cv2.dilate(sure, _square(NEAR_M * scale)) & gap.free | gap.old
+    grown = cv2.morphologyEx(grown, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)) | gap.old
     out = mask.copy()
-    out[box] |= cv2.morphologyEx(grown, cv2.MORPH_CLOSE, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (5, 5)))
-    return out, cv2.countNonZero(sure) / max(1, cv2.countNonZero(old))
+    out[gap.box] |= cv2.morphologyEx(grown, cv2.MORPH_CLOSE, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (5, 5)))
+    return out, cv2.countNonZero(sure) / max(1, cv2.countNonZero(gap.old))
 
 
 def _square(reach: float) -> np.ndarray:

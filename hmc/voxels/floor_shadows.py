@@ -129,7 +129,7 @@ def cut_filled_shadows(
     """
     if not any(mask is not None and fill is not None and fill.any() for mask, fill in zip(masks, filled, strict=True)):
         return tuple(masks)
-    sure = [mask if mask is None or fill is None else mask & ~fill for mask, fill in zip(masks, filled, strict=True)]
+    sure = [mask if mask is None or fill is None else mask > fill for mask, fill in zip(masks, filled, strict=True)]
     shadow = np.append(doubted_floor(tables, sure, doubtful), False)
     cut = list(masks)
     for c, (mask, fill) in enumerate(zip(masks, filled, strict=True)):
