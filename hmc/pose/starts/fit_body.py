@@ -102,46 +102,45 @@ def fit_body(
         samples = body_points(other, coordinates)
         return [one.of_body(other, samples) for one in objectives]
 
-    def rows(shape, states):
-        """Residuals of each frame, how they change with the pose and with the dimensions, and what speeds up others near them."""
+    def rows(shape, states, found):
+        """Residuals of each frame (`found`), and how they change with the pose and with the dimensions."""
         step = 0.01
-        here, beside = with_shape(shape), [with_shape(shape + step * unit) for unit in np.eye(len(shape))]
+        beside = [with_shape(shape + step * unit) for unit in np.eye(len(shape))]
 
         def of_frames(lot):
             out = []
             for k in lot:
-                found = here[k].linearise(states[k])
-                residual, jacobian = residual_rows(found)
-                by_shape = [other[k].linearise(states[k], found.near).residuals for other in beside]
-                out.append(((residual, jacobian, (np.array(by_shape).T - residual[:, None]) / step), found.near))
+                residual, jacobian = residual_rows(found[k])
+                by_shape = [other[k].linearise(states[k], found[k].near).residuals for other in beside]
+                out.append((residual, jacobian, (np.array(by_shape).T - residual[:, None]) / step))
             return out
 
         n = min(workers, len(states))
         lots = [range(k, len(states), n) for k in range(n)]
         told = share_out([partial(of_frames, lot) for lot in lots], workers)
-        in_turn = [told[k % n][k // n] for k in range(len(states))]
-        return [of_frame for of_frame, _ in in_turn], [near for _, near in in_turn]
+        return [told[k % n][k // n] for k in range(len(states))]
 
     def costs(shape, states, near):
-        data = [one.linearise(state, there).residuals for one, state, there in zip(with_shape(shape), states, near, strict=True)]
-        fit = sum(float(r @ r) for r in data)
+        """The cost of all and of the data a frame, and each frame's residuals, which are told more quickly near others."""
+        found = [one.linearise(state, there) for one, state, there in zip(with_shape(shape), states, near, strict=True)]
+        fit = sum(float(one.residuals @ one.residuals) for one in found)
         total = fit + float((prior.hold * (states - prior.anchors) ** 2).sum()) + len(states) * float(prior.precision @ shape**2)
-        return total, fit / len(states)
+        return total, fit / len(states), found
 
-    total, before = costs(shape, states, [None] * len(states))
+    total, before, found = costs(shape, states, [None] * len(states))
     after, damping = before, 1e-2
     for _ in range(settings.iterations):
-        frames, near = rows(shape, states)
+        frames, near = rows(shape, states, found), [one.near for one in found]
         for _ in range(4):
             trial_shape, trial_states = _gauss_newton(frames, shape, states, prior, damping, body.limits)
-            trial_total, trial_fit = costs(trial_shape, trial_states, near)
+            trial_total, trial_fit, trial_found = costs(trial_shape, trial_states, near)
             if trial_total < total:
                 break
             damping *= 8
         else:
             break
         gain = (total - trial_total) / total
-        shape, states, total, after = trial_shape, trial_states, trial_total, trial_fit
+        shape, states, total, after, found = trial_shape, trial_states, trial_total, trial_fit, trial_found
         damping = max(0.3 * damping, 1e-3)
         if gain < 3e-3:
             break

@@ -179,8 +179,10 @@ def _followed(subject, window, preset, settings, anchor, chosen) -> tuple[list[f
 
     First all for a short while, and then those that are not far behind by then and go their own way; the others cost infinitely much.
     """
-    frame_rng, step = window.frame_rng, quick_step(preset)
-    paths: list[_Path] = [{} for _ in chosen]
+    frame_rng, step, workers = window.frame_rng, quick_step(preset), window.capture.workers
+    # Both ways begin with the step in the frame between them.
+    firsts = [partial(step, frame_rng(anchor), begin_tracking(subject, state), window.views[anchor]) for state in chosen]
+    paths: list[_Path] = [{anchor: first} for first in share_out(firsts, workers)]
     scores, left = np.zeros(len(chosen)), list(range(len(chosen)))
     for follow_s in (*settings.trials_s, settings.follow_s):
         reach = max(2, round(follow_s * window.capture.fps))
@@ -192,7 +194,7 @@ def _followed(subject, window, preset, settings, anchor, chosen) -> tuple[list[f
             return walk(lambda frame: frame_rng(begin + frame), step, begin_tracking(subject, chosen[k]), anchor - begin, views, known)
 
         halves = range(first, anchor + 1), range(anchor, last)
-        found = share_out([partial(follow, k, half) for k in left for half in halves], window.capture.workers)
+        found = share_out([partial(follow, k, half) for k in left for half in halves], workers)
         scores[:] = np.inf
         for k, before, after in zip(left, found[::2], found[1::2], strict=True):
             path = [*before, *after[1:]]

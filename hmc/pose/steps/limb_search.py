@@ -108,6 +108,7 @@ def search_limbs(
     limbs: Sequence[str],
     refine_settings: RefineSettings,
     settings: SearchSettings,
+    misfit: Misfit | None = None,
 ) -> tuple[np.ndarray, float, int]:
     """A pose with limbs looked for, one after the other.
 
@@ -121,6 +122,8 @@ def search_limbs(
         As from `lost_limbs`.
     refine_settings : RefineSettings
     settings : SearchSettings
+    misfit : Misfit, optional
+        Of the pose, where it is known.
 
     Returns
     -------
@@ -133,7 +136,8 @@ def search_limbs(
     evaluations = 0
     for limb in limbs:
         trials = np.repeat(state[None], settings.draws + 1, axis=0)
-        trials[1:, LIMBS[limb].dofs] = _draw(rng, settings, objective, state, limb)
+        misfit = objective.linearise(state).misfit if misfit is None else misfit
+        trials[1:, LIMBS[limb].dofs] = _draw(rng, settings, objective.body, state, limb, misfit)
         costs = coarse.cost(trials)  # the first is the present pose
         evaluations += len(trials)
         if costs[1:].min() > settings.draw_ratio * costs[0]:
@@ -143,7 +147,7 @@ def search_limbs(
         trial, info = refine_best(objective, starts, refine_settings, stop_early=has_failed)
         evaluations += info.evaluations
         if info.cost_after < (1 - settings.gain) * cost:
-            state, cost = trial, info.cost_after
+            state, cost, misfit = trial, info.cost_after, info.misfit
     return state, cost, evaluations
 
 
@@ -160,12 +164,12 @@ def _has_failed(
     return has_failed
 
 
-def _draw(rng: np.random.Generator, settings: SearchSettings, objective: Objective, state: np.ndarray, limb: str) -> np.ndarray:
+def _draw(
+    rng: np.random.Generator, settings: SearchSettings, body: BodyModel, state: np.ndarray, limb: str, misfit: Misfit | None
+) -> np.ndarray:
     """Random poses of a limb: some reach for hull points that no part covers, some are common ones, and some may be any."""
-    body = objective.body
     dofs = LIMBS[limb].dofs
     low, high = body.limits.low[dofs], body.limits.high[dofs]
-    misfit = objective.linearise(state).misfit
     goals = np.zeros((0, 3)) if misfit is None else _goals(body, state, limb, misfit, settings)
     n_reach = round(settings.reach_share * settings.draws) if len(goals) else 0
     n_common = (settings.draws - n_reach) // 2

@@ -112,7 +112,7 @@ def searched(
     if settings.search is None or info.misfit is None:
         return estimate, info.cost, 0
     limbs = lost_limbs(rng, objective.body, estimate, info.misfit, settings.search)
-    return search_limbs(rng, objective, (estimate, info.cost), limbs, settings.refine, settings.search)
+    return search_limbs(rng, objective, (estimate, info.cost), limbs, settings.refine, settings.search, info.misfit)
 
 
 def polished(propose: Propose, settings: PolishSettings, make_objective: MakeObjective | None = None) -> PoseStep:
