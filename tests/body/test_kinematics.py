@@ -120,6 +120,13 @@ def test_one_state_or_many_give_the_same():
         assert_allclose(points[index], landmarks(BODY, states[index]), atol=1e-14)
 
 
+def test_one_state_alone_is_the_same_to_the_last_digit():
+    for state in random_states(5, 20):
+        rotations, positions = segment_transforms(BODY, state)
+        _, _, turned, placed = joint_twists(BODY, state)
+        assert np.array_equal(turned, rotations) and np.array_equal(placed, positions)
+
+
 @settings(max_examples=30)
 @given(seed=st.integers(0, 2**31))
 @pytest.mark.parametrize("body", [BODY, canton_body(1.6)], ids=["default", "canton"])
