@@ -377,8 +377,8 @@ def check_recipe(recipe: Recipe, where: str) -> None:
     within(recipe.silhouette_every, 1, 10**6, "silhouette_every")
     within(recipe.cell_m, 0.008, 0.03, "cell_m")
     within(recipe.light.lamps, 1, 6, "lamps")
-    for side in recipe.rig.size_px:
-        within(side, 8, MOST_PX, "each side of the images, size_px,")
+    for pixels in recipe.rig.size_px:
+        within(pixels, 8, MOST_PX, "each side of the images, size_px,")
     within(recipe.rig.field_of_view_deg, 0, 150, "field_of_view_deg")
     for side in recipe.room.size_m:
         within(side, 1, MOST_SIDE_M, "each side of the room, size_m,")
@@ -391,8 +391,8 @@ def check_recipe(recipe: Recipe, where: str) -> None:
             raise InputError(f"{where}: [room] takes one wall texture and color or four of each; got {count}")
     for item in recipe.furniture:
         among(item.kind, FURNITURE, "furniture")
-        for side in item.size_m or ():
-            within(side, 0.01, MOST_SIDE_M, "each side of a piece of furniture, size_m,")
+        for edge in item.size_m or ():
+            within(edge, 0.01, MOST_SIDE_M, "each side of a piece of furniture, size_m,")
     for wall, _ in recipe.room.doors:
         within(wall, 0, 3, "the wall of a door")
     if len(recipe.actors) > MOST_ACTORS:

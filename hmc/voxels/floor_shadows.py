@@ -76,7 +76,7 @@ class LitView:
 
     @cached_property
     def colors(self) -> np.ndarray:
-        """Luma and chroma of the smoothed image, uint8, shape (height * width, 3): it is asked of ever other pixels of a frame."""
+        """Luma and chroma of the smoothed image, uint8, shape (height * width, 3): asked of other pixels again and again."""
         return cv2.GaussianBlur(cv2.cvtColor(self.image, cv2.COLOR_BGR2YCrCb), (3, 3), 0).reshape(-1, 3)
 
 
