@@ -35,8 +35,8 @@ MOST_LOGIT = 4.0
 #: Deviation of what the others see (logarithms of shares of light), and the likelihood, against that of no deviation, of what is neither:
 #: a spot that a third person shades, or that is hidden.
 SPREAD, UNLIKE = 0.11, 0.13
-#: From this chance on it stays, as of the guess (`SegmentationSettings.least_chance`): a shadow of one camera is in no hull, but a leg that it
-#: lost is out of the hull too.
+#: From this chance on it stays, as of the guess (`SegmentationSettings.least_chance`): a shadow of one camera is in no hull, but a leg that
+#: it lost is out of the hull too.
 LEAST_CHANCE = 0.4
 #: The floor is asked of every so manieth pixel of each row and column.
 EVERY_PX = 2
