@@ -43,6 +43,9 @@ logger = logging.getLogger("hmc")
 
 #: Images of the empty scene by which it is told whether a camera has moved.
 SCENE_IMAGES = 5
+#: What a camera takes for a person with this chance is not cut for what the floor shows. Less leaves shadows (r1 and two rooms drawn at
+#: random: from .6 on a hundredth of the silhouettes' overlap), more loses shoes and shanks of the floor's color (`pale`).
+KEPT_CHANCE = 0.8
 
 
 @dataclass(frozen=True)
@@ -301,12 +304,15 @@ def settle(tables: CompletionTables | None, look: Look, settings: FrontendSettin
         masks, much = complete_masks(tables, masks, doubtful)
     if much:  # people who look like what is around them: what is dark on the floor there may be their shoes
         return masks, doubtful
-    # Where each shade was weighed with what the floor tells of it, nothing is cut for the floor alone: it would be shoes of its color.
-    untold = [not settings.ask_floor or chance is None or not chance.any() for chance in look.chances]
-    if settings.cut_shadows and any(untold):
+    if settings.cut_shadows:
         cut = cut_floor_shadows(tables, views, masks)
-        masks = tuple(after if bare else mask for after, mask, bare in zip(cut, masks, untold, strict=True))
+        masks = tuple(map(_with_sure_shades, cut, masks, look.chances)) if settings.ask_floor else cut
     return masks, none
+
+
+def _with_sure_shades(cut: np.ndarray | None, mask: np.ndarray | None, chance: np.ndarray | None) -> np.ndarray | None:
+    """A cut silhouette with what its camera surely takes for a person: shoes of the floor's color, which stand in their own shadow."""
+    return cut if cut is mask or cut is None or mask is None or chance is None else cut | (mask & (chance >= round(255 * KEPT_CHANCE)))
 
 
 def _say_still(places: UnseenPlaces) -> Iterator[str]:

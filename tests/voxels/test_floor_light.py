@@ -10,6 +10,9 @@ from hmc.camera.shade import floor_pixels
 from hmc.voxels.completion import make_completion_tables
 from hmc.voxels.floor_light import EVERY_PX, FloorEvidence, floor_evidence, person_by_floor, tell_shades
 from hmc.voxels.floor_shadows import Scene, lit_views
+from hmc.voxels.frontend_settings import FrontendSettings
+from hmc.voxels.hulls import settle
+from hmc.voxels.looks import Look
 
 ROOM = np.array([[-2.5, -2.5, 0.0], [2.5, 2.5, 2.2]])
 FLOOR, WALL, DARK = (110, 125, 140), (190, 170, 150), 0.6
@@ -175,3 +178,21 @@ def test_cameras_without_an_empty_scene_or_a_mask_neither_tell_nor_are_told(tabl
     scenes = [scene_of(image) for image in empty]
     done = tell_shades(tables, lit(images, scenes), [None, *chances[1:]], [*people[:2], None, *people[3:]])
     assert done[0] is people[0] and done[2] is None
+
+
+def test_what_the_network_is_sure_of_is_not_cut_for_the_floor_alone(tables, people, shadows, floors):
+    """Shoes of the floor's color stand in their own shadow: all cameras see the spot as dark, and one rule must not undo what the other said."""
+    empty = empty_images(floors)
+    images, none = darkened(empty, shadows), (None,) * len(empty)
+    masks = tuple(person | shadow for person, shadow in zip(people, shadows, strict=True))
+    scenes = tuple(scene_of(image) for image in empty)
+
+    def left(chances):
+        look = Look(0, tuple(images), masks, none, none, chances, none, scenes, ())
+        after, _ = settle(tables, look, FrontendSettings(complete=False))
+        return sum(int((mask & shadow & ~person).sum()) for mask, shadow, person in zip(after, shadows, people, strict=True))
+
+    whole = sum(int((shadow & ~person).sum()) for shadow, person in zip(shadows, people, strict=True))
+    assert left(tuple(guesses(shadows, 0.99))) > 0.9 * whole  # told, and left
+    assert left(none) < 0.5 * whole  # where there was no guess, the floor decides as before
+    assert left(tuple(guesses(shadows, 0.3))) < 0.2 * whole
