@@ -181,7 +181,7 @@ def test_cameras_without_an_empty_scene_or_a_mask_neither_tell_nor_are_told(tabl
 
 
 def test_what_the_network_is_sure_of_is_not_cut_for_the_floor_alone(tables, people, shadows, floors):
-    """Shoes of the floor's color stand in their own shadow: all cameras see the spot as dark, and one rule must not undo what the other said."""
+    """Shoes of the floor's color stand in their own shadow: all cameras see the spot as dark."""
     empty = empty_images(floors)
     images, none = darkened(empty, shadows), (None,) * len(empty)
     masks = tuple(person | shadow for person, shadow in zip(people, shadows, strict=True))
