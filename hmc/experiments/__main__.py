@@ -160,7 +160,7 @@ def _run_one(name: str, experiment: Experiment, out: Path, asked: Plan, args: ar
         _tell(f"{experiment.id}: {len(outcome.failures)} cells failed; the same command tries them again", sys.stderr)
         return False
     for claim in outcome.report.claims:
-        _tell(f"  {'holds  ' if claim.holds else 'DIFFERS'} {claim.text}{': ' if claim.detail else ''}{claim.detail}")
+        _tell(f"  {claim.verdict:9} {claim.text}{': ' if claim.detail else ''}{claim.detail}")
     _tell(f"  wrote {folder}")
     return True
 

@@ -20,7 +20,7 @@ from hmc.body.proportions import DEFAULT_LENGTHS, SOLE, default_body, make_body,
 from hmc.errors import InputError
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs, rendered
-from hmc.experiments.engine.intervals import difference
+from hmc.experiments.engine.intervals import decide, difference
 from hmc.experiments.markerless_runs import FRONTEND, VOXEL_M, opened
 from hmc.experiments.truth import all_truth, standing_state, true_silhouettes
 from hmc.io.masks import MaskStep
@@ -194,10 +194,11 @@ def _nearer(what: str, labels: Sequence[str], means: dict[str, np.ndarray], with
     n, one_each = len(labels), np.ones(len(labels))
     helped = int((means[AS_IT_IS] < means[without]).sum())
     nearer = difference(labels, (means[without], one_each), (means[AS_IT_IS], one_each))
-    return Claim(
+    return decide(
         f"{what} landmarks nearer: on {LEAST_HELPED:.0%} of the recordings or more, and on their mean",
-        helped >= LEAST_HELPED * n and nearer.above_zero,
+        nearer,
         f"on {helped} of {n}; on the mean by {nearer} mm",
+        helped >= LEAST_HELPED * n,
     )
 
 

@@ -19,7 +19,7 @@ from hmc.experiments.chain_runs import FEW, MANY, name_of
 from hmc.experiments.cue_runs import BOTH, FAMILY, KEYPOINTS, SILHOUETTES, VERSION, WAYS, cell
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Source, Table
 from hmc.experiments.engine.inputs import recipe_of, rendered
-from hmc.experiments.engine.intervals import Interval
+from hmc.experiments.engine.intervals import Interval, decide
 from hmc.experiments.engine.style import COLORS
 from hmc.experiments.keypoint_faults import FAULTS, NO_FAULT
 from hmc.experiments.run_means import RunValues, gains, mean_interval, run_values
@@ -221,7 +221,7 @@ def _claims(cells: Sequence[Cell]) -> Iterator[Claim]:
             if gain:
                 found, pair = mean_interval(gain), [mean_interval({run: means[cues][n][run] for run in gain}) for cues in (BOTH, other)]
                 detail = f"{pair[0].value:.1f} mm for {pair[1].value:.1f}: nearer by {found} mm, {_of_runs(gain)}"
-                yield Claim(f"{n} cameras: both are nearer than {other} alone", found.above_zero, detail)
+                yield decide(f"{n} cameras: both are nearer than {other} alone", found, detail)
     wrists = _by_cameras(plain, BOTH, partial(_mean_mm, joints=WRISTS)).get(MANY, {})
     if wrists:
         found = mean_interval(wrists)
@@ -233,9 +233,7 @@ def _claims(cells: Sequence[Cell]) -> Iterator[Claim]:
         for when, cost in (("", whole), (" while it lasts", there)):
             if cost:
                 found = mean_interval(cost)
-                yield Claim(
-                    f"{fault}: costs both less than {COST_MM:g} mm{when}", bool(found.high < COST_MM), f"{found} mm, {_of_runs(cost)}"
-                )
+                yield decide(f"{fault}: costs both less than {COST_MM:g} mm{when}", found.under(COST_MM), f"{found} mm, {_of_runs(cost)}")
 
 
 def _by_cameras(cells: Sequence[Cell], cues: str, value: Callable[[Cell], float]) -> ByCameras:

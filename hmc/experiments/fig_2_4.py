@@ -13,8 +13,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from hmc.errors import InputError
-from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
+from hmc.experiments.engine.experiment import Cell, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs
+from hmc.experiments.engine.intervals import decide
 from hmc.experiments.five_actions import action_recipes
 from hmc.experiments.markerless_runs import FRONTEND, MASKS_KEY, action_sources, tracked
 from hmc.experiments.run_means import gains, mean_interval
@@ -98,7 +99,7 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
             row |= {f"{name}_deg": known.value, f"{name}_low_deg": known.low, f"{name}_high_deg": known.high}
         rows.append(row)
     gain = mean_interval(gains(_by_frame(cells, "plain"), _by_frame(cells, "visible")))
-    claim = Claim("colors by visibility are nearer to the true ones than the plain average", gain.above_zero, f"by {gain} degrees")
+    claim = decide("colors by visibility are nearer to the true ones than the plain average", gain, f"by {gain} degrees")
     caption = "Mean angle between estimated and true colors of surface voxels. The paper: Canton, Figure 2.4, pictures."
     return Report((Table("fig-2.4", caption, rows),), {"fig-2.4": _draw(cells)}, (claim,))
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs
+from hmc.experiments.engine.intervals import decide
 from hmc.experiments.engine.style import COLORS
 from hmc.experiments.run_means import gains, mean_interval, run_values
 from hmc.experiments.toy_likelihood import BOUNDS, drawn_peaks, log_mixture
@@ -116,7 +117,7 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
 
 def _ahead(text: str, more: Sequence[Cell], less: Sequence[Cell], value: Callable[[Cell], float], unit: str) -> Claim:
     gain = mean_interval(gains(run_values(more, value, "function"), run_values(less, value, "function")))
-    return Claim(text, gain.above_zero, f"by {gain.value:.2f} [{gain.low:.2f}, {gain.high:.2f}] {unit}")
+    return decide(text, gain, f"by {gain.value:.2f} [{gain.low:.2f}, {gain.high:.2f}] {unit}")
 
 
 EXPERIMENT = Experiment("fig-3.3", "particle filter and annealed one on several peaks", "Canton, Figure 3.3", grid, cell, report, version=2)

@@ -14,6 +14,7 @@ import numpy as np
 
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs
+from hmc.experiments.engine.intervals import decide
 from hmc.experiments.run_means import gains, mean_interval, run_values
 from hmc.experiments.toy_likelihood import BOUNDS, moving_log_likelihood, target_path
 from hmc.search import AnnealedSettings, annealed_step, particle_init
@@ -105,7 +106,7 @@ def _row(cells: Sequence[Cell], particles: int, layers: int) -> dict:
 def _better(text: str, by_layers: dict, more: int, less: int, told: str) -> Claim:
     gain = mean_interval(gains(by_layers[more], by_layers[less]))
     detail = f"{more} layers are better than {less} by {gain.value:.3f} [{gain.low:.3f}, {gain.high:.3f}]; {told}"
-    return Claim(text, gain.above_zero, detail)
+    return decide(text, gain, detail)
 
 
 EXPERIMENT = Experiment("fig-3.5", "over-annealing: layers by particles a layer", "Canton, Figure 3.5", grid, cell, report, version=2)

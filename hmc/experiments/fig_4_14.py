@@ -10,8 +10,8 @@ import numpy as np
 from hmc.experiments import table_4_3
 from hmc.experiments import tracking_runs as runs
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
-from hmc.experiments.engine.intervals import interval
-from hmc.experiments.tracking_intervals import ahead, is_followed
+from hmc.experiments.engine.intervals import decide, interval
+from hmc.experiments.tracking_intervals import ahead, following
 
 __all__ = ["EXPERIMENT"]
 
@@ -71,12 +71,12 @@ def _claims(preset: str, cells: Sequence[Cell]) -> list[Claim]:
     clips = list(dict.fromkeys(one.parameters["recording"] for one in own))
     gains = [_ahead([one for one in own if one.parameters["recording"] == clip]) for clip in clips]
     gain = interval(clips, np.array(gains), np.ones(len(clips)))
-    followed = is_followed([one for one in own if one.parameters["tracker"] == "sparse"])
+    followed = following([one for one in own if one.parameters["tracker"] == "sparse"])
     return [
-        Claim(
+        decide(
             f"{preset}: SS above PF at equal factor, in MOTP",
-            gain.above_zero and followed,
-            f"{gain} mm less, over all voxel sizes, raw and color" + ("" if followed else "; people are not followed"),
+            (gain, followed),
+            f"{gain} mm less, over all voxel sizes, raw and color" + ("" if followed.above_zero else "; people may be lost"),
         ),
         *claims,
     ]

@@ -13,9 +13,9 @@ import numpy as np
 from scipy.ndimage import uniform_filter
 
 from hmc.experiments.ellipsoid import VOXEL_M, person_voxels
-from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
+from hmc.experiments.engine.experiment import Cell, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs
-from hmc.experiments.engine.intervals import interval
+from hmc.experiments.engine.intervals import decide, interval
 from hmc.experiments.engine.style import COLORS
 from hmc.search import systematic
 
@@ -109,9 +109,9 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     upper.legend()
     lower.set(xlabel="step", ylabel="error of the centroid (mm)", ylim=(0, None))
     gain = interval([""] * len(spreads["surface"]), spreads["surface"] - spreads["interior"], np.ones(len(spreads["surface"])))
-    claim = Claim(
+    claim = decide(
         "samples spread faster over the surface",
-        gain.above_zero,
+        gain,
         f"mean over {STEPS} steps {spreads['surface'].mean():.2f} of uniform samples' spread against {spreads['interior'].mean():.2f}; "
         f"between {gain.low:.3f} and {gain.high:.3f} more",
     )

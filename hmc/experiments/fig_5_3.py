@@ -14,7 +14,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from hmc.experiments import pose_runs as runs
-from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
+from hmc.experiments.engine.experiment import Cell, Experiment, Plan, Report, Table
+from hmc.experiments.engine.intervals import decide
 from hmc.experiments.engine.style import COLORS
 from hmc.experiments.run_means import gains, mean_interval, run_values
 from hmc.experiments.truth import estimates
@@ -75,8 +76,8 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     less = mean_interval({run: mean[run] + matched[run] for run in mean if run in matched})
     told = f"the mean changes by {mean_interval(mean)} mm, MMTP by {mean_interval(matched)}"
     claims = (
-        Claim("MMTA is lower where landmarks are exchanged or lost", lost.above_zero, f"lower by {_percent(lost)}"),
-        Claim("the mean is biased by them, and MMTP less so", more.above_zero and less.above_zero, told),
+        decide("MMTA is lower where landmarks are exchanged or lost", lost, f"lower by {_percent(lost)}"),
+        decide("the mean is biased by them, and MMTP less so", (more, less), told),
     )
     caption = (
         f"Scores of frames, matched within {runs.PAPER_THRESHOLD_MM:g} mm: of one frame of each kind (that of the middle mean error), and "

@@ -14,7 +14,8 @@ import numpy as np
 from scipy.stats import norm
 
 from hmc.experiments import pose_runs as runs
-from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
+from hmc.experiments.engine.experiment import Cell, Experiment, Plan, Report, Table
+from hmc.experiments.engine.intervals import decide
 from hmc.experiments.engine.style import COLORS
 from hmc.experiments.run_means import gains, mean_interval, run_values
 from hmc.metrics.threshold import choose_threshold, lilliefors_statistic, normal_quantiles, quantile_r2
@@ -54,7 +55,7 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     for method in ("canton2009", "default"):
         gain = mean_interval(gains(straight["markers"], straight[method]))
         detail = f"R^2 larger by {gain.value:.3f} [{gain.low:.3f}, {gain.high:.3f}]"
-        claims.append(Claim(f"marker-based errors are nearer to a Gaussian: {runs.METHODS[method]}", gain.above_zero, detail))
+        claims.append(decide(f"marker-based errors are nearer to a Gaussian: {runs.METHODS[method]}", gain, detail))
     caption = "Errors of all landmarks and frames; R^2 also run by run, with its interval. The paper: Canton, Figure 5.4, without figures."
     return Report((Table("fig-5.4", caption, rows),), {"fig-5.4": figure}, tuple(claims))
 

@@ -14,7 +14,8 @@ import numpy as np
 from scipy.stats import spearmanr
 
 from hmc.experiments import pose_runs as runs
-from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
+from hmc.experiments.engine.experiment import Cell, Experiment, Plan, Report, Table
+from hmc.experiments.engine.intervals import decide
 from hmc.experiments.engine.style import COLORS
 from hmc.experiments.run_means import gains, mean_interval, run_values
 from hmc.metrics.landmarks import LandmarkScores, score
@@ -40,8 +41,8 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     together = mean_interval({run: -value for run, value in per_run["deviation"].items()})
     steadier = mean_interval(gains(per_run["MMTP"], per_run["mean"]))
     claims = (
-        Claim("the deviation rises where MMTA falls", together.above_zero, f"rank correlation, sign exchanged, {_told(together)}"),
-        Claim("the mean goes with what is lost more than MMTP does", steadier.above_zero, f"correlations differ by {_told(steadier)}"),
+        decide("the deviation rises where MMTA falls", together, f"rank correlation, sign exchanged, {_told(together)}"),
+        decide("the mean goes with what is lost more than MMTP does", steadier, f"correlations differ by {_told(steadier)}"),
     )
     caption = (
         f"Rank correlation over the frames of a run with MMTA (matched within {runs.PAPER_THRESHOLD_MM:g} mm), mean over runs and its "

@@ -14,7 +14,8 @@ import numpy as np
 from scipy.stats import norm
 
 from hmc.experiments import pose_runs as runs
-from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
+from hmc.experiments.engine.experiment import Cell, Experiment, Plan, Report, Table
+from hmc.experiments.engine.intervals import decide
 from hmc.experiments.engine.style import COLORS
 from hmc.experiments.run_means import RunValues, mean_interval, run_values
 from hmc.metrics.landmarks import score
@@ -60,14 +61,14 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     factors, gain = _by_run(known, _apart), mean_interval(_by_run(known, _straighter))
     agree = mean_interval({run: float(factor < np.log1p(AGREE)) for run, factor in factors.items()})
     claims = (
-        Claim(
+        decide(
             "both tests usually choose about the same threshold",
-            agree.low > 0.5,
+            agree.over(0.5),
             f"within {AGREE:.0%} in {agree.value:.0%} of the runs [{agree.low:.0%}, {agree.high:.0%}]",
         ),
-        Claim(
+        decide(
             "errors up to the threshold are nearer to a Gaussian than all",
-            gain.above_zero,
+            gain,
             f"R^2 larger by {gain.value:.3f} [{gain.low:.3f}, {gain.high:.3f}]",
         ),
     )

@@ -14,6 +14,7 @@ import numpy as np
 
 from hmc.experiments import pose_runs as runs
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
+from hmc.experiments.engine.intervals import decide
 from hmc.experiments.engine.style import COLORS
 from hmc.experiments.run_means import gains, mean_interval, run_values
 from hmc.experiments.truth import estimates
@@ -79,7 +80,7 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
 
 def _claim(text: str, values: dict, what: str) -> Claim:
     gain = mean_interval(values)
-    return Claim(text, gain.above_zero, f"{what} by {gain.value:.2f} degrees [{gain.low:.2f}, {gain.high:.2f}]")
+    return decide(text, gain, f"{what} by {gain.value:.2f} degrees [{gain.low:.2f}, {gain.high:.2f}]")
 
 
 def _mean_error(threshold: float | None) -> Callable[[Cell], float]:

@@ -22,7 +22,7 @@ from hmc.body.joints import DOF_NAMES
 from hmc.body.proportions import canton_body
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs
-from hmc.experiments.engine.intervals import Interval
+from hmc.experiments.engine.intervals import Interval, decide
 from hmc.experiments.engine.style import COLORS
 from hmc.experiments.markerless_runs import FRONTEND, MASKS_KEY, action_sources, tracked
 from hmc.experiments.run_means import gains, mean_interval
@@ -148,7 +148,7 @@ def _by_frame(cells: Sequence[Cell], value: Callable[[Cell], float]) -> dict:
 def _more(text: str, first: dict, second: dict, what: str, there: Interval) -> Claim:
     """That the first figure is larger; nothing is claimed of a likelihood that is no nearer to the truth than any place is."""
     gain = mean_interval(gains(first, second))
-    return Claim(text, gain.above_zero and there.above_zero, f"{gain.value:.2f} [{gain.low:.2f}, {gain.high:.2f}] {what}")
+    return decide(text, (gain, there), f"{gain.value:.2f} [{gain.low:.2f}, {gain.high:.2f}] {what}")
 
 
 def _n_modes(one: Cell, panel: int) -> float:

@@ -19,12 +19,13 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from hmc.experiments import marker_runs as runs
-from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report
+from hmc.experiments.engine.experiment import Cell, Experiment, Plan, Report
+from hmc.experiments.engine.intervals import Interval, decide
 from hmc.experiments.engine.selection import REPEAT
 from hmc.experiments.filter_study import QUICK_ACTIONS
 from hmc.experiments.five_actions import ACTIONS
 from hmc.experiments.markerless_runs import action_sources
-from hmc.experiments.pose_intervals import ahead, is_followed, score_difference
+from hmc.experiments.pose_intervals import ahead, following, score_difference
 from hmc.experiments.study import runs_of, score_table, table_of
 from hmc.experiments.table_6_3 import SEEDS
 
@@ -71,9 +72,9 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     )
     clean = those(false_positives=0.0, variance_px2=0.0)
     claims = [
-        Claim(
+        decide(
             "robust against false positives: the most of them cost less than the most noise does",
-            is_followed(clean) and noise.above_zero and false.high < noise.low,
+            (following(clean), noise, Interval(noise.value - false.value, noise.low - false.high, noise.high - false.low)),
             f"MMTA, from none to most: false positives cost {false} %, noise {noise} %",
         )
     ]

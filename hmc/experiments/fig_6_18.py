@@ -11,8 +11,9 @@ from collections.abc import Sequence
 import matplotlib.pyplot as plt
 
 from hmc.experiments import filter_study as runs
-from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report
-from hmc.experiments.pose_intervals import ahead, is_followed, score_difference, score_interval
+from hmc.experiments.engine.experiment import Cell, Experiment, Plan, Report
+from hmc.experiments.engine.intervals import decide
+from hmc.experiments.pose_intervals import ahead, following, score_difference, score_interval
 from hmc.experiments.study import draw_lines, runs_of, score_table, table_of
 
 __all__ = ["EXPERIMENT"]
@@ -40,14 +41,15 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     speed = table.set_index("density").filter_frames_per_s
     faster, costs = speed.iloc[-1] / speed[1.0], score_difference(dense, twice, "MMTA_percent", ("density",))
     claims = (
-        Claim(
+        decide(
             "a sparser table is quicker",
-            bool(faster > QUICKER) and is_followed(dense),
+            following(dense),
             f"{speed[1.0]:.2f} frames a second at density 1, {speed.iloc[-1]:.2f} at {speed.index[-1]:g}",
+            bool(faster > QUICKER),
         ),
-        Claim(
+        decide(
             "people are followed, and at density 2 little accuracy is lost",
-            is_followed(dense) and costs.high < NO_LOSS,
+            (following(dense), costs.under(NO_LOSS)),
             f"MMTA {score_interval(dense, 'MMTA_percent')} % at density 1; {costs} % are lost at 2",
         ),
         ahead(f"at density {speed.index[-1]:g} accuracy is lost", dense, sparsest, but=("density",)),

@@ -20,6 +20,7 @@ from hmc.body.scalable_models import PRINTED_1, PRINTED_2
 from hmc.errors import InputError
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs
+from hmc.experiments.engine.intervals import decide
 from hmc.experiments.five_actions import ACTIONS
 from hmc.experiments.markerless_runs import FRONTEND, MASKS_KEY, VOXEL_M, action_sources, tracked
 from hmc.experiments.run_means import mean_interval
@@ -117,14 +118,14 @@ def _claims(cells: Sequence[Cell], model: str, particles: np.ndarray) -> list[Cl
     worst = min(falls, key=lambda one: one.low)
     told = f"{particles.round().astype(int).tolist()}, {particles.sum():.0f} in all"
     return [
-        Claim(
+        decide(
             f"hierarchy {model}: each model's variables are filtered by more particles than the next one's",
-            all(one.above_zero for one in more),
+            more,
             ", ".join(f"{one.value:.0f} more" for one in more),
         ),
-        Claim(
+        decide(
             f"hierarchy {model}: a variable's spread falls in every layer",
-            worst.above_zero,
+            worst,
             f"least by {worst.value:.3f} [{worst.low:.3f}, {worst.high:.3f}] of the first",
         ),
         Claim(f"hierarchy {model}: 1,100 particles, 300, 500 and 300", bool(np.allclose(particles, PARTICLES_PAPER)), told),

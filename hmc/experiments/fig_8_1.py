@@ -14,6 +14,7 @@ import matplotlib.pyplot as plt
 from hmc.experiments import filter_study as runs
 from hmc.experiments.by_action import pose_scores
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
+from hmc.experiments.engine.intervals import all_of
 from hmc.experiments.pose_intervals import ahead
 from hmc.experiments.study import draw_lines, runs_of, score_table, table_of
 
@@ -75,7 +76,7 @@ def _at_every_count(frame, method: str, score: str) -> Claim:
         parts.append(ahead(f"{count:,}", better, worse, score, ("method", "particles", "gamma")))
     name = score.partition("_")[0]
     detail = "; ".join(f"{part.text}: {part.detail}" for part in parts)
-    return Claim(f"{method} better than APF in {name} at every count", all(part.holds for part in parts), detail)
+    return all_of(f"{method} better than APF in {name} at every count", parts, detail)
 
 
 def _gains(frame, count: int) -> list[dict]:

@@ -16,7 +16,7 @@ import numpy as np
 
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs
-from hmc.experiments.engine.intervals import Interval
+from hmc.experiments.engine.intervals import Interval, decide
 from hmc.experiments.engine.selection import REPEAT
 from hmc.experiments.run_means import mean_interval, run_values
 
@@ -135,9 +135,9 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     )
     claims = (
         Claim(f"without over-sampling {PRINTED:g} % are left at 45 degrees", bool(abs(at_45.mean() - PRINTED) < SAME), told),
-        Claim(
+        decide(
             "45 degrees are the worst, in the mean of all squares",
-            more.above_zero,
+            more,
             f"elsewhere least are left at {degrees[closest]:g} degrees, more by {more} %; least "
             + ", ".join(f"of {row['side_px']} px at {row['at_deg']:g}" for row in plain),
         ),

@@ -14,9 +14,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
+from hmc.experiments.engine.experiment import Cell, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs
-from hmc.experiments.engine.intervals import Interval
+from hmc.experiments.engine.intervals import Interval, decide
 from hmc.experiments.engine.ratios import Parts, ratio_gain, ratio_interval
 from hmc.experiments.hsiao_runs import VOXEL_M, limbs_apart, person_hulls, scene_of, sequences
 from hmc.experiments.truth import first_truth
@@ -179,9 +179,9 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     gains = {score: gain(cells, score, MODIFIED, SUNDARESAN) for score in ("trunk", "arms")}
     better = gain(cells, "voxels", MODIFIED, SUNDARESAN, "voxels_rest_as_trunk")
     claims = (
-        Claim("more of the trunk is found than by Sundaresan's method, limbs apart", gains["trunk"].above_zero, _told(gains["trunk"])),
-        Claim("more of the arms is found, limbs apart", gains["arms"].above_zero, _told(gains["arms"])),
-        Claim("more voxels in their true part, though what Sundaresan's leaves unfitted counts as trunk", better.above_zero, _told(better)),
+        decide("more of the trunk is found than by Sundaresan's method, limbs apart", gains["trunk"], _told(gains["trunk"])),
+        decide("more of the arms is found, limbs apart", gains["arms"], _told(gains["arms"])),
+        decide("more voxels in their true part, though what Sundaresan's leaves unfitted counts as trunk", better, _told(better)),
     )
     shown = [one.results["shown"] for one in cells if one.results["shown"] is not None]
     figures = {"hsiao-3.15": draw(shown[0])} if shown else {}

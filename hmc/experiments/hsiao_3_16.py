@@ -11,7 +11,8 @@ from collections.abc import Sequence
 import matplotlib.pyplot as plt
 import numpy as np
 
-from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
+from hmc.experiments.engine.experiment import Cell, Experiment, Plan, Report, Table
+from hmc.experiments.engine.intervals import decide
 from hmc.experiments.engine.ratios import ratio_interval
 from hmc.experiments.hsiao_3_15 import COLORS_OF_PARTS, FAMILY, MODIFIED, OURS, SUNDARESAN, VERSION, cell, gain, grid, mean_of
 from hmc.pose.spectral.parts import PART_NAMES
@@ -32,14 +33,14 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     ]
     inside, nearer = found[MODIFIED, "joints_m"], gain(cells, "trunk_line_m", SUNDARESAN, MODIFIED)
     claims = (
-        Claim(
+        decide(
             "curves run inside their limbs: elbows and knees lie within 5 cm of the nearest",
-            inside.high < INSIDE_M,
+            inside.under(INSIDE_M),
             f"{1000 * inside.value:.0f} [{1000 * inside.low:.0f}, {1000 * inside.high:.0f}] mm",
         ),
-        Claim(
+        decide(
             "the thick trunk has a curve: its line is nearer to one than with Sundaresan's",
-            nearer.above_zero,
+            nearer,
             f"by {1000 * nearer.value:.0f} [{1000 * nearer.low:.0f}, {1000 * nearer.high:.0f}] mm",
         ),
     )

@@ -11,8 +11,9 @@ from collections.abc import Sequence
 import matplotlib.pyplot as plt
 import numpy as np
 
-from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
+from hmc.experiments.engine.experiment import Cell, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs
+from hmc.experiments.engine.intervals import decide
 from hmc.experiments.engine.ratios import Parts, ratio_gain, ratio_interval
 from hmc.experiments.hsiao_runs import person_hulls, scene_of, sequences
 from hmc.io.recording import open_recording
@@ -75,9 +76,9 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     legs = ratio_interval(few, _mean("legs"))
     more, far = (ratio_gain(few, many, _mean(column)) for column in ("legs", "litres_far_from_body"))
     claims = (
-        Claim("more than two legs with four cameras", legs.low > 2, str(legs)),
-        Claim("more legs with four cameras than with eight", more.above_zero, f"more by {more}"),
-        Claim("more hull far from the body with four cameras", far.above_zero, f"more by {far} l"),
+        decide("more than two legs with four cameras", legs.over(2), str(legs)),
+        decide("more legs with four cameras than with eight", more, f"more by {more}"),
+        decide("more hull far from the body with four cameras", far, f"more by {far} l"),
     )
     return Report((Table("hsiao-3.8", "Hulls from eight and four cameras.", table),), {"hsiao-3.8": draw(of_rig)}, claims)
 

@@ -16,8 +16,9 @@ import numpy as np
 from scipy.optimize import differential_evolution, dual_annealing
 
 from hmc.body.spin_skeleton import model_of_height, skeleton_landmarks
-from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
+from hmc.experiments.engine.experiment import Cell, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs
+from hmc.experiments.engine.intervals import decide
 from hmc.experiments.engine.ratios import Parts, ratio_gain
 from hmc.experiments.engine.selection import REPEAT
 from hmc.experiments.engine.style import COLORS
@@ -140,7 +141,7 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
                 }
             )  # fmt: skip
     gain = ratio_gain(cells, cells, _errors(FLAT), smaller_parts=_errors(HIERARCHICAL))
-    claims = (Claim("hierarchical swarms end with a smaller error than flat ones at equal evaluations", gain.above_zero, f"by {gain} mm"),)
+    claims = (decide("hierarchical swarms end with a smaller error than flat ones at equal evaluations", gain, f"by {gain} mm"),)
     figure, ax = plt.subplots(figsize=(7, 3.2))
     ax.boxplot([rows[rows[:, 1] == k, 2] for k in range(len(METHODS))], tick_labels=METHODS, medianprops={"color": COLORS["sparse"]})
     ax.tick_params(axis="x", rotation=30)

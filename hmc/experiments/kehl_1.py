@@ -22,7 +22,7 @@ from hmc.body.solids import SolidBody, solid_body
 from hmc.camera.model import Rig, look_at, project
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs
-from hmc.experiments.engine.intervals import difference, interval
+from hmc.experiments.engine.intervals import decide, difference, interval
 from hmc.experiments.engine.selection import REPEAT
 from hmc.experiments.engine.style import COLORS
 from hmc.pose.objectives.cue_rows import pose_body
@@ -137,7 +137,7 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     detail = ", ".join(f"{views} views, {side}^3: {gain} ms" for (views, side), gain in gains.items())
     claims = [
         Claim("the updated hull is the one that is carved anew, voxel by voxel", same),
-        Claim("updating is quicker than the same tables from scratch, at every size", same and _all_above(gains.values()), detail),
+        decide("updating is quicker than the same tables from scratch, at every size", list(gains.values()), detail, same),
     ]
     for side in sorted({side for _, side in sizes}):
         few, many = ([one for one in cells if (one.parameters["views"], one.parameters["side"]) == (views, side)] for views in (4, 9))
@@ -145,7 +145,7 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
             # Per view the time falls: 9 views take less than 9/4 of what 4 take.
             spare = difference(_runs(few), _ms(few, "incremental", 9 / 4), _ms(many, "incremental"))
             text = f"at {side}^3 the time grows less than the number of views, from 4 to 9"
-            claims.append(Claim(text, same and spare.above_zero, f"{spare} ms less than in proportion"))
+            claims.append(decide(text, spare, f"{spare} ms less than in proportion", same))
     caption = "Reconstruction and texturing of a moving body, mean processor times. The paper: Kehl, Table 1 (Pentium IV, 3 GHz)."
     return Report((Table("kehl-1", caption, rows),), {"kehl-1": figure}, tuple(claims))
 
@@ -171,10 +171,6 @@ def _ms(own: Sequence[Cell], what: str, times: float = 1.0) -> tuple[np.ndarray,
     """Sum of milliseconds and number of frames, a run."""
     spent = [np.asarray(one.results["ms"][what], float) for one in own]
     return np.array([times * one.sum() for one in spent]), np.array([float(one.size) for one in spent])
-
-
-def _all_above(gains) -> bool:
-    return all(gain.above_zero for gain in gains)
 
 
 EXPERIMENT = Experiment("kehl-1", "the hull by look-up tables", "Kehl, Table 1", grid, cell, report, version=2)

@@ -17,6 +17,7 @@ from hmc.experiments import kehl_runs
 from hmc.experiments.drill_clips import training_name
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
 from hmc.experiments.engine.inputs import rendered
+from hmc.experiments.engine.intervals import decide
 from hmc.experiments.engine.selection import REPEAT
 from hmc.experiments.engine.style import COLORS
 
@@ -97,20 +98,20 @@ def _row(name: str, family: str, own: Sequence[Cell], stop: float | None, paper:
 def _claims(groups: dict[str, list[Cell]]) -> list[Claim]:
     """The paper's, of the methods as printed. Who is lost is no faster and no nearer than anybody."""
     smd, equal, five = groups.values()
-    followed = {name: kehl_runs.is_followed(own) for name, own in groups.items()}
+    followed = {name: kehl_runs.following(own) for name, own in groups.items()}
     errors = {name: kehl_runs.error_interval(own) for name, own in groups.items()}
     nearer, nearer_five = kehl_runs.joint_gain(smd, equal), kehl_runs.joint_gain(smd, five)
     quicker = kehl_runs.seconds_gain(smd, five)
     both = f"SMD {errors['SMD']}, LM {errors['LM']}, with five times the points {errors['LM, 5 times the points']} mm"
     return [
-        Claim("SMD follows the whole sequence", followed["SMD"], f"{errors['SMD']} mm"),
-        Claim("LM with equal points loses the track, SMD does not", followed["SMD"] and errors["LM"].low > kehl_runs.FOLLOWED_MM, both),
-        Claim("SMD is nearer than LM with equal points", followed["SMD"] and nearer.above_zero, f"{both}: by {nearer}"),
-        Claim("LM with five times the points follows the whole sequence", followed["LM, 5 times the points"], both),
-        Claim("SMD is nearer than LM with five times the points", followed["SMD"] and nearer_five.above_zero, f"{both}: by {nearer_five}"),
-        Claim(
-            "SMD takes less time a frame than LM with five times the points", followed["SMD"] and quicker.above_zero,
-            f"by {quicker} ms; both {'followed' if all(followed.values()) else 'not all followed'}",
+        decide("SMD follows the whole sequence", followed["SMD"], f"{errors['SMD']} mm"),
+        decide("LM with equal points loses the track, SMD does not", (followed["SMD"], errors["LM"].over(kehl_runs.FOLLOWED_MM)), both),
+        decide("SMD is nearer than LM with equal points", (followed["SMD"], nearer), f"{both}: by {nearer}"),
+        decide("LM with five times the points follows the whole sequence", followed["LM, 5 times the points"], both),
+        decide("SMD is nearer than LM with five times the points", (followed["SMD"], nearer_five), f"{both}: by {nearer_five}"),
+        decide(
+            "SMD takes less time a frame than LM with five times the points", (followed["SMD"], quicker),
+            f"by {quicker} ms; both {'followed' if all(one.above_zero for one in followed.values()) else 'not all followed'}",
         ),
     ]  # fmt: skip
 

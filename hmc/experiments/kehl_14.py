@@ -11,7 +11,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from hmc.experiments import kehl_runs
-from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
+from hmc.experiments.engine.experiment import Cell, Experiment, Plan, Report, Table
+from hmc.experiments.engine.intervals import decide
 from hmc.experiments.engine.selection import REPEAT
 from hmc.experiments.engine.style import COLORS
 from hmc.landmarks import LANDMARKS
@@ -55,10 +56,11 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     below.set(ylabel="mean joint error, mm", xlabel="frame")
     fastest = max(row["largest_turn_deg_per_frame"] for row in rows)
     claims = tuple(
-        Claim(
+        decide(
             f"{variant}: the dancer is followed through the sequence and at its end, at turns of {PAPER_DEG:.0f} degrees between frames",
-            fastest >= PAPER_DEG and kehl_runs.is_followed(own) and kehl_runs.is_followed(own, LAST),
+            (kehl_runs.following(own), kehl_runs.following(own, LAST)),
             f"{kehl_runs.error_interval(own)} mm, last tenth {kehl_runs.error_interval(own, last=LAST)}; up to {fastest:.0f} degrees",
+            fastest >= PAPER_DEG,
         )
         for variant, own in groups.items()
         if variant != kehl_runs.QUARTER

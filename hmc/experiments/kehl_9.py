@@ -20,8 +20,9 @@ from hmc.body.proportions import default_body
 from hmc.body.solids import CHAINS, FREE, FREE_NAMES, GROUPS
 from hmc.experiments import kehl_runs
 from hmc.experiments.drill_clips import clip_names
-from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
+from hmc.experiments.engine.experiment import Cell, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs, rendered
+from hmc.experiments.engine.intervals import decide
 from hmc.experiments.engine.ratios import Parts, ratio_gain, ratio_interval
 from hmc.experiments.engine.style import COLORS
 from hmc.experiments.truth import HEIGHT_M, first_truth, standing_state, stature_m
@@ -116,7 +117,7 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
             })  # fmt: skip
         gain = ratio_gain(own, own, _led_back("stochastic"), smaller_parts=_led_back("deterministic"))
         detail = f"{back['stochastic']} and {back['deterministic']} %: more by {gain}"
-        claims.append(Claim(f"stochastic sampling, {family}, leads back more often than deterministic", gain.above_zero, detail))
+        claims.append(decide(f"stochastic sampling, {family}, leads back more often than deterministic", gain, detail))
         axes.axvline(1000 * NEAR_M, color=COLORS["paper"], linewidth=1, linestyle="--")
         axes.set(xlabel="elbow or wrist off the best pose, the farther, mm", title=family)
     panels[0].set(ylabel="share of the displacements")

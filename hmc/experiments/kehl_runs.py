@@ -20,7 +20,7 @@ from hmc.errors import InputError
 from hmc.experiments.drill_clips import clip_names
 from hmc.experiments.engine.experiment import Cell, Claim, Parameters, Plan, Results
 from hmc.experiments.engine.inputs import Inputs, rendered
-from hmc.experiments.engine.intervals import Interval
+from hmc.experiments.engine.intervals import Interval, decide
 from hmc.experiments.engine.ratios import Parts, ratio_gain, ratio_interval
 from hmc.experiments.engine.selection import REPEAT
 from hmc.experiments.engine.style import COLORS
@@ -42,7 +42,7 @@ from hmc.voxels.hulls import FrontendSettings, stream_hulls
 
 __all__ = [
     "FAMILY", "FOLLOWED_MM", "QUARTER", "REPEATS", "TOLERANCES", "VARIANTS", "VERSION",
-    "cell", "cell_grid", "error_interval", "errors_mm", "is_followed", "joint_gain",
+    "cell", "cell_grid", "error_interval", "errors_mm", "following", "joint_gain",
     "lm_name", "nearer", "observations", "of_variant", "preset_of", "seconds_gain", "shown",
 ]  # fmt: skip
 
@@ -229,7 +229,7 @@ def nearer(text: str, better: Sequence[Cell], worse: Sequence[Cell], joints: Seq
     """The claim that people are followed in the first group, and that it is nearer in some joints than the second."""
     gain = joint_gain(better, worse, joints)
     detail = f"{error_interval(better, joints)} mm for {error_interval(worse, joints)}: nearer by {gain}"
-    return Claim(text, is_followed(better) and gain.above_zero, detail)
+    return decide(text, (gain, following(better)), detail)
 
 
 def seconds_gain(faster: Sequence[Cell], slower: Sequence[Cell]) -> Interval:
@@ -237,9 +237,9 @@ def seconds_gain(faster: Sequence[Cell], slower: Sequence[Cell]) -> Interval:
     return ratio_gain(slower, faster, _milliseconds)
 
 
-def is_followed(cells: Sequence[Cell], last: float = 1.0) -> bool:
-    """Whether people are followed: all of the error's interval is below `FOLLOWED_MM`. Nothing is claimed of who is lost."""
-    return error_interval(cells, last=last).high < FOLLOWED_MM
+def following(cells: Sequence[Cell], last: float = 1.0) -> Interval:
+    """By how much the error is below `FOLLOWED_MM`: people are followed where all of it is. Nothing is claimed of who is lost."""
+    return error_interval(cells, last=last).under(FOLLOWED_MM)
 
 
 def _errors(joints: Sequence[int] = (), last: float = 1.0) -> Parts:

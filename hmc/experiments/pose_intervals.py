@@ -9,12 +9,12 @@ import numpy as np
 from hmc.errors import InputError
 from hmc.experiments.by_action import COLUMNS, MATCHED_MM, NEAR_MM, STRICT_MM
 from hmc.experiments.engine.experiment import Cell, Claim
-from hmc.experiments.engine.intervals import Interval
+from hmc.experiments.engine.intervals import Interval, decide
 from hmc.experiments.engine.ratios import Parts, ratio_gain, ratio_interval
 from hmc.experiments.truth import estimates
 from hmc.metrics.landmarks import landmark_errors
 
-__all__ = ["SCORES", "WORTH_MM", "ahead", "is_followed", "none_better", "reaches", "score_difference", "score_interval"]
+__all__ = ["SCORES", "WORTH_MM", "ahead", "following", "is_followed", "none_better", "reaches", "score_difference", "score_interval"]
 
 #: As `hmc.experiments.by_action.pose_scores` calls them.
 SCORES = ("mean_mm", "MMTP_mm", "MMTA_percent", "MMTP_70_mm", "MMTA_70_percent", "MMTA_50_percent")
@@ -74,7 +74,7 @@ def ahead(text: str, better: Sequence[Cell], worse: Sequence[Cell], score: str =
     gain = score_difference(first, second, score, but)
     unit = "mm" if error else "%"
     detail = f"{score.split('_')[0]} {score_interval(better, score)} {unit} for {score_interval(worse, score)}: better by {gain}"
-    return Claim(text, gain.above_zero, detail)
+    return decide(text, gain, detail)
 
 
 def none_better(text: str, chosen: Sequence[Cell], others: Mapping[str, Sequence[Cell]], but: Sequence[str] = ("method",)) -> Claim:
@@ -90,8 +90,8 @@ def none_better(text: str, chosen: Sequence[Cell], others: Mapping[str, Sequence
     """
     costs = {name: score_difference(own, chosen, "mean_mm", but) for name, own in others.items()}
     shown = {name: cost for name, cost in costs.items() if cost.low <= -WORTH_MM} or costs
-    holds = bool(costs) and all(cost.low > -WORTH_MM for cost in costs.values())
-    return Claim(text, holds, "; ".join(f"{name} costs {cost} mm" for name, cost in shown.items()))
+    told = "; ".join(f"{name} costs {cost} mm" for name, cost in shown.items())
+    return decide(text, [cost.over(-WORTH_MM) for cost in costs.values()], told)
 
 
 def reaches(text: str, cells: Sequence[Cell], paper: Sequence[float]) -> Claim:
@@ -108,12 +108,18 @@ def reaches(text: str, cells: Sequence[Cell], paper: Sequence[float]) -> Claim:
     found, mmtp = score_interval(cells, "MMTA_percent"), paper[COLUMNS.index("MMTP_mm")]
     mmta = paper[COLUMNS.index("MMTA_percent")]
     holds = bool(found.value >= mmta or (found.high >= mmta and is_followed(cells)))
-    return Claim(text, holds, f"MMTA {found} %, MMTP {score_interval(cells, 'MMTP_mm')} mm; the paper {mmta} %, {mmtp} mm")
+    detail = f"MMTA {found} %, MMTP {score_interval(cells, 'MMTP_mm')} mm; the paper {mmta} %, {mmtp} mm"
+    return Claim(text, holds, detail, undecided=bool(not holds and found.high >= mmta))
 
 
-def is_followed(cells: Sequence[Cell], least_percent: float = 50.0) -> bool:
-    """Whether people are followed at all: the interval of MMTA at 100 mm is above so much. Nothing is claimed of runs that are lost."""
-    return score_interval(cells, "MMTA_percent").low > least_percent
+def following(cells: Sequence[Cell], least_percent: float = 50.0) -> Interval:
+    """By how much MMTA at 100 mm is above a least: people are followed where all of it is. Nothing is claimed of runs that are lost."""
+    return score_interval(cells, "MMTA_percent").over(least_percent)
+
+
+def is_followed(cells: Sequence[Cell]) -> bool:
+    """Whether people are shown to be followed at all."""
+    return following(cells).above_zero
 
 
 def _without(one: Cell, but: Sequence[str]) -> str:

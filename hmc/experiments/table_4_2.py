@@ -11,9 +11,9 @@ from dataclasses import asdict
 
 import numpy as np
 
-from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
+from hmc.experiments.engine.experiment import Cell, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs
-from hmc.experiments.engine.intervals import Interval, difference
+from hmc.experiments.engine.intervals import Interval, decide, difference
 from hmc.experiments.person_features import features_of, test_sources, training_sources
 from hmc.tracking.classifiers import CLASSIFIERS, detection_scores, fit_classifier, frame_groups
 from hmc.tracking.feature_table import FeatureTable, join_tables
@@ -89,9 +89,9 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     tree = next(row for row in rows if row["method"] == "decision-tree")
     others = [row["method"] for row in order if row["method"] != "decision-tree"]
     gains = {name: _gain("decision-tree", name, cells) for name in others}
-    claim = Claim(
+    claim = decide(
         "the decision tree has the best F",
-        all(gain.above_zero for gain in gains.values()),
+        list(gains.values()),
         f"F {tree['F']:.3f}; ahead of " + ", ".join(f"{name} by {100 * gain.value:.1f} [{100 * gain.low:.1f}, {100 * gain.high:.1f}] %"
                                                     for name, gain in gains.items()),
     )  # fmt: skip

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 from hmc.errors import InputError
 from hmc.experiments.engine.experiment import Cell, Claim
-from hmc.experiments.engine.intervals import Interval
+from hmc.experiments.engine.intervals import Interval, decide
 from hmc.experiments.engine.ratios import Parts, clip_and_seed, ratio_gain, ratio_interval
 
-__all__ = ["SCORES", "ahead", "gain", "is_followed", "score_interval"]
+__all__ = ["SCORES", "ahead", "following", "gain", "is_followed", "score_interval"]
 
 #: By name, the unit and whether less is better.
 SCORES = {
@@ -66,9 +66,14 @@ def ahead(text: str, better: Sequence[Cell], worse: Sequence[Cell], score: str, 
     if not better or not worse:
         return Claim(text, False, "no runs to compare")
     found, unit = gain(better, worse, score, by), SCORES[score][0]
-    followed = is_followed(better)
+    followed = following(better)
     detail = f"{score} {score_interval(better, score)} for {score_interval(worse, score)}: better by {found} {unit}"
-    return Claim(text, found.above_zero and followed, detail if followed else f"{detail}; people are not followed")
+    return decide(text, (found, followed), detail if followed.above_zero else f"{detail}; people may be lost")
+
+
+def following(cells: Sequence[Cell]) -> Interval:
+    """By how much MOTA is above 0: people are followed where all of it is. Nothing is claimed of runs that are lost."""
+    return score_interval(cells, "MOTA")
 
 
 def is_followed(cells: Sequence[Cell]) -> bool:

@@ -12,8 +12,9 @@ from dataclasses import replace
 import numpy as np
 
 from hmc.experiments import tracking_runs as runs
-from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
+from hmc.experiments.engine.experiment import Cell, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs
+from hmc.experiments.engine.intervals import decide
 from hmc.experiments.engine.ratios import Parts, ratio_gain, ratio_interval
 from hmc.io.results import TrackTable, read_centroids
 from hmc.metrics.scores import evaluate_tracks
@@ -96,8 +97,8 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     claims = []
     for name, changed in CAUSES.items():
         late, gain = ratio_interval(_of(cells, name), _mean(*BEHIND)), ratio_gain(_of(cells, name), _of(cells, changed), _mean(*BEHIND))
-        claims.append(Claim(f"{name} as printed is behind who walks", late.above_zero, f"by {late} mm"))
-        claims.append(Claim(f"{name} is less behind with this changed: {changed.partition(', ')[2]}", gain.above_zero, f"by {gain} mm"))
+        claims.append(decide(f"{name} as printed is behind who walks", late, f"by {late} mm"))
+        claims.append(decide(f"{name} is less behind with this changed: {changed.partition(', ')[2]}", gain, f"by {gain} mm"))
     caption = (
         f"Errors against true centroids of who stands (below {STANDING_M_S} m/s) and walks (above {WALKING_M_S} m/s), and how far the "
         f"estimate is behind along the way; preset canton2009 without color, voxels of {100 * VOXEL_M:g} cm."

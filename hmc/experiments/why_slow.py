@@ -22,8 +22,9 @@ from hmc.body.kinematics import landmarks
 from hmc.body.model import BodyModel
 from hmc.body.proportions import canton_body
 from hmc.experiments import marker_runs
-from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results
+from hmc.experiments.engine.experiment import Cell, Experiment, Parameters, Plan, Report, Results
 from hmc.experiments.engine.inputs import Inputs
+from hmc.experiments.engine.intervals import decide
 from hmc.experiments.engine.selection import REPEAT
 from hmc.experiments.exploratory import action_drift, measured_truth, turned
 from hmc.experiments.filter_study import MARKERS, STUDY_FRAMES
@@ -156,9 +157,9 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     standing = score_interval(those(PLACES, AS_PRINTED, STANDING), "MMTA_percent")
     walking = those(PLACES, AS_PRINTED, STEPS)
     claims = (
-        Claim(
+        decide(
             f"a likelihood that knows every place: who stands and moves the arms is followed as printed, {FOLLOWED_PERCENT:g} % or more",
-            standing.low >= FOLLOWED_PERCENT,
+            standing.over(FOLLOWED_PERCENT),
             f"MMTA {standing} %",
         ),
         ahead(

@@ -14,10 +14,11 @@ import pytest
 from hmc.experiments import EXPERIMENTS, Claim, Plan, Report, find_experiment
 from hmc.experiments.__main__ import main
 from hmc.experiments.engine.catalogue import CATALOGUE, UNKNOWN
+from hmc.experiments.engine.experiment import DIFFERS, HOLDS
 from hmc.experiments.engine.markdown import to_markdown
 from hmc.experiments.engine.page import to_html, verdict_counts
 from hmc.experiments.engine.selection import changed_plan
-from hmc.experiments.engine.summary import DIFFERS, HOLDS, MISSING, NOT_RUN, REPRODUCED, SHOWN, summarise
+from hmc.experiments.engine.summary import MISSING, NOT_RUN, REPRODUCED, SHOWN, summarise
 from hmc.experiments.engine.writing import write_report
 from hmc.io.files import write_toml
 
@@ -72,8 +73,8 @@ def test_every_table_and_figure_has_its_row(out):
     rows = {row.entry.id: row for row in summarise(out)}
     assert list(rows) == [entry.id for entry in CATALOGUE] + [name for name in EXPERIMENTS if name not in {e.id for e in CATALOGUE}]
     assert rows["fig-B.1"].verdict == HOLDS and rows["fig-4.9"].verdict == DIFFERS and rows["fig-4.7"].verdict == NOT_RUN
-    assert rows["fig-4.9"].why == UNKNOWN and rows["fig-B.1"].why == rows["fig-4.7"].why == ""
-    assert replace(rows["fig-4.9"], entry=rows["table-4.3"].entry).why == rows["table-4.3"].entry.why != ""
+    assert rows["fig-4.9"].why == f"Why it differs, as far as known: {UNKNOWN}" and rows["fig-B.1"].why == rows["fig-4.7"].why == ""
+    assert rows["table-4.3"].entry.why and rows["table-4.3"].entry.why in replace(rows["fig-4.9"], entry=rows["table-4.3"].entry).why
     assert [claim.text for claim in rows["fig-4.9"].differing] == ["faster over <the> surface"]
     without = {name for name, row in rows.items() if row.verdict == MISSING}
     assert without == {entry.id for entry in CATALOGUE} - set(EXPERIMENTS)
@@ -125,6 +126,24 @@ def test_reproduced_is_what_holds_in_full_alone(tmp_path):
     told.append(row_of(tmp_path).label)
     assert told == ["changed, holds", "quick, holds", "quick, holds", "in part, holds", SHOWN, "in full, differs", REPRODUCED]
     assert row_of(tmp_path).results[0].what == "in full, 2 cells"
+
+
+def test_a_row_is_undecided_where_nothing_differs_and_something_is(tmp_path):
+    """It says over how many recordings, and that nothing of it differs; written and read it stays so."""
+    experiment, plan = find_experiment("fig-4.9"), Plan(quick=True)
+    claims = [Claim("yes", True), Claim("who knows", False, "by 1 [-1, 3]", True), Claim("no", False)]
+    for claims_of, label in ((claims[:2], "quick, undecided"), (claims, "quick, differs")):
+        write_report(tmp_path, experiment, plan, Report(claims=tuple(claims_of)))
+        row = row_of(tmp_path)
+        assert row.label == label and row.results[0].claims == tuple(claims_of)
+    assert "Undecided: the interval over its runs" in row.why and UNKNOWN in row.why
+    page, text = to_html([row]), to_markdown([row])
+    assert ">undecided</span>" in page and "- undecided: who knows (by 1 [-1, 3])" in text and "- differs: no" in text
+    run_of(tmp_path / "lost-arm", holds=(True,), recordings=["a@1", "b@2"])
+    stored = row_of(tmp_path, "lost-arm").results[0]
+    assert stored.recordings == ("a", "b")
+    told = replace(row_of(tmp_path, "lost-arm"), verdict="undecided", results=(replace(stored, claims=(claims[1],)),)).why
+    assert told == "Undecided: the interval over 2 recordings has both in it, that it is so and that it is not."
 
 
 def test_a_changed_run_that_does_not_say_by_what_is_none_in_full(tmp_path):

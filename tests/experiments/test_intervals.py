@@ -5,7 +5,8 @@ import pytest
 from scipy import stats
 
 from hmc.errors import InputError
-from hmc.experiments.engine.intervals import difference, interval
+from hmc.experiments.engine.experiment import Claim
+from hmc.experiments.engine.intervals import Interval, all_of, decide, difference, interval
 
 RNG = np.random.default_rng(5)
 
@@ -75,3 +76,38 @@ def test_one_run_says_nothing_of_its_interval_and_lengths_are_checked():
     assert (alone.value, alone.low, alone.high) == (1.5, -np.inf, np.inf) and not alone.above_zero
     with pytest.raises(InputError, match="2 names of clips and 1 runs"):
         interval(["a", "b"], np.array([3.0]), np.array([2.0]))
+
+
+SURE, OPEN, AGAINST, EQUAL = Interval(2.0, 1.0, 3.0), Interval(2.0, -1.0, 5.0), Interval(-2.0, -3.0, -1.0), Interval(0.0, 0.0, 0.0)
+UNKNOWN = Interval(np.nan, -np.inf, np.inf)
+
+
+@pytest.mark.parametrize(
+    ("gains", "given", "verdict"),
+    [
+        (SURE, True, "holds"), ([SURE, SURE], True, "holds"), (SURE, False, "differs"),
+        (OPEN, True, "undecided"), ([SURE, OPEN], True, "undecided"), (UNKNOWN, True, "undecided"), ([], True, "undecided"),
+        (OPEN, False, "differs"), (AGAINST, True, "differs"), (EQUAL, True, "differs"), ([OPEN, AGAINST], True, "differs"),
+    ],
+)  # fmt: skip
+def test_what_an_interval_has_both_of_is_undecided(gains, given, verdict):
+    assert decide("it is so", gains, "by 2", given).verdict == verdict
+
+
+def test_figures_above_and_below_a_value():
+    assert decide("", OPEN.over(-2)).holds and decide("", OPEN.under(6)).holds
+    assert OPEN.over(2).open and OPEN.under(2).open and OPEN.under(2) == Interval(0.0, -3.0, 3.0)
+    assert decide("", OPEN.over(5)).verdict == decide("", OPEN.under(-1)).verdict == "differs"
+
+
+def test_several_claims_are_one_that_is_no_surer_than_they_are():
+    holds, undecided, differs = Claim("", True), Claim("", False, undecided=True), Claim("", False)
+    told = [all_of("", parts).verdict for parts in ([holds, holds], [holds, undecided], [undecided, differs], [holds, differs])]
+    assert told == ["holds", "undecided", "differs", "differs"]
+
+
+def test_few_runs_without_a_difference_are_undecided_and_many_alike_ones_differ():
+    """What 400 runs show to be no gain, three do not."""
+    gains = RNG.normal(-0.5, 1.0, 400)
+    few, many = (interval([f"{k}" for k in range(n)], gains[:n], np.ones(n)) for n in (3, 400))
+    assert decide("", few).verdict == "undecided" and decide("", many).verdict == "differs"

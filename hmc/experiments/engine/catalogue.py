@@ -237,11 +237,7 @@ CATALOGUE = (
 UNKNOWN = "What makes the difference is not known."
 #: The same of experiments that are no paper's.
 OWN_REASONS = {
-    "why-slow": "Of markers there is one clip of who walks and one of who jogs: an interval of two tells next to nothing.",
-    "why-lost": (
-        "On two clips an interval is so wide that not even 30 % more landmarks are shown to be more. why-slow has the same changes of the "
-        "filter where the likelihood cannot be at fault, on more clips."
-    ),
+    "why-lost": "why-slow has the same changes of the filter where the likelihood cannot be at fault, on more clips.",
     "what-each-adds": (
         "The silhouettes of the quick mode are clean: what only those with holes need, as the tolerant hull, costs there. "
         "docs/accuracy.md has recordings that need it."

@@ -14,7 +14,10 @@ if TYPE_CHECKING:
 
     from hmc.experiments.engine.inputs import Inputs
 
-__all__ = ["Cell", "Claim", "Experiment", "Plan", "Report", "Source", "Table"]
+__all__ = ["DIFFERS", "HOLDS", "UNDECIDED", "Cell", "Claim", "Experiment", "Plan", "Report", "Source", "Table"]
+
+#: Of a claim.
+HOLDS, UNDECIDED, DIFFERS = "holds", "undecided", "differs"
 
 Parameters = Mapping[str, Any]
 Results = dict[str, Any]
@@ -104,11 +107,27 @@ class Table:
 
 @dataclass(frozen=True)
 class Claim:
-    """Something that the paper shows, and whether it shows here; `detail` has the figures that decide."""
+    """Something that the paper shows, and whether it shows here.
+
+    Attributes
+    ----------
+    text : str
+    holds : bool
+    detail : str
+        The figures that decide.
+    undecided : bool
+        Whether it does not hold for no other reason than that too little was run: an interval has both sides in it.
+    """
 
     text: str
     holds: bool
     detail: str = ""
+    undecided: bool = False
+
+    @property
+    def verdict(self) -> str:
+        """ "holds", "undecided" or "differs"."""
+        return HOLDS if self.holds else UNDECIDED if self.undecided else DIFFERS
 
 
 @dataclass(frozen=True)

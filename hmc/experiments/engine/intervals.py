@@ -20,8 +20,9 @@ import numpy as np
 from scipy import stats
 
 from hmc.errors import InputError
+from hmc.experiments.engine.experiment import Claim
 
-__all__ = ["DRAWS", "LEVEL", "Interval", "difference", "interval"]
+__all__ = ["DRAWS", "LEVEL", "Interval", "all_of", "decide", "difference", "interval"]
 
 #: Draws of an interval, and the share of them that it holds.
 DRAWS, LEVEL = 2000, 0.95
@@ -46,9 +47,52 @@ class Interval:
         """Whether all of it is above 0."""
         return bool(self.low > 0)
 
+    @property
+    def open(self) -> bool:
+        """Whether it does not tell: neither all of it is above 0, nor none."""
+        return not self.above_zero and not self.high <= 0
+
+    def over(self, value: float) -> Interval:
+        """By how much it is above a value."""
+        return Interval(self.value - value, self.low - value, self.high - value)
+
+    def under(self, value: float) -> Interval:
+        """By how much it is below a value."""
+        return Interval(value - self.value, value - self.high, value - self.low)
+
     def __str__(self) -> str:
         value = f"{self.value:.1f}"
         return f"{value} [{self.low:.1f}, {self.high:.1f}]" if np.isfinite([self.low, self.high]).all() else value
+
+
+def decide(text: str, gains: Interval | Sequence[Interval], detail: str = "", given: bool = True) -> Claim:
+    """The claim that something is above 0, or several are.
+
+    Parameters
+    ----------
+    text : str
+    gains : Interval or sequence of Interval
+        What is to be above 0; of none nothing is decided.
+    detail : str
+        The figures that decide.
+    given : bool
+        What has to be so besides; where it is not, the claim does not hold, whatever the intervals are.
+
+    Returns
+    -------
+    Claim
+        It holds where all of every interval is above 0. It is undecided where it does not, and no interval is without a value above 0.
+    """
+    several = [gains] if isinstance(gains, Interval) else list(gains)
+    holds = bool(several) and all(one.above_zero for one in several)
+    undecided = not holds and all(one.above_zero or one.open for one in several)
+    return Claim(text, bool(given and holds), detail, bool(given and undecided))
+
+
+def all_of(text: str, parts: Sequence[Claim], detail: str = "") -> Claim:
+    """The claim that several claims hold; undecided where some of them are, and none differs."""
+    holds = all(part.holds for part in parts)
+    return Claim(text, holds, detail, not holds and all(part.holds or part.undecided for part in parts))
 
 
 def interval(clips: Sequence[str], sums: np.ndarray, counts: np.ndarray, draws: int = DRAWS) -> Interval:

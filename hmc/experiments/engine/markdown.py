@@ -46,9 +46,9 @@ def _section(row: Row, link: str) -> Iterator[str]:
         yield f"{without.capitalize()}."
     yield from ("", f"**{row.label.capitalize()}**; {run.what}.")
     for claim in run.claims:
-        yield f"- {'holds' if claim.holds else 'differs'}: {claim.text}{f' ({claim.detail})' if claim.detail else ''}"
+        yield f"- {claim.verdict}: {claim.text}{f' ({claim.detail})' if claim.detail else ''}"
     if row.why:
-        yield from ("", f"Why it differs, as far as known: {row.why}")
+        yield from ("", row.why)
     yield ""
     if link:
         files = [*(f"{table.name}.csv" for table in run.tables), *(picture.name for picture in run.pictures)]

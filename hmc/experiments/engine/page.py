@@ -9,7 +9,8 @@ from collections.abc import Iterable, Sequence
 from html import escape
 
 from hmc.experiments.engine.catalogue import Entry
-from hmc.experiments.engine.summary import DIFFERS, HOLDS, MISSING, NOT_RUN, REPRODUCED, SCOPES, SHOWN, Row, StoredRun, StoredTable
+from hmc.experiments.engine.experiment import DIFFERS, HOLDS, UNDECIDED
+from hmc.experiments.engine.summary import MISSING, NOT_RUN, REPRODUCED, SCOPES, SHOWN, Row, StoredRun, StoredTable
 
 __all__ = ["HEADING", "INTRODUCTION", "to_html", "verdict_counts", "without_dataset"]
 
@@ -18,11 +19,13 @@ INTRODUCTION = (
     "Every table and figure of the three papers that hmc implements, and how what comes out here compares. The data of the papers are not "
     "to be had: rendered recordings, or those of the user, stand for them, so that order and shape are compared and not figures. An "
     "experiment is reproduced when everything that its paper shows holds in a run in full. Where it holds in a quick run, or in a "
-    "part of the full grid, no more than that is said; otherwise it differs, and how is said."
+    "part of the full grid, no more than that is said. Something holds where its confidence interval over clips and seeds says so, and "
+    "differs where the interval says the contrary, or what has to be so first is not; where both are in the interval it is undecided."
 )
 #: Tables with more rows are folded up.
 MAX_OPEN_ROWS = 16
-_CLASS = {REPRODUCED: "good", HOLDS: "partly", DIFFERS: "bad", SHOWN: "none", NOT_RUN: "none", MISSING: "none"}
+_CLASS = {REPRODUCED: "good", HOLDS: "partly", UNDECIDED: "none", DIFFERS: "bad", SHOWN: "none", NOT_RUN: "none", MISSING: "none"}
+_CLAIM_CLASS = {HOLDS: "good", UNDECIDED: "none", DIFFERS: "bad"}
 
 _STYLE = """
 :root { color-scheme: light; }
@@ -79,7 +82,8 @@ def verdict_counts(rows: Sequence[Row]) -> str:
     """How many rows have which verdict, in full, in part and quick told apart, as a sentence."""
     counts = Counter(row.label for row in rows)
     told = {REPRODUCED: REPRODUCED}
-    told |= {f"{scope}, {verdict}": f"{word} {scope}" for verdict, word in ((HOLDS, "hold"), (DIFFERS, "differ")) for scope in SCOPES}
+    words = {HOLDS: "hold", UNDECIDED: "undecided", DIFFERS: "differ"}
+    told |= {f"{scope}, {verdict}": f"{word} {scope}" for verdict, word in words.items() for scope in SCOPES}
     told |= {verdict: verdict for verdict in (SHOWN, NOT_RUN, MISSING)}
     return f"{len(rows)} experiments: {', '.join(f'{counts[label]} {words}' for label, words in told.items() if counts[label])}."
 
@@ -110,7 +114,7 @@ def _section(row: Row) -> str:
     lines = [f'<section class="experiment" id="{_anchor(entry.id)}">', f"<h3>{escape(entry.id)}: {escape(entry.title)}</h3>"]
     lines.append(f"<p>{_chip(row)} {escape(entry.work)}: {escape(entry.shows)}</p>")
     if row.why:
-        lines.append(f"<p><b>Why it differs, as far as known:</b> {escape(row.why)}</p>")
+        lines.append(f"<p>{escape(row.why)}</p>")
     for result in row.results:
         lines += _run(entry.id, result)
     return "\n".join([*lines, "</section>"])
@@ -121,7 +125,7 @@ def _run(name: str, result: StoredRun) -> Iterable[str]:
     if result.claims:
         yield '<ul class="claims">'
         for claim in result.claims:
-            mark = f'<span class="verdict {"good" if claim.holds else "bad"}">{"holds" if claim.holds else "differs"}</span>'
+            mark = f'<span class="verdict {_CLAIM_CLASS[claim.verdict]}">{claim.verdict}</span>'
             yield f"<li>{mark} {escape(_how(claim.text, claim.detail))}</li>"
         yield "</ul>"
     for picture in result.pictures:

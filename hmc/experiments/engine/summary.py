@@ -10,17 +10,18 @@ from typing import Any
 
 from hmc.errors import InputError
 from hmc.experiments.engine.catalogue import CATALOGUE, OWN_REASONS, UNKNOWN, Entry
-from hmc.experiments.engine.experiment import Claim, Experiment, Plan, Source
+from hmc.experiments.engine.experiment import DIFFERS, HOLDS, UNDECIDED, Claim, Experiment, Plan, Source
 from hmc.experiments.engine.library import EXPERIMENTS, find_experiment
 from hmc.experiments.engine.writing import report_folder
 from hmc.io.results import read_run
 
 __all__ = [
-    "CHANGED", "DIFFERS", "HOLDS", "IN_FULL", "IN_PART", "MISSING", "NOT_RUN", "OURS", "QUICK", "REPRODUCED", "SCOPES", "SHOWN", "Row",
+    "CHANGED", "IN_FULL", "IN_PART", "MISSING", "NOT_RUN", "OURS", "QUICK", "REPRODUCED", "SCOPES", "SHOWN", "Row",
     "StoredRun", "StoredTable", "summarise",
 ]  # fmt: skip
 
-REPRODUCED, HOLDS, DIFFERS, SHOWN = "reproduced", "holds", "differs", "shown"
+#: Of a row, besides what a claim can be.
+REPRODUCED, SHOWN = "reproduced", "shown"
 NOT_RUN, MISSING = "not computed yet", "no experiment yet"
 #: How much of an experiment a run is: its own grid, cells of that and no others, its quick grid, or other seeds and parameters.
 IN_FULL, IN_PART, QUICK, CHANGED = "in full", "in part", "quick", "changed"
@@ -51,6 +52,8 @@ class StoredRun:
         One of `SCOPES`.
     what : str
         How it was run: in full or quick, with what changed, on which recordings.
+    recordings : tuple of str
+        Their names; none where it was computed on no recording.
     claims : tuple of Claim
     tables : tuple of StoredTable
     pictures : tuple of Path
@@ -62,6 +65,7 @@ class StoredRun:
     folder: Path
     scope: str
     what: str
+    recordings: tuple[str, ...]
     claims: tuple[Claim, ...]
     tables: tuple[StoredTable, ...]
     pictures: tuple[Path, ...]
@@ -77,7 +81,8 @@ class Row:
     entry : Entry
     verdict : str
         One of the constants of this module, of the run that counts, the first of `SCOPES`. `REPRODUCED` where everything that a paper
-        shows holds in a run in full; `HOLDS` where it does in less than that, and in full where it is no paper's.
+        shows holds in a run in full; `HOLDS` where it does in less than that, and in full where it is no paper's. `UNDECIDED` where some
+        of it is, and nothing differs.
     results : tuple of StoredRun
         The run that counts, then one on the user's recordings; either may be missing.
     """
@@ -89,17 +94,26 @@ class Row:
     @property
     def label(self) -> str:
         """The verdict, and in how much it was found where that has to be said: "quick, holds", "in full, differs"."""
-        return f"{self.results[0].scope}, {self.verdict}" if self.verdict in (HOLDS, DIFFERS) else self.verdict
+        return f"{self.results[0].scope}, {self.verdict}" if self.verdict in (HOLDS, UNDECIDED, DIFFERS) else self.verdict
 
     @property
     def differing(self) -> tuple[Claim, ...]:
-        """Claims of the paper's that do not hold in the run that counts."""
+        """Claims of the paper's that do not hold in the run that counts, undecided ones among them."""
         return tuple(claim for claim in self.results[0].claims if not claim.holds) if self.results else ()
 
     @property
     def why(self) -> str:
-        """Why it differs, as far as known; empty where it does not."""
-        return (self.entry.why or UNKNOWN) if self.differing else ""
+        """Why it differs, as far as known, and over how much what is undecided is; empty where everything holds."""
+        told = []
+        if self.verdict == DIFFERS:
+            told.append(f"Why it differs, as far as known: {self.entry.why or UNKNOWN}")
+        elif self.differing and self.entry.why:
+            told.append(self.entry.why)
+        if any(claim.undecided for claim in self.differing):
+            n = len(self.results[0].recordings)
+            over = f"{n} recording{'s' * (n > 1)}" if n else "its runs"
+            told.append(f"Undecided: the interval over {over} has both in it, that it is so and that it is not.")
+        return " ".join(told)
 
 
 def summarise(out: Path) -> list[Row]:
@@ -147,8 +161,10 @@ def _row(out: Path, entry: Entry) -> Row:
 def _verdict(entry: Entry, run: StoredRun) -> str:
     if not run.claims:
         return SHOWN
-    if not all(claim.holds for claim in run.claims):
+    if any(claim.verdict == DIFFERS for claim in run.claims):
         return DIFFERS
+    if any(claim.undecided for claim in run.claims):
+        return UNDECIDED
     return REPRODUCED if run.scope == IN_FULL and entry.work != OURS else HOLDS
 
 
@@ -161,17 +177,19 @@ def _is_old(experiment: Experiment, run: Mapping[str, Any]) -> bool:
 def _result(folder: Path, run: Mapping[str, Any]) -> StoredRun:
     parameters: dict[str, Any] = run.get("parameters", {})
     try:
-        claims = tuple(Claim(one["claim"], one["holds"], one.get("detail", "")) for one in run.get("claims", []))
+        claims = tuple(
+            Claim(one["claim"], one["holds"], one.get("detail", ""), one.get("undecided", False)) for one in run.get("claims", [])
+        )
     except (KeyError, TypeError) as error:
         raise InputError(f"{folder / 'run.toml'}: its claims cannot be read; run the experiment again") from error
-    names = [source.rpartition("@")[0] for source in parameters.get("recordings", [])]
+    names = tuple(source.rpartition("@")[0] for source in parameters.get("recordings", []))
     scope, what = _scope(folder, parameters)
     if names:
         what += f", on {', '.join(names)}"
     captions = run.get("captions", {})
     tables = (_table(path, captions.get(path.stem, "")) for path in _in_order(folder, "csv", list(captions)))
     pictures = _in_order(folder, "png", run.get("figures", []))
-    return StoredRun(folder, scope, what, claims, tuple(tables), tuple(pictures), run.get("versions", {}))
+    return StoredRun(folder, scope, what, names, claims, tuple(tables), tuple(pictures), run.get("versions", {}))
 
 
 def _scope(folder: Path, parameters: dict[str, Any]) -> tuple[str, str]:

@@ -74,7 +74,10 @@ def write_report(out: Path, experiment: Experiment, plan: Plan, report: Report) 
     }
     if plan.changed:
         parameters["changed"] = _changes(experiment, plan, parameters["cells"])
-    claims = [{"claim": claim.text, "holds": claim.holds, "detail": claim.detail} for claim in report.claims]
+    claims = [
+        {"claim": claim.text, "holds": claim.holds, "detail": claim.detail} | ({"undecided": True} if claim.undecided else {})
+        for claim in report.claims
+    ]
     captions = {table.name: table.caption for table in report.tables}
     write_run(
         folder / "run.toml", experiment.id, parameters, None, seeds="of each cell, by its parameters", claims=claims,
