@@ -21,11 +21,13 @@ from _scene import ROOM, people, ring_rig, silhouette
 from _timing import report
 
 from hmc.camera.segmentation import SegmentationSettings, segment_views, train_background
+from hmc.io.recording import Frame
 from hmc.voxels.carving import carve_levels, make_tables
 from hmc.voxels.completion import complete_masks, make_completion_tables
 from hmc.voxels.components import components
-from hmc.voxels.floor_shadows import cut_filled_shadows, cut_floor_shadows, lit_views
 from hmc.voxels.grid import VoxelGrid
+from hmc.voxels.hulls import FrontendSettings, settle
+from hmc.voxels.looks import look_once
 from hmc.voxels.surface import surface
 
 VOXEL_M = 0.04
@@ -95,12 +97,9 @@ def measure(n_people: int) -> tuple[float, float, float, float, float, float]:
         completing.append(time.thread_time() - end)
     for images in frames:  # as `hmc.voxels.hulls` does, in which the background learns too
         start = time.thread_time()
-        masks, models = segment_views(models, images, learning)
-        doubtful = [model.doubtful for model in models]
-        masks = cut_filled_shadows(completion, masks, [model.filled for model in models], doubtful)
-        masks, much = complete_masks(completion, masks, doubtful)
-        if not much:
-            cut_floor_shadows(completion, lit_views(images, models, [model.gains for model in models]), masks)
+        look, after = look_once(dict(enumerate(models)), Frame(0, tuple(images), None), learning)
+        models = tuple(after.values())
+        settle(completion, look, FrontendSettings())
         silhouettes.append(time.thread_time() - start)
     ratio = float(np.median(np.subtract(whole, mixture)) / np.median(mixture))
     every = float(np.mean(silhouettes) / np.median(mixture))

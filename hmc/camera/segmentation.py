@@ -96,11 +96,12 @@ class BackgroundModel:
         Where the last image is not quite the empty scene: the silhouette, shadows, and near people whatever differs a little. What
         other cameras see decides there (`hmc.voxels.completion`). None before the first image.
     filled : ndarray of bool, shape (height, width), or None
-        Pixels of the last silhouette that were filled for their darkness alone: what other cameras see of the floor decides there
-        (`hmc.voxels.floor_shadows`). None before the first image.
+        Pixels of the last silhouette that were filled for their darkness alone, by rules: what other cameras see of the floor decides
+        there (`hmc.voxels.floor_shadows`). None before the first image, and where shades have a `chance`.
     chance : ndarray of uint8, shape (height, width), or None
         Of each pixel of the last image that may as well be a shadow, how likely it is a person, of 255 (`hmc.camera.shade`), which other
-        cameras' sight of the floor may tell better (`hmc.voxels.floor_light`); 0 of all others. None before the first image.
+        cameras' sight of the floor may tell better (`hmc.voxels.floor_light`); 0 of all others. None before the first image, and where
+        the network that guesses it does not know such images: grey, noisy or small ones.
     gains : ndarray of float32, shape (rows, columns, 3), or None
         By which factors the last image was brighter than the empty scene (`hmc.camera.light.light_gains`); None: taken as it is.
     unseen : ndarray of bool, shape (height, width), or None
@@ -263,7 +264,7 @@ def segment(
     if cv2.countNonZero(found) > settings.max_foreground * found.size:
         return None, _adapt_to_switch(model, image, settings)
     mask, filled, chance, doubtful = _complete(found, cv2.threshold(answer, SHADOW - 1, 1, cv2.THRESH_BINARY)[1], image, model, settings)
-    mask, filled = mask.view(bool), filled.view(bool)
+    mask = mask.view(bool)
     doubtful = np.bitwise_or(doubtful.view(bool), mask, out=doubtful.view(bool))
     if model.unseen is not None:
         doubtful &= ~model.unseen
@@ -331,13 +332,17 @@ def _nearer(image: np.ndarray, one: np.ndarray, other: np.ndarray) -> bool:
 
 def _complete(
     found: np.ndarray, doubtful: np.ndarray, image: np.ndarray, model: BackgroundModel, settings: SegmentationSettings
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """What the mixture found, cleaned and completed; what of that was filled for darkness alone; the chance of shades; what is doubtful.
+) -> tuple[np.ndarray, np.ndarray | None, np.ndarray | None, np.ndarray]:
+    """What the mixture found, cleaned and completed; its `filled` or `chance`; what is doubtful.
 
     Only the part of the image around what was found is looked at.
     """
     scale = max(image.shape[:2]) / 640
-    mask, filled, chance = np.zeros_like(found), np.zeros_like(found), np.zeros_like(found)
+    zoom = max(1, round(COMPLETION_PX / max(image.shape[:2])))
+    # The network has learnt from sharp images in color of 640 x 480.
+    guesses = settings.least_chance > 0 and zoom == 1 and not model.blur and not model.grey
+    mask = np.zeros_like(found)
+    filled, chance = (None, np.zeros_like(found)) if guesses else (np.zeros(found.shape, bool), None)
     # Specks are all over the image; a person has some solid part.
     solid = min(SOLID_PX, max(LEAST_SOLID_PX, round(SOLID_PX * scale)))
     left, top, width, height = cv2.boundingRect(cv2.erode(found, np.ones((solid, solid), np.uint8)))
@@ -346,7 +351,6 @@ def _complete(
     margin = round(MARGIN_PX * scale)
     rows = slice(max(0, top - margin), top + height + margin)
     columns = slice(max(0, left - margin), left + width + margin)
-    zoom = max(1, round(COMPLETION_PX / max(image.shape[:2])))
     seeds = cv2.morphologyEx(enlarged_mask(found[rows, columns], zoom), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
     mean = enlarged(model.mean[rows, columns], zoom)
     seen = evidence(enlarged(image[rows, columns], zoom), mean, enlarged(model.deviation[rows, columns], zoom))
@@ -359,17 +363,14 @@ def _complete(
         sure=SURE,
     )
     part = cut_halo(fill_gaps(seeds, seen, rules, scale * zoom), seen, settings.halo_share, scale * zoom)
-    # The network has learnt from sharp images in color of 640 x 480.
-    if settings.least_chance > 0 and zoom == 1 and not model.blur and not model.grey:
+    if chance is not None:
         floor = None if model.floor is None else model.floor[rows, columns]
         shades = shade_features(image[rows, columns], mean, model.deviation[rows, columns], seen, seeds, scale, floor)
-        part, dark, chance[rows, columns] = told_by_chance(part, *shades, settings.least_chance)
+        part, chance[rows, columns] = told_by_chance(part, *shades, settings.least_chance)
         part = cut_halo(without_specks(part, seeds, seen, rules, scale), seen, settings.halo_share, scale)
-        dark &= part
-    else:
-        dark = filled_for_darkness(part, seeds, seen, rules)
+    elif filled is not None:
+        filled[rows, columns] = reduced_mask(filled_for_darkness(part, seeds, seen, rules), zoom)
     mask[rows, columns] = reduced_mask(part, zoom)
-    filled[rows, columns] = mask[rows, columns] & reduced_mask(dark, zoom)
     doubtful[rows, columns] |= reduced_mask(((seen.chroma2 > DOUBT**2) | (np.abs(seen.luma) > DOUBT)).view(np.uint8), zoom)
     return mask, filled, chance, cv2.morphologyEx(doubtful, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
 

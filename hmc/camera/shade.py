@@ -50,8 +50,6 @@ FEATURES = (
 LEAST_LUMA, LOST, MOST_CHROMA, REACH_PX = 4.0, (0.02, 0.65), 8.0, 60
 #: Surely a person: found by the mixture, and off by so many deviations in chroma or brighter, or darker than any shadow.
 SURE, DARKEST = 6.0, 0.45
-#: From this chance on a shade needs no other camera's word (`hmc.camera.segmentation.BackgroundModel.filled`).
-SURE_CHANCE = 0.6
 #: Chances are no nearer to 0 and 1 than that of this logit.
 MOST_LOGIT = 30.0
 #: Where it is not known whether a pixel looks at the floor.
@@ -227,7 +225,7 @@ def person_chance(net: ShadeNet, features: np.ndarray) -> np.ndarray:
     return np.asarray(1 / (1 + np.exp(-logits)), np.float32)
 
 
-def told_by_chance(mask: np.ndarray, pixels: np.ndarray, features: np.ndarray, least: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def told_by_chance(mask: np.ndarray, pixels: np.ndarray, features: np.ndarray, least: float) -> tuple[np.ndarray, np.ndarray]:
     """A silhouette in which each shade is what its chance says, averaged over the shades around it.
 
     Parameters
@@ -242,8 +240,6 @@ def told_by_chance(mask: np.ndarray, pixels: np.ndarray, features: np.ndarray, l
     -------
     mask : ndarray of uint8, shape (height, width)
         Without specks and whiskers.
-    unsure : ndarray of uint8, shape (height, width)
-        Shades that may be shadows all the same.
     chance : ndarray of uint8, shape (height, width)
         Of each shade, how likely it is a person, from 1 to 255; 0 of all other pixels.
     """
@@ -251,9 +247,8 @@ def told_by_chance(mask: np.ndarray, pixels: np.ndarray, features: np.ndarray, l
     shade.ravel()[pixels], chance.ravel()[pixels] = 1, person_chance(default_net(), features)
     chance = cv2.GaussianBlur(chance, (5, 5), 0) / np.maximum(cv2.GaussianBlur(shade, (5, 5), 0), 0.2)
     told = np.where(shade > 0, (chance > least).view(np.uint8), mask)
-    unsure = ((shade > 0) & (chance < SURE_CHANCE)).view(np.uint8)
     guess = np.where(shade > 0, np.maximum(255 * chance, 1), 0).astype(np.uint8)
-    return cv2.morphologyEx(told, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)), unsure, guess
+    return cv2.morphologyEx(told, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)), guess
 
 
 @functools.cache

@@ -80,14 +80,14 @@ def floor_evidence(
     views : sequence of LitView or None
         One a camera (`hmc.voxels.floor_shadows.lit_views`).
     chances : sequence of ndarray of uint8, shape (height, width), or None
-        Of each pixel that is a shade, how likely it is a person, of 255; 0 of all others.
+        Of each pixel that is a shade, how likely it is a person, of 255; 0 of all others. None of a camera that does not ask.
     masks : sequence of ndarray of bool, shape (height, width), or None
         Silhouettes so far: behind them nobody sees the floor.
     """
     known = {
-        c: (view, chance, mask)
+        c: (view, np.zeros_like(mask, np.uint8) if chance is None else chance, mask)
         for c, (view, chance, mask) in enumerate(zip(views, chances, masks, strict=True))
-        if view is not None and chance is not None and mask is not None
+        if view is not None and mask is not None
     }
     n_cells = tables.cells[0] * tables.cells[1]
     asked, near = {}, np.zeros(n_cells + 1, bool)

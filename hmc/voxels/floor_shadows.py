@@ -8,8 +8,9 @@ so it is in the hull, and joins people who stand together. To a rig the two are 
 - A shadow fills no room. The line of sight to it meets no place, a quarter of a metre and more above the floor, at which all cameras see
   people.
 
-Pixels of which both hold leave the silhouettes (`cut_floor_shadows`). What a camera filled for its darkness alone needs less to leave
-(`cut_filled_shadows`): that most cameras doubt the spot on which it lies, as they do under a chair, where the line of sight meets legs.
+Pixels of which both hold leave the silhouettes (`cut_floor_shadows`). What a camera filled for its darkness alone, by rules, needs less to
+leave (`cut_filled_shadows`): that most cameras doubt the spot on which it lies, as they do under a chair, where the line of sight meets
+legs. Where a network guesses what is a shade, `hmc.voxels.floor_light` decides that.
 Measured by ``python -m hmc.experiments run repairs``.
 """
 

@@ -26,8 +26,8 @@ __all__ = ["Look", "look_at", "look_once"]
 
 T = TypeVar("T")
 
-#: Of a pixel in shared memory, at most: image, mask, doubts, what was filled, chances, the empty scene and where it was never seen. Bytes.
-PIXEL_BYTES = 3 + 1 + 1 + 1 + 1 + 12 + 1
+#: Of a pixel in shared memory, at most, bytes: image, mask, doubts, filled or chance, the empty scene and where it was never seen.
+PIXEL_BYTES = 3 + 1 + 1 + 1 + 12 + 1
 #: Of a frame besides, bytes.
 FRAME_BYTES = 1 << 16
 #: Arrays of a camera that go between processes.
@@ -45,9 +45,10 @@ class Look:
     images : tuple of ndarray of uint8, shape (h, w, 3), or None
     masks : tuple of ndarray of bool, shape (h, w), or None
     doubtful, filled : tuples of ndarray of bool, shape (h, w), or None
-        As `hmc.camera.segmentation.BackgroundModel` has them; None of a camera with ready-made silhouettes.
+        As `hmc.camera.segmentation.BackgroundModel` has them; None of a camera with ready-made silhouettes, and `filled` of one with
+        `chances`.
     chances : tuple of ndarray of uint8, shape (h, w), or None
-        Of pixels that may be shadows, likewise.
+        Of pixels that may be shadows, likewise; None of a camera with `filled`.
     gains : tuple of ndarray of float32, shape (rows, columns, 3), or None
         Of the image's light, likewise.
     scenes : tuple of Scene or None

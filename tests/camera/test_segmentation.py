@@ -106,10 +106,23 @@ def test_what_was_filled_for_its_darkness_alone_is_told():
     for top in (90, 105, 120):
         image[top : top + 7, 142:178] = scene.wall[top : top + 7, 142:178] * 0.66
     mask, model = segment(model, image)
-    assert model.filled is not None and not (model.filled & ~mask).any()
+    assert model.chance is None and model.filled is not None and not (model.filled & ~mask).any()
     assert np.mean(model.filled[91:96, 145:175]) > 0.95  # but for a rim that the evidence mixes with what is beside it
     assert not model.filled[100:103, 145:175].any() and not model.filled[150:185].any()
     assert not segment(model, scene.empty())[1].filled.any()
+
+
+def test_where_the_network_guesses_it_says_so_and_nothing_is_filled_by_rules():
+    """In images of the size that it has learnt from; where it is not asked, what is filled is told as in small ones."""
+    scene = Scene(1, noise=1.0)
+    empty = [cv2.resize(scene.empty(), (640, 480)) for _ in range(10)]
+    image = scene.person()[0]
+    image[91:96, 142:178] = scene.wall[91:96, 142:178] * 0.66
+    image = cv2.resize(image, (640, 480))
+    model = segment(train_background(empty), image)[1]
+    assert model.filled is None and model.chance is not None and model.chance[182:192, 290:350].any() and not model.chance[:40].any()
+    model = segment(train_background(empty), image, SegmentationSettings(least_chance=0))[1]
+    assert model.chance is None and model.filled is not None and model.filled[182:192, 290:350].any()
 
 
 def test_an_empty_scene_has_no_silhouette():
