@@ -27,16 +27,16 @@ __all__ = [
 #: last neck vertebra is behind the hip centres (Mac-Thiong et al. 2010, Spine 35: E1193), while the chest and the skull are over or
 #: before them. From the line of hips and neck the chest's middle is `chest_forward` to the front, the crown `head_forward`. The crown is
 #: the skull's; silhouettes have its hair as well. Joints are not in the middle of the flesh around them: with the arms stretched sideways
-#: that of the arms is lower and more to the front; that of waist and hips is to the front, of hips inward, of ankles and feet outward, by
-#: the lengths that are named so. The spine bends `lumbar` above the hips' middle, about at the lowest rib; each shoulder turns with its
-#: collar bone about a point `collar` inward (`python -m hmc.experiments run body-bias`).
+#: that of the arms is lower and more to the front; that of waist and hips is to the front, of hips inward, of ankles and feet outward, of
+#: the head to the back, by the lengths that are named so. The spine bends `lumbar` above the hips' middle, about at the lowest rib;
+#: each shoulder turns with its collar bone about a point `collar` inward (`python -m hmc.experiments run body-bias`).
 DEFAULT_LENGTHS: dict[str, float] = {
     "trunk": 0.318, "head": 0.147, "shoulder_half_width": 0.104, "shoulder_drop": 0.060, "hip_half_width": 0.060,
     "upper_arm": 0.157, "forearm": 0.150, "hand": 0.085, "thigh": 0.245, "shank": 0.250, "ankle_height": 0.046, "foot": 0.105,
-    "chest_forward": 0.010, "head_forward": 0.020, "hair": 0.010,
+    "chest_forward": 0.010, "head_forward": 0.027, "hair": 0.010,
     "shoulder_flesh_low": 0.0046, "elbow_flesh_low": 0.0034, "wrist_flesh_low": 0.0069, "arm_flesh_forward": 0.0023,
     "waist_flesh_forward": 0.0046, "hip_flesh_forward": 0.0034, "hip_flesh_inward": 0.0020,
-    "ankle_flesh_outward": 0.0046, "lumbar": 0.143, "collar": 0.083,
+    "ankle_flesh_outward": 0.0046, "head_flesh_back": 0.007, "lumbar": 0.143, "collar": 0.083,
 }  # fmt: skip
 #: What is 0 in a body that was stored before it was known, and in Canton's: joints in the middle of the flesh, which ends at the crown, and
 #: a trunk of one piece.
@@ -225,7 +225,7 @@ def _flesh(d: dict[str, float], sole: float) -> Cones:
 
     wide, deep, trunk = d["girth_torso"], d["girth_torso"] * d["girth_depth"], d["trunk"]
     x, y = np.eye(3)[:2]
-    chest, ahead = d["chest_forward"], d["head_forward"]
+    chest, ahead = d["chest_forward"], d["head_forward"] - d["head_flesh_back"]
     nape = 0.4 * chest
     waist = nape + d["waist_flesh_forward"]
     # Radii over stature: [lateral, front to back] at both ends.

@@ -110,7 +110,7 @@ def solid_body(skeleton: BodyModel) -> SolidBody:
     d, h = skeleton.dimensions, skeleton.dimensions["height"]
     wide, deep = d["girth_torso"], d["girth_torso"] * d["girth_depth"]
     trunk, chest, head = d["trunk"], d["chest_forward"], d["head"]
-    skull = 0.01 * h + 0.6 * d["head_forward"]
+    skull = 0.01 * h + 0.6 * (d["head_forward"] - d["head_flesh_back"])
     x, y, z = np.eye(3)
     rows: list[tuple] = []
 

@@ -138,8 +138,8 @@ def thesis_body(height_m: float) -> BodyModel:
     low[places], high[places] = thesis_limits()
     lacking = [k for k, name in enumerate(DOF_NAMES) if name.startswith(("torso", "r_hip_z", "l_hip_z", *ADDED_JOINTS))]
     low[lacking] = high[lacking] = 0.0
-    straight = {"shoulder_drop": 0.0, "chest_forward": 0.0, "head_forward": 0.0, "lumbar": 0.0, "collar": 0.0}
-    return make_body(default_body(height_m).dimensions | straight, JointLimits(low, high))
+    straight = ("shoulder_drop", "chest_forward", "head_forward", "head_flesh_back", "lumbar", "collar")
+    return make_body(default_body(height_m).dimensions | dict.fromkeys(straight, 0.0), JointLimits(low, high))
 
 
 def model_of_body(body: BodyModel, thesis: bool = False) -> SkeletonModel:
