@@ -85,6 +85,7 @@ PARTS: dict[str, Part] = {
     "particles where they are needed only": Part(preset={"sparing": None}),
     "limb search": Part(preset={"search": None}),
     "fresh starts for who is lost": Part(back={"anew": None}),
+    "turning about who faces backwards": Part(back={"turned": None}),
     "feet that stand": Part(back={"standing_feet": False}),
     "the floor as others see it": Part(frontend={"ask_floor": False}),
     "completion by other cameras": Part(frontend={"complete": False}),

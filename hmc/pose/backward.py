@@ -3,16 +3,17 @@
 A filter knows only the frames before: a limb that it loses stays lost until the silhouettes show it again, and the body was fitted to the
 first second and a half. When the recording is over more is known:
 
-1. What the scene hides from single cameras is learnt from the first pass's poses (`hmc.pose.occluders`); and what another's pose
+1. Who was followed the wrong way round is turned about (`hmc.pose.turned`).
+2. What the scene hides from single cameras is learnt from the first pass's poses (`hmc.pose.occluders`); and what another's pose
    covers asks nothing of a person. Feet that stand, as their motion tells, are held to the floor (`hmc.pose.contacts`).
-2. The person's dimensions are fitted anew, to frames of the whole run (`hmc.pose.starts.own_body`).
-3. Each person is followed from the last frame to the first. Nothing is drawn at random but limbs that are lost: the pose of the frame after
+3. The person's dimensions are fitted anew, to frames of the whole run (`hmc.pose.starts.own_body`).
+4. Each person is followed from the last frame to the first. Nothing is drawn at random but limbs that are lost: the pose of the frame after
    and the first pass's are refined side by side, so that a limb that was found again is followed back to where it was lost. Where a
    person was lost for long, so is a pose that is found anew (`hmc.pose.anew`).
-4. Each frame then has two poses, and more with limbs of one on the other; the best way through all of them is taken
+5. Each frame then has two poses, and more with limbs of one on the other; the best way through all of them is taken
    (`hmc.pose.mixtures`). Where nothing shows a limb, the way in from before and the way out to after are joined where they meet best.
 
-The second and the third go on where they were when a run was stopped; the others take a moment. Ours; the papers follow forward only.
+The third and the fourth go on where they were when a run was stopped; the others take a moment. Ours; the papers follow forward only.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from hmc.body.exchange import swapped_pose
 from hmc.body.kinematics import landmarks
 from hmc.body.model import BodyModel
 from hmc.body.proportions import make_bodies
@@ -46,6 +48,7 @@ from hmc.pose.starts.own_body import choose_frames, own_body
 from hmc.pose.steps.polish import PolishSettings, fine_objective, polish
 from hmc.pose.steps.proposal import shows_enough
 from hmc.pose.steps.refine import refine
+from hmc.pose.turned import both_ways, followed_wrongly
 from hmc.pose.views.keypoint_pose import keypoint_pose
 from hmc.pose.views.person_view import PersonView, views_of
 from hmc.processes import each_ahead
@@ -61,7 +64,7 @@ T = TypeVar("T")
 #: Of the random numbers of a frame: those of the backward pass.
 BACKWARD = 3
 #: Of those of the backward pass (`hmc.pose.method.other_rng`).
-ANEW = 1
+ANEW, TURNED = 1, 2
 #: Frames from which it is learnt where a detector's keypoints lie, at most, well spread.
 BESIDE_FRAMES = 40
 #: A ray that passes another's body as near as this may be of that one, metres: as wide as clothes are.
@@ -132,15 +135,18 @@ def backward(
     places = learn_hidden_places(recording.rig, grid, run, people.states) if settings.hidden_places else None
     first_bodies = make_bodies(people.states.bodies, method.limits)
     floor_z = float(recording.room[0, 2])
-    standing = standing_feet(people.states, first_bodies, recording.fps, floor_z) if settings.standing_feet else {}
-    pass_ = _Pass(recording, tracks, settings, options, run, capture, people.states, first_bodies, places, standing)
     records = open_journal(run.journal, with_angles(run.key), run.on_problem)
+    pass_ = _Pass(recording, tracks, settings, options, run, capture, people.states, first_bodies, places, {})
+    turned = frozenset(records[0].get("turned", ())) if records else _followed_wrongly(pass_, people, fitted)
+    people = _turned_about(people, fitted, turned, first_bodies)
+    standing = standing_feet(people.states, first_bodies, recording.fps, floor_z) if settings.standing_feet else {}
+    pass_ = replace(pass_, states=people.states, standing=standing)
     if records:
         bodies = make_bodies({int(person): body for person, body in records[0]["bodies"].items()}, method.limits)
     else:
         bodies = _bodies(pass_, people, fitted)
         if run.journal is not None:
-            append_journal(run.journal, {"bodies": {person: body.dimensions for person, body in bodies.items()}})
+            append_journal(run.journal, {"turned": sorted(turned), "bodies": {person: body.dimensions for person, body in bodies.items()}})
     pass_ = _with_beside(pass_, people, fitted, bodies)
     persons = {person: _begun(people, fitted, person, make_subject(body, pass_.capture)) for person, body in bodies.items()}
     if settings.anew is not None:
@@ -289,6 +295,39 @@ def _bodies(pass_: _Pass, people: PosedPeople, fitted: np.ndarray) -> dict[int, 
             partial(make_subject, capture=pass_.capture),
         ).body
     return bodies
+
+
+def _followed_wrongly(pass_: _Pass, people: PosedPeople, fitted: np.ndarray) -> frozenset[int]:
+    """Who was followed the wrong way round, by frames of the whole run."""
+    settings = pass_.settings
+    if settings.turned is None:
+        return frozenset()
+    turned_settings, polish_settings = settings.turned, settings.polish
+    persons = {number: _begun(people, fitted, number, make_subject(body, pass_.capture)) for number, body in pass_.bodies.items()}
+
+    def evidence_in(frames: Sequence[int], asked: frozenset[int]) -> Iterator[dict[int, float]]:
+        def told(some: Sequence[int]) -> Iterator[dict[int, float]]:
+            for frame, views in pass_.views_of(some):
+                evidence = {}
+                for number in sorted(asked & views.keys()):
+                    person, view = persons[number], views[number]
+                    if frame in person.row_of and shows_enough(view.target):
+                        rng = other_rng(pass_.rng(number, frame), TURNED)
+                        state = person.own[person.row_of[frame]]
+                        evidence[number] = both_ways(rng, person.subject, state, view, polish_settings, turned_settings.start).evidence
+                yield evidence
+
+        return pass_.each(told, frames)
+
+    return followed_wrongly({number: list(person.row_of) for number, person in persons.items()}, evidence_in, turned_settings)
+
+
+def _turned_about(people: PosedPeople, fitted: np.ndarray, turned: frozenset[int], bodies: Mapping[int, BodyModel]) -> PosedPeople:
+    """The tables with some people's poses turned about."""
+    states = people.states.states.copy()
+    for row in np.flatnonzero(fitted & np.isin(people.persons, sorted(turned))):
+        states[row] = swapped_pose(bodies[int(people.persons[row])], states[row], "all")
+    return replace(people, states=replace(people.states, states=states)) if turned else people
 
 
 def _begun(people: PosedPeople, fitted: np.ndarray, person: int, subject: Subject) -> _Person:

@@ -18,6 +18,7 @@ from hmc.body.model import BodyModel
 from hmc.pose.anew import AnewSettings
 from hmc.pose.legs import LegSettings, choose_legs, limb_points
 from hmc.pose.steps.polish import PolishSettings
+from hmc.pose.turned import TurnedSettings
 
 __all__ = ["N_MIXTURES", "BackwardSettings", "choose_path", "mixed_poses", "mixture"]
 
@@ -47,6 +48,8 @@ class BackwardSettings:
         backward pass's poses stay as they are, and none of the first pass's are taken; feet that stand are not held to the floor.
     anew : AnewSettings or None
         Where a pose is looked for anew (`hmc.pose.anew`); None: nowhere.
+    turned : TurnedSettings or None
+        When somebody was followed the wrong way round (`hmc.pose.turned`); None: never.
     """
 
     polish: PolishSettings
@@ -58,6 +61,7 @@ class BackwardSettings:
     best_way: bool = True
     standing_feet: bool = True
     anew: AnewSettings | None = field(default_factory=AnewSettings)
+    turned: TurnedSettings | None = field(default_factory=TurnedSettings)
 
 
 def mixed_poses(one: np.ndarray, other: np.ndarray) -> np.ndarray:

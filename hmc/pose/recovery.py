@@ -5,8 +5,8 @@ faces backwards. Two signs tell, and neither alone changes anything:
 
 - The cost has stayed far above what is usual for this person. A fresh start from the frame's hulls is then refined beside the pose as
   it is, and taken if it is far better.
-- Every so often the body turned about is refined beside the pose as it is. A hull hardly tells the two apart in one frame; the logarithm
-  of the ratio of their costs is summed up (CUSUM; Page, 1954), until it is beyond doubt.
+- Every so often the body turned about is refined beside the pose as it is (`hmc.pose.turned`). A hull hardly tells the two apart in one
+  frame; the logarithm of the ratio of their costs is summed up (CUSUM; Page, 1954), until it is beyond doubt.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from dataclasses import astuple, dataclass, field, replace
 
 import numpy as np
 
-from hmc.body.exchange import swapped_pose
 from hmc.pose.method import StepInfo, StepResult, Tracked, other_rng
 from hmc.pose.objectives.objective import cost_at
-from hmc.pose.starts.candidates import StartSettings, candidates, search_all, walk_factor
+from hmc.pose.starts.candidates import StartSettings, candidates
 from hmc.pose.steps.polish import fine_objective
 from hmc.pose.steps.presets import PosePreset
 from hmc.pose.steps.refine import refine
+from hmc.pose.turned import both_ways
 from hmc.pose.views.person_view import PersonView
 
 __all__ = ["LossSettings", "LossState", "Recovery", "loss_init", "recalled"]
@@ -170,13 +170,11 @@ class Recovery:
         state = replace(state, usual=usual, bad_s=0.0, wait_s=settings.patience_s)
         if state.since_turn_s < (settings.suspicion_s if state.turned else settings.turn_every_s) - dt / 2:
             return tracked, info, state
-        (as_it_is, cost), (turned, turned_cost) = self._both_ways(rng, tracked, view)
-        factors = walk_factor(np.array([as_it_is[3], turned[3]]), view.velocity, self.start)
-        evidence = np.log(cost * factors[0]) - np.log(turned_cost * factors[1]) - settings.turn_drift
-        state = replace(state, since_turn_s=0.0, turned=max(0.0, state.turned + float(evidence)))
+        ways = both_ways(rng, tracked.subject, tracked.state, view, self.preset.polish, self.start)
+        state = replace(state, since_turn_s=0.0, turned=max(0.0, state.turned + ways.evidence - settings.turn_drift))
         if state.turned < settings.turn_limit:
             return tracked, info, state
-        return (*_placed(tracked, info, turned, turned_cost), replace(state, turned=0.0))
+        return (*_placed(tracked, info, ways.turned, ways.turned_cost), replace(state, turned=0.0))
 
     def _fresh_start(self, rng: np.random.Generator, tracked: Tracked, view: PersonView) -> tuple[np.ndarray, float] | None:
         """The best pose that a start from this frame's hulls finds, and its cost, if that is far below the present one's."""
@@ -186,17 +184,6 @@ class Recovery:
         trials = [refine(objective, one, polish.refine) for one in states]
         best, cost = min(((one, info.cost_after) for one, info in trials), key=lambda pair: pair[1])
         return (best, cost) if cost < self.settings.gain * cost_at(objective, tracked.state) else None
-
-    def _both_ways(self, rng: np.random.Generator, tracked: Tracked, view: PersonView) -> list[tuple[np.ndarray, float]]:
-        """The pose and the one turned about, both refined to the same points, with their costs.
-
-        Arms and legs of a body that has been followed the wrong way round have gone astray too: those of the turned one are looked for.
-        """
-        polish, now = self.preset.polish, tracked.state
-        objective = fine_objective(rng, tracked.subject, view, polish)
-        as_it_is, _ = refine(objective, now, polish.refine)
-        turned, _ = refine(objective, swapped_pose(tracked.subject.body, now, "all"), polish.refine)
-        return [(as_it_is, cost_at(objective, as_it_is)), search_all(rng, objective, turned, polish)]
 
 
 def _placed(tracked: Tracked, info: StepInfo, state: np.ndarray, cost: float) -> StepResult:

@@ -28,6 +28,7 @@ FRAMES, SEED = 8, 2
 SECOND = (
     "second pass", "own body of the whole run", "what furniture hides", "others' rays", "best way through both passes",
     "fresh starts for who is lost",
+    "turning about who faces backwards",
     "feet that stand",
 )  # fmt: skip
 

@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from methods import HEIGHT_M, VOXEL_M, followed, tiny_clip, true_joints, true_tracks
 
+from hmc.body.exchange import swapped_pose
 from hmc.body.joints import N_DOF
 from hmc.body.kinematics import landmarks
 from hmc.body.limbs import LIMBS
@@ -55,6 +56,14 @@ def second(people, run, method=None, recent=None):
     method = method or pose_method("apf")
     options = FollowOptions(VOXEL_M, 3, HEIGHT_M, recent=recent)
     return backward(tiny_clip(FRAMES), true_tracks(FRAMES), method, people, options, run)
+
+
+def turned_about(people):
+    """The same poses the wrong way round: left is right, and front is back."""
+    (body,) = make_bodies(people.states.bodies).values()
+    states = np.array([swapped_pose(body, state, "all") for state in people.states.states])
+    poses = replace(people.poses, positions=landmarks(body, states))
+    return replace(people, poses=poses, states=replace(people.states, states=states))
 
 
 @pytest.mark.parametrize(
@@ -106,10 +115,26 @@ def test_a_stopped_pass_goes_on_to_the_same_numbers(one_pass, tmp_path):
         assert again.states.bodies == whole.states.bodies
 
 
+def test_who_was_followed_the_wrong_way_round_is_turned_about(one_pass, tmp_path):
+    """By the whole run, also where the pass was stopped; with that switched off it stays wrong."""
+    people, run = one_pass
+    wrong = turned_about(people)
+    assert np.median(errors(wrong)[:, WRIST]) > 0.2
+    run = replace(run, journal=tmp_path / "journal")
+    found = second(wrong, run)
+    assert np.median(errors(found)[:, WRIST]) < 0.06 and np.mean(errors(found)) < 1.3 * np.mean(errors(people))
+    lines = (tmp_path / "journal").read_text().splitlines(keepends=True)
+    (tmp_path / "journal").write_text("".join(lines[:4]))
+    np.testing.assert_array_equal(second(wrong, run).states.states, found.states.states)
+    method = pose_method("apf")
+    off = second(wrong, replace(run, journal=None), replace(method, back=replace(method.back, turned=None)))
+    assert np.median(errors(off)[:, WRIST]) > 0.2
+
+
 def test_views_that_the_first_pass_left_are_not_made_again_and_change_nothing(one_pass, monkeypatch):
     people, run = one_pass
     method = pose_method("apf")
-    method = replace(method, back=replace(method.back, hidden_places=False, fit_body=None))
+    method = replace(method, back=replace(method.back, hidden_places=False, fit_body=None, turned=None))
     clip, tracks = tiny_clip(FRAMES), true_tracks(FRAMES)
     grid = person_grid(clip, VOXEL_M)
     steps = stream_hulls(clip, grid, masks=kept_frames(run.masks, run.key, range(FRAMES)))
