@@ -29,7 +29,7 @@ METHOD = OBJECTIVES | {"pose.method"}
 STEPS = METHOD | {"pose.steps"}
 STARTS = STEPS | {"pose.starts"}
 PERSON = STARTS | {"pose.legs", "pose.person"}
-MIXTURES = STEPS | {"pose.anew", "pose.legs", "pose.mixtures"}
+MIXTURES = STEPS | {"pose.anew", "pose.legs", "pose.mixtures", "pose.turned"}
 FINISHED = MOTION | {"view"}
 FOLLOWING = PERSON | FINISHED | {"pose.finished", "pose.records", "pose.follow", "pose.keypoint_cues", "pose.keypoint_sides"}
 METHODS = STARTS | MIXTURES | {"pose.recovery", "pose.methods"}
@@ -55,7 +55,7 @@ MAY_IMPORT = {
     "pose.steps": STEPS,
     "pose.legs": STEPS,
     "pose.starts": STARTS,
-    "pose.recovery": STARTS,
+    "pose.recovery": STARTS | {"pose.turned"},
     "pose.person": PERSON,
     "pose.records": PERSON | {"pose.records"},
     "pose.finished": FINISHED,
@@ -65,6 +65,7 @@ MAY_IMPORT = {
     "pose.keypoint_tracks": VIEWS,
     "pose.keypoint_views": FOLLOWING | {"pose.trust"},
     "pose.anew": STARTS,
+    "pose.turned": STARTS,
     "pose.mixtures": MIXTURES,
     "pose.occluders": VIEWS,
     "pose.backward": FOLLOWING | MIXTURES | {"pose.backward", "pose.contacts", "pose.occluders"},
