@@ -26,7 +26,10 @@ for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
 #: Module and function of each stage, in the order of the picture; what is in none is the last line.
 STAGES = {
     "opening the recording": (("hmc.io.recording", "open_recording"),),
-    "learning the empty scene": (("hmc.camera.segmentation", "train_background"), ("hmc.voxels.background_initialisation", "learn_from_people")),
+    "learning the empty scene": (
+        ("hmc.camera.segmentation", "train_background"),
+        ("hmc.voxels.background_initialisation", "learn_from_people"),
+    ),
     "silhouettes, each camera alone": (("hmc.voxels.looks", "look_once"), ("hmc.camera.segmentation", "segment_views")),
     "silhouettes, cameras together": (("hmc.voxels.hulls", "settle"),),
     "hulls": (("hmc.voxels.hulls", "carve_step"),),
