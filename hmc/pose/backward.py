@@ -48,7 +48,7 @@ from hmc.pose.starts.own_body import choose_frames, own_body
 from hmc.pose.steps.polish import PolishSettings, fine_objective, polish
 from hmc.pose.steps.proposal import shows_enough
 from hmc.pose.steps.refine import refine
-from hmc.pose.turned import both_ways, followed_wrongly
+from hmc.pose.turned import followed_wrongly, turn_about
 from hmc.pose.views.keypoint_pose import keypoint_pose
 from hmc.pose.views.person_view import PersonView, views_of
 from hmc.processes import each_ahead
@@ -305,19 +305,19 @@ def _followed_wrongly(pass_: _Pass, people: PosedPeople, fitted: np.ndarray) -> 
     turned_settings, polish_settings = settings.turned, settings.polish
     persons = {number: _begun(people, fitted, number, make_subject(body, pass_.capture)) for number, body in pass_.bodies.items()}
 
-    def evidence_in(frames: Sequence[int], asked: frozenset[int]) -> Iterator[dict[int, float]]:
+    def evidence_in(asked: Mapping[int, Sequence[int]]) -> Iterator[dict[int, float]]:
         def told(some: Sequence[int]) -> Iterator[dict[int, float]]:
             for frame, views in pass_.views_of(some):
                 evidence = {}
-                for number in sorted(asked & views.keys()):
-                    person, view = persons[number], views[number]
-                    if frame in person.row_of and shows_enough(view.target):
+                for number in asked[frame]:
+                    person, view = persons[number], views.get(number)
+                    if view is not None and shows_enough(view.target):
                         rng = other_rng(pass_.rng(number, frame), TURNED)
                         state = person.own[person.row_of[frame]]
-                        evidence[number] = both_ways(rng, person.subject, state, view, polish_settings, turned_settings.start).evidence
+                        evidence[number] = turn_about(rng, person.subject, state, view, polish_settings, turned_settings.start).evidence
                 yield evidence
 
-        return pass_.each(told, frames)
+        return pass_.each(told, list(asked))
 
     return followed_wrongly({number: list(person.row_of) for number, person in persons.items()}, evidence_in, turned_settings)
 

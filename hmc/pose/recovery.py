@@ -22,7 +22,7 @@ from hmc.pose.starts.candidates import StartSettings, candidates
 from hmc.pose.steps.polish import fine_objective
 from hmc.pose.steps.presets import PosePreset
 from hmc.pose.steps.refine import refine
-from hmc.pose.turned import both_ways
+from hmc.pose.turned import turn_about
 from hmc.pose.views.person_view import PersonView
 
 __all__ = ["LossSettings", "LossState", "Recovery", "loss_init", "recalled"]
@@ -170,11 +170,11 @@ class Recovery:
         state = replace(state, usual=usual, bad_s=0.0, wait_s=settings.patience_s)
         if state.since_turn_s < (settings.suspicion_s if state.turned else settings.turn_every_s) - dt / 2:
             return tracked, info, state
-        ways = both_ways(rng, tracked.subject, tracked.state, view, self.preset.polish, self.start)
-        state = replace(state, since_turn_s=0.0, turned=max(0.0, state.turned + ways.evidence - settings.turn_drift))
+        about = turn_about(rng, tracked.subject, tracked.state, view, self.preset.polish, self.start)
+        state = replace(state, since_turn_s=0.0, turned=max(0.0, state.turned + about.evidence - settings.turn_drift))
         if state.turned < settings.turn_limit:
             return tracked, info, state
-        return (*_placed(tracked, info, ways.turned, ways.turned_cost), replace(state, turned=0.0))
+        return (*_placed(tracked, info, about.state, about.cost), replace(state, turned=0.0))
 
     def _fresh_start(self, rng: np.random.Generator, tracked: Tracked, view: PersonView) -> tuple[np.ndarray, float] | None:
         """The best pose that a start from this frame's hulls finds, and its cost, if that is far below the present one's."""

@@ -10,6 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import groupby
+from operator import itemgetter
 
 import numpy as np
 
@@ -22,7 +24,7 @@ from hmc.pose.steps.polish import PolishSettings, fine_objective
 from hmc.pose.steps.refine import refine
 from hmc.pose.views.person_view import PersonView
 
-__all__ = ["BothWays", "TurnedSettings", "both_ways", "followed_wrongly"]
+__all__ = ["TurnedAbout", "TurnedSettings", "followed_wrongly", "turn_about"]
 
 
 @dataclass(frozen=True)
@@ -50,29 +52,28 @@ class TurnedSettings:
 
 
 @dataclass(frozen=True)
-class BothWays:
-    """A frame's pose as it is and turned about, both refined to the same points, what they cost, and what that says.
+class TurnedAbout:
+    """A frame's pose turned about, and what speaks for it.
 
     Parameters
     ----------
-    as_it_is, turned : ndarray, shape (37,)
-    cost, turned_cost : float
+    state : ndarray, shape (37,)
+    cost : float
         Square metres.
     evidence : float
-        For the body turned about: the logarithm of the costs' ratio, of costs that walking backwards raises.
+        The logarithm of the ratio of costs, of the pose as it is over that one's, both refined to the same points; walking backwards
+        raises a cost.
     """
 
-    as_it_is: np.ndarray
-    turned: np.ndarray
+    state: np.ndarray
     cost: float
-    turned_cost: float
     evidence: float
 
 
-def both_ways(
+def turn_about(
     rng: np.random.Generator, subject: Subject, state: np.ndarray, view: PersonView, polish: PolishSettings, start: StartSettings
-) -> BothWays:
-    """A pose as it is and turned about.
+) -> TurnedAbout:
+    """A pose turned about, beside the pose as it is.
 
     Arms and legs of a body that has been followed the wrong way round have gone astray too: those of the turned one are looked for.
 
@@ -92,12 +93,12 @@ def both_ways(
     cost = cost_at(objective, as_it_is)
     turned, turned_cost = search_all(rng, objective, turned, polish)
     factors = walk_factor(np.array([as_it_is[3], turned[3]]), view.velocity, start)
-    return BothWays(as_it_is, turned, cost, turned_cost, float(np.log(cost * factors[0]) - np.log(turned_cost * factors[1])))
+    return TurnedAbout(turned, turned_cost, float(np.log(cost * factors[0]) - np.log(turned_cost * factors[1])))
 
 
 def followed_wrongly(
     frames: Mapping[int, Sequence[int]],
-    evidence_in: Callable[[Sequence[int], frozenset[int]], Iterator[Mapping[int, float]]],
+    evidence_in: Callable[[Mapping[int, Sequence[int]]], Iterator[Mapping[int, float]]],
     settings: TurnedSettings,
 ) -> frozenset[int]:
     """Who was followed the wrong way round.
@@ -107,8 +108,8 @@ def followed_wrongly(
     frames : mapping of int to sequence of int
         The frames in which each person was fitted, in order of time.
     evidence_in : callable
-        ``evidence_in(frames, persons) -> iterator over the frames of evidence by person``, as `BothWays` has it; a person of whom a frame
-        shows too little is not in it.
+        ``evidence_in(persons) -> iterator over the frames of evidence by person``, of the persons asked of by frame, as `TurnedAbout` has
+        it; a person of whom a frame shows too little is not in it.
     settings : TurnedSettings
 
     Returns
@@ -121,11 +122,10 @@ def followed_wrongly(
     stride = max(1, settings.frames // settings.first)
     found: dict[int, list[float]] = {person: [] for person in chosen}
     for begin in ([0], range(1, stride)):
-        left = frozenset(person for person, told in found.items() if not told or np.mean(told) > -settings.sure)
-        wanted = {person: {frame for k in begin for frame in chosen[person][k::stride]} for person in left}
-        asked = sorted(set().union(*wanted.values()))
-        for frame, told in zip(asked, evidence_in(asked, left), strict=True):
+        left = [person for person, told in found.items() if not told or np.mean(told) > -settings.sure]
+        asked = sorted((frame, person) for person in left for k in begin for frame in chosen[person][k::stride])
+        by_frame = {frame: [person for _, person in some] for frame, some in groupby(asked, itemgetter(0))}
+        for told in evidence_in(by_frame):
             for person, evidence in told.items():
-                if frame in wanted.get(person, ()):
-                    found[person].append(evidence)
+                found[person].append(evidence)
     return frozenset(person for person, told in found.items() if len(told) >= settings.first and np.mean(told) > settings.drift)

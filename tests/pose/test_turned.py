@@ -14,9 +14,10 @@ def asked(evidence, frames=None, settings=SETTINGS):
     people = frames or dict.fromkeys(range(3), FRAMES)
     seen = {person: [] for person in people}
 
-    def evidence_in(frames, persons):
-        for frame in frames:
-            told = {person: evidence(person, frame) for person in sorted(persons)}
+    def evidence_in(asked):
+        assert list(asked) == sorted(asked)
+        for frame, persons in asked.items():
+            told = {person: evidence(person, frame) for person in persons}
             for person in told:
                 seen[person].append(frame)
             yield {person: value for person, value in told.items() if value is not None}
@@ -31,6 +32,12 @@ def test_the_mean_over_the_run_decides_and_who_is_surely_right_is_asked_less():
     assert found == {1}
     assert len(seen[0]) == SETTINGS.first and len(seen[1]) == len(seen[2]) == SETTINGS.frames
     assert min(seen[1]) == FRAMES[0] and max(seen[1]) == FRAMES[-1] and len(set(seen[1])) == SETTINGS.frames
+
+
+def test_each_is_asked_of_its_own_frames_alone():
+    people = {0: list(range(50)), 1: list(range(30, 90))}
+    _, seen = asked(lambda person, frame: 0.0, people)
+    assert all(len(seen[person]) == SETTINGS.frames and set(seen[person]) <= set(frames) for person, frames in people.items())
 
 
 def test_a_single_frame_decides_nothing_however_sure_it_is():
