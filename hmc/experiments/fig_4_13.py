@@ -43,12 +43,14 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     figure, (left, right) = plt.subplots(1, 2, figsize=(8, 3.4))
     for (tracker, color), method in runs.methods(PRESET).items():
         own_rows = [row for row in rows if row["method"] == method]
-        most = max((row["N"] for row in own_rows if row["N"]), default=None)
+        # The largest number that was run at the most voxel sizes: at 5 cm there are numbers that no other size has.
+        numbers = [row["N"] for row in own_rows]
+        held = max(numbers, key=lambda n: (numbers.count(n), n or 0))
         finest = min(row["voxel_cm"] for row in own_rows)
         style = runs.style_of(tracker, color)
-        label = method + (f", N = {most}" if most else "")
+        label = method + (f", N = {held}" if held else "")
         for axes, key, part in (
-            (left, "voxel_cm", [row for row in own_rows if row["N"] == most]),
+            (left, "voxel_cm", [row for row in own_rows if row["N"] == held]),
             (right, "N", [row for row in own_rows if row["N"] and row["voxel_cm"] == finest]),
         ):
             at = [row[key] for row in part]

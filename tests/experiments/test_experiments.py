@@ -453,6 +453,18 @@ def test_what_the_paper_shows_holds_on_the_papers_own_figures():
             plt.close(figure)
 
 
+def test_growth_with_voxels_is_drawn_at_a_number_that_all_sizes_have():
+    from hmc.experiments import fig_4_13
+
+    everywhere = (None, 800, 100)
+    cells = [one for one in papers_cells() if one.parameters["voxel_m"] == 0.05 or one.parameters["particles"] in everywhere]
+    with house_style():
+        figure = fig_4_13.EXPERIMENT.report(cells, Plan()).figures["fig-4.13"]
+    drawn = {line.get_label(): len(line.get_xdata()) for line in figure.axes[0].lines if not line.get_label().startswith("_")}
+    plt.close(figure)
+    assert drawn == dict.fromkeys(["naive", "SS raw, N = 800", "SS color, N = 800", "PF raw, N = 100", "PF color, N = 100"], 4)
+
+
 def test_scores_of_several_runs_are_taken_together():
     from hmc.experiments.tracking_runs import scores_of
 
