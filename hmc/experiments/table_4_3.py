@@ -154,7 +154,8 @@ def _draw(preset: str, scores: dict[Configuration, runs.Score]) -> Figure:
         column[1].set_xlabel("samples, particles")
     axes[0, 0].set_ylabel("MOTP (mm)")
     axes[1, 0].set_ylabel("MOTA (%)")
-    axes[0, -1].legend()
+    handles, labels = axes[0, -1].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
     return figure
 
 

@@ -447,6 +447,10 @@ def test_what_the_paper_shows_holds_on_the_papers_own_figures():
             assert rows["PF", "default", chosen]["best_case"] == "2 cm, 100, color"
         growth = fig_4_13.EXPERIMENT.report(cells, plan)
         assert all(claim.holds for claim in growth.claims) and "naive -3.00" in growth.claims[0].detail
+        own = {(row["method"], row["voxel_cm"]): row for row in growth.tables[1].rows}
+        assert own["PF raw", 2]["one_sample_us"] / own["PF raw", 5]["one_sample_us"] == pytest.approx(2.5**3)
+        assert own["SS raw", 2]["one_sample_us"] == pytest.approx(own["SS raw", 15]["one_sample_us"] * 7.5**0.1)
+        assert all(row["the_rest_ms"] == pytest.approx(0, abs=1e-6) for row in own.values())
         factors = fig_4_14.EXPERIMENT.report(cells, plan)
         assert all(claim.holds for claim in factors.claims if "time" in claim.text)
         for figure in (*report.figures.values(), *growth.figures.values(), *factors.figures.values()):
