@@ -67,7 +67,7 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     left.minorticks_off()
     left.legend(title="dotted: theory")
     caption = "Processor time of the filters and the theory's growth (Canton, Table 4.5 and Figure 4.13)."
-    parts = "Of these the part that goes with the number of samples or particles, by the straight line through the times of all numbers, and the rest."
+    parts = "Of these the part that goes with samples or particles, by the straight line through the times of all numbers, and the rest."
     tables = (Table("fig-4.13", caption, rows), Table("fig-4.13-parts", parts, _parts(rows)))
     return Report(tables, {"fig-4.13": figure}, tuple(_claims(cells)))
 
@@ -76,9 +76,9 @@ def _parts(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     """What a sample costs (microseconds), and what is there without any (milliseconds), method by method and voxel by voxel."""
     parts = []
     for method, voxel in dict.fromkeys((row["method"], row["voxel_cm"]) for row in rows if row["N"]):
-        line = [(row["N"], row["measured_ms"]) for row in rows if (row["method"], row["voxel_cm"]) == (method, voxel)]
+        line = np.array([(row["N"], row["measured_ms"]) for row in rows if (row["method"], row["voxel_cm"]) == (method, voxel)])
         if len(line) > 1:
-            each, rest = np.polyfit(*zip(*line, strict=True), 1)
+            each, rest = np.polyfit(line[:, 0], line[:, 1], 1)
             parts.append({"method": method, "voxel_cm": voxel, "one_sample_us": 1000 * each, "the_rest_ms": rest})
     return parts
 

@@ -48,7 +48,7 @@ from hmc.pose.starts.own_body import choose_frames, own_body
 from hmc.pose.steps.polish import PolishSettings, fine_objective, polish
 from hmc.pose.steps.proposal import shows_enough
 from hmc.pose.steps.refine import refine
-from hmc.pose.turned import followed_wrongly, turn_about
+from hmc.pose.turned import followed_wrongly, stretches, turn_about
 from hmc.pose.views.keypoint_pose import keypoint_pose
 from hmc.pose.views.person_view import PersonView, views_of
 from hmc.processes import each_ahead
@@ -137,7 +137,10 @@ def backward(
     floor_z = float(recording.room[0, 2])
     records = open_journal(run.journal, with_angles(run.key), run.on_problem)
     pass_ = _Pass(recording, tracks, settings, options, run, capture, people.states, first_bodies, places, {})
-    turned = frozenset(records[0].get("turned", ())) if records else _followed_wrongly(pass_, people, fitted)
+    if records:
+        turned = {int(person): frames for person, frames in records[0]["turned_frames"].items()}
+    else:
+        turned = _followed_wrongly(pass_, people, fitted)
     people = _turned_about(people, fitted, turned, first_bodies)
     standing = standing_feet(people.states, first_bodies, recording.fps, floor_z) if settings.standing_feet else {}
     pass_ = replace(pass_, states=people.states, standing=standing)
@@ -146,7 +149,7 @@ def backward(
     else:
         bodies = _bodies(pass_, people, fitted)
         if run.journal is not None:
-            append_journal(run.journal, {"turned": sorted(turned), "bodies": {person: body.dimensions for person, body in bodies.items()}})
+            append_journal(run.journal, {"turned_frames": turned, "bodies": {person: body.dimensions for person, body in bodies.items()}})
     pass_ = _with_beside(pass_, people, fitted, bodies)
     persons = {person: _begun(people, fitted, person, make_subject(body, pass_.capture)) for person, body in bodies.items()}
     if settings.anew is not None:
@@ -297,11 +300,11 @@ def _bodies(pass_: _Pass, people: PosedPeople, fitted: np.ndarray) -> dict[int, 
     return bodies
 
 
-def _followed_wrongly(pass_: _Pass, people: PosedPeople, fitted: np.ndarray) -> frozenset[int]:
-    """Who was followed the wrong way round, by frames of the whole run."""
+def _followed_wrongly(pass_: _Pass, people: PosedPeople, fitted: np.ndarray) -> dict[int, list[int]]:
+    """In which frames people were followed the wrong way round, by frames of the whole run."""
     settings = pass_.settings
     if settings.turned is None:
-        return frozenset()
+        return {}
     turned_settings, polish_settings = settings.turned, settings.polish
     persons = {number: _begun(people, fitted, number, make_subject(body, pass_.capture)) for number, body in pass_.bodies.items()}
 
@@ -319,14 +322,21 @@ def _followed_wrongly(pass_: _Pass, people: PosedPeople, fitted: np.ndarray) -> 
 
         return pass_.each(told, list(asked))
 
-    return followed_wrongly({number: list(person.row_of) for number, person in persons.items()}, evidence_in, turned_settings)
+    followed = {
+        number: stretches(people.frames[person.rows], person.own[:, 3], pass_.recording.fps, turned_settings)
+        for number, person in persons.items()
+    }
+    return followed_wrongly(followed, evidence_in, turned_settings)
 
 
-def _turned_about(people: PosedPeople, fitted: np.ndarray, turned: frozenset[int], bodies: Mapping[int, BodyModel]) -> PosedPeople:
-    """The tables with some people's poses turned about."""
+def _turned_about(
+    people: PosedPeople, fitted: np.ndarray, turned: Mapping[int, Sequence[int]], bodies: Mapping[int, BodyModel]
+) -> PosedPeople:
+    """The tables with some people's poses turned about in some frames."""
     states = people.states.states.copy()
-    for row in np.flatnonzero(fitted & np.isin(people.persons, sorted(turned))):
-        states[row] = swapped_pose(bodies[int(people.persons[row])], states[row], "all")
+    for person, frames in turned.items():
+        for row in np.flatnonzero(fitted & (people.persons == person) & np.isin(people.frames, frames)):
+            states[row] = swapped_pose(bodies[person], states[row], "all")
     return replace(people, states=replace(people.states, states=states)) if turned else people
 
 

@@ -49,8 +49,8 @@ class LossSettings:
         Time over which the usual cost is a mean, seconds.
     turn_every_s, suspicion_s : float
         How often the body turned about is tried, and how often once it was better, seconds.
-    turn_drift, turn_limit : float
-        What is taken from each logarithm of a ratio of costs, and the sum at which the body is turned about.
+    turn_limit : float
+        The sum of evidence (`TurnedAbout`) at which the body is turned about.
     """
 
     ratio: float = 3.0
@@ -59,7 +59,6 @@ class LossSettings:
     memory_s: float = 3.0
     turn_every_s: float = 1.0
     suspicion_s: float = 0.2
-    turn_drift: float = 0.1
     turn_limit: float = 0.8
 
 
@@ -171,7 +170,7 @@ class Recovery:
         if state.since_turn_s < (settings.suspicion_s if state.turned else settings.turn_every_s) - dt / 2:
             return tracked, info, state
         about = turn_about(rng, tracked.subject, tracked.state, view, self.preset.polish, self.start)
-        state = replace(state, since_turn_s=0.0, turned=max(0.0, state.turned + about.evidence - settings.turn_drift))
+        state = replace(state, since_turn_s=0.0, turned=max(0.0, state.turned + about.evidence))
         if state.turned < settings.turn_limit:
             return tracked, info, state
         return (*_placed(tracked, info, about.state, about.cost), replace(state, turned=0.0))

@@ -42,6 +42,9 @@ class StartSettings:
         Above this speed of the track, a body is taken to face where it goes.
     walk_penalty : float
         Share by which facing straight backwards raises the cost.
+    searched : float
+        Logarithm of the ratio of costs that a search of the limbs gains on the mean, whoever it is: it is no evidence that a body turned
+        about is the right one.
     body_frames : int
         Frames to which the body's dimensions are fitted.
     """
@@ -54,6 +57,7 @@ class StartSettings:
     same_m: float = 0.04
     walk_speed_m_s: float = 0.5
     walk_penalty: float = 2.0
+    searched: float = 0.1
     body_frames: int = 12
 
 
