@@ -261,6 +261,8 @@ def _run(args: argparse.Namespace, held: ExitStack) -> int:
     elif tracks is not None and cues is not None:
         people = with_keypoint_views(people, recording, tracks, cues)
     problems += people.notes
+    if source_of_keypoints is not None:
+        problems += source_of_keypoints.notes
     if hulls:
         leave_silhouettes(args, recording, key, problems.append)
     write_tracks(paths["tracks.csv"], _pelvis_tracks(people) if tracks is None else tracks)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -197,6 +197,7 @@ def _run(args: argparse.Namespace, held: ExitStack) -> int:
     )
     take_silhouettes(silhouettes, work.recording, args.out / MASKS, key, problems.append)
     table = work.track(run, timings.append)
+    problems += work.notes
     if args.cues == CUES[0]:
         leave_silhouettes(args, work.recording, key, problems.append)
     write_tracks(tracks_path, table)
@@ -220,13 +221,14 @@ def _run(args: argparse.Namespace, held: ExitStack) -> int:
 
 @dataclass(frozen=True)
 class _Work:
-    """What is to be done: the recording as it is read, the method's name and parameters, and a function from a run and what takes its
-    timing to the tracks."""
+    """What is to be done: the recording as it is read, the method's name and parameters, a function from a run and what takes its
+    timing to the tracks, and what is to be said besides."""
 
     recording: Recording
     method: str
     parameters: Mapping[str, Any]
     track: Callable[[RunOptions, Callable[[Timing], None]], TrackTable]
+    notes: Sequence[str] = ()
 
 
 def _by_silhouettes(args: argparse.Namespace, recording: Recording) -> _Work:
@@ -248,7 +250,7 @@ def _by_keypoints(args: argparse.Namespace, recording: Recording) -> _Work:
     if given:
         raise InputError(f"--cues {args.cues}: has no use for {', '.join(given)}; leave {'it' if len(given) == 1 else 'them'} out")
     source = open_given_keypoints(recording, f"--cues {args.cues}")
-    return _Work(recording, "keypoints", {"cues": args.cues}, lambda run, timed: tracks_of_keypoints(recording, source, run))
+    return _Work(recording, "keypoints", {"cues": args.cues}, lambda run, timed: tracks_of_keypoints(recording, source, run), source.notes)
 
 
 def _speed(timing, fps: float) -> dict[str, float]:

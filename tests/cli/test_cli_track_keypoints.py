@@ -60,6 +60,16 @@ def test_other_keypoints_are_another_run(clip, tmp_path, capsys):
     assert "another recording; starting anew" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize("command", ["track", "pose"])
+def test_cameras_without_keypoints_are_named(clip, tmp_path, capsys, command):
+    folder = Path(shutil.copytree(clip, tmp_path / "clip"))
+    one = sorted((folder / "keypoints").iterdir())[1]
+    one.rename(one.with_name(f"other_{one.name}"))
+    assert main([command, str(folder), "--out", str(tmp_path / "out"), "--cues", "keypoints", "--frames", "4", "--quiet"]) == 0
+    assert f"{folder / 'keypoints'}: no keypoints of cam_01; those of the other cameras are used" in capsys.readouterr().err
+    assert any("no keypoints of cam_01" in problem for problem in read_run(tmp_path / "out" / "run.toml")["problems"])
+
+
 @pytest.mark.parametrize("stop", [0, 7])
 def test_a_stopped_run_goes_on_and_ends_as_if_it_had_not_been(clip, tmp_path, monkeypatch, stop):
     assert track(clip, tmp_path / "whole") == 0

@@ -55,6 +55,12 @@ class KeypointSource:
     _views: tuple[Footage | None, ...] = field(repr=False)
     _change: Change | None = field(default=None, repr=False)
 
+    @property
+    def notes(self) -> list[str]:
+        """A line where some cameras have no keypoints: their files may bear other names."""
+        without = [name for name, present in zip(self.cameras, self.present, strict=True) if not present]
+        return [f"{self.path}: no keypoints of {', '.join(without)}; those of the other cameras are used"] if without else []
+
     def changed(self, change: Change) -> KeypointSource:
         """The same keypoints with every frame's people, in pixels as recorded, passed through ``change(index, people)``, which returns as
         many arrays."""
