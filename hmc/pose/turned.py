@@ -5,8 +5,8 @@ turned about is refined beside the pose as it is, and the logarithms of the rati
 person is followed (`hmc.pose.recovery`), and over frames of the whole run when the recording is over (`hmc.pose.backward`), since who was
 followed the wrong way round from the first pose on was found among others, in silhouettes that told little.
 
-Nobody turns about from one frame to the next. Where a followed heading does, one side of that moment was followed the wrong way round, and
-evidence for the body turned about on one side is evidence against it on the other.
+Nobody turns about from one frame to the next. Where a followed heading does, one side of that moment was followed the wrong way round, if
+nothing else speaks against it: evidence for the body turned about on one side is evidence against it on the other.
 """
 
 from __future__ import annotations
@@ -42,7 +42,9 @@ class TurnedSettings:
         After so many of them, also spread, nothing more is looked at of whom the mean evidence is below minus this; of fewer nothing
         is said.
     gap_s : float
-        A person who was not followed for so long may have turned, seconds: another stretch begins.
+        A person who was not followed for so long may have turned, seconds: nothing follows from the way round before.
+    about : float
+        What it takes of evidence, summed up over the frames looked at, to say that a person did turn about from one frame to the next.
     start : StartSettings
         What walking backwards costs, and what a search of limbs gains anybody.
     """
@@ -51,23 +53,24 @@ class TurnedSettings:
     first: int = 4
     sure: float = 0.3
     gap_s: float = 0.25
+    about: float = 1.0
     start: StartSettings = field(default_factory=StartSettings)
 
 
 @dataclass(frozen=True)
 class Stretch:
-    """Frames over which a person was followed without a long gap.
+    """Frames over which a person was followed without a long gap, and without turning about from one frame to the next.
 
     Parameters
     ----------
     frames : ndarray of int, shape (n,)
         Rising.
-    sides : ndarray of int, shape (n,)
-        1 where they were followed the way round of the first frame, -1 the other way round.
+    about : bool
+        Whether it begins where the stretch before turned about; False of the first one, and after a long gap.
     """
 
     frames: np.ndarray
-    sides: np.ndarray
+    about: bool
 
 
 @dataclass(frozen=True)
@@ -116,7 +119,7 @@ def turn_about(
 
 
 def stretches(frames: np.ndarray, headings: np.ndarray, fps: float, settings: TurnedSettings) -> list[Stretch]:
-    """A person's frames, with the moments at which the one who followed them turned about.
+    """A person's frames, parted where the one who followed them turned about, and at long gaps.
 
     Parameters
     ----------
@@ -127,11 +130,10 @@ def stretches(frames: np.ndarray, headings: np.ndarray, fps: float, settings: Tu
     fps : float
     settings : TurnedSettings
     """
-    found = []
-    for own in np.split(np.arange(len(frames)), np.flatnonzero(np.diff(frames) > settings.gap_s * fps) + 1):
-        about = np.cos(np.diff(headings[own], prepend=headings[own[:1]])) < 0
-        found.append(Stretch(frames[own], 1 - 2 * (np.cumsum(about) % 2)))
-    return found
+    gap = np.diff(frames) > settings.gap_s * fps
+    begins = np.flatnonzero(gap | (np.cos(np.diff(headings)) < 0)) + 1
+    about = [False, *(~gap[begins - 1]).tolist()]
+    return [Stretch(own, jumped) for own, jumped in zip(np.split(frames, begins), about, strict=True) if len(own)]
 
 
 def followed_wrongly(
@@ -153,11 +155,11 @@ def followed_wrongly(
     Returns
     -------
     dict of int to list of int
-        By person, rising; those of whom no frame is wrong are not in it. Of a stretch these are the frames of the side for which the mean
-        evidence over the frames looked at is; none of a stretch of which there are fewer than `TurnedSettings.first`.
+        By person, rising; those of whom no frame is wrong are not in it. Stretch by stretch it is as the evidence has it in sum, with
+        `TurnedSettings.about` against two stretches that are right, or wrong, on both sides of a moment of turning about. A stretch of
+        which fewer than `TurnedSettings.first` frames tell is as its neighbors have it.
     """
     parts = [(person, stretch) for person, of in followed.items() for stretch in of]
-    side_of = [dict(zip(stretch.frames.tolist(), stretch.sides.tolist(), strict=True)) for _, stretch in parts]
     chosen = [spread_frames(stretch.frames, settings.frames) for _, stretch in parts]
     stride = max(1, settings.frames // settings.first)
     found: list[list[float]] = [[] for _ in parts]
@@ -168,12 +170,27 @@ def followed_wrongly(
         by_frame = {frame: [parts[k][0] for _, k in some] for frame, some in groupby(asked, itemgetter(0))}
         for frame, told in zip(by_frame, evidence_in(by_frame), strict=True):
             for person, evidence in told.items():
-                k = part_of[frame, person]
-                found[k].append(side_of[k][frame] * evidence)
+                found[part_of[frame, person]].append(evidence)
+    sums = iter([sum(told) if len(told) >= settings.first else 0.0 for told in found])
     wrong: dict[int, list[int]] = {}
-    for (person, stretch), signed in zip(parts, found, strict=True):
-        if len(signed) >= settings.first:
-            frames = stretch.frames[stretch.sides == (1 if np.mean(signed) > 0 else -1)].tolist()
-            if frames:
-                wrong.setdefault(person, []).extend(frames)
+    for person, of in followed.items():
+        turned = _wrong_ones([next(sums) for _ in of], [stretch.about for stretch in of], settings.about)
+        frames = [frame for stretch, is_wrong in zip(of, turned, strict=True) if is_wrong for frame in stretch.frames.tolist()]
+        if frames:
+            wrong[person] = frames
     return wrong
+
+
+def _wrong_ones(evidence: Sequence[float], about: Sequence[bool], against: float) -> list[bool]:
+    """Which of the stretches were followed the wrong way round: the most evidence in sum, less `against` for each two neighbors that are
+    alike though the second begins by turning about (Viterbi, 1967)."""
+    best = [(0.0, [False]), (evidence[0], [True])] if evidence else [(0.0, [])]
+    for told, jumped in zip(evidence[1:], about[1:], strict=True):
+        best = [
+            max(
+                ((score + told * wrong - against * (jumped and way[-1] == wrong), [*way, wrong]) for score, way in best),
+                key=itemgetter(0),
+            )
+            for wrong in (False, True)
+        ]
+    return max(best, key=itemgetter(0))[1]

@@ -1,5 +1,8 @@
 """Who was followed the wrong way round, told by evidence from frames of the whole run."""
 
+from functools import partial
+from itertools import product
+
 import numpy as np
 import pytest
 
@@ -74,45 +77,75 @@ def followed_about(turns, n=90, gaps=(), seed=0):
     return frames, headings[frames]
 
 
-def test_where_a_heading_turns_about_from_one_frame_to_the_next_the_side_changes():
-    (one,) = stretches(*followed_about([30, 40]), 25.0, SETTINGS)
-    assert one.frames.tolist() == list(range(90))
-    assert np.flatnonzero(one.sides == -1).tolist() == list(range(30, 40))
+def as_lists(some):
+    return [(stretch.frames.tolist(), stretch.about) for stretch in some]
+
+
+def test_where_a_heading_turns_about_from_one_frame_to_the_next_another_stretch_begins():
+    found = stretches(*followed_about([30, 40]), 25.0, SETTINGS)
+    assert as_lists(found) == [(list(range(30)), False), (list(range(30, 40)), True), (list(range(40, 90)), True)]
 
 
 def test_who_turns_about_slowly_is_followed_the_same_way_round():
-    (one,) = stretches(np.arange(90), np.linspace(0, 3 * np.pi, 90), 25.0, SETTINGS)
-    assert (one.sides == 1).all()
+    found = stretches(np.arange(90), np.linspace(0, 3 * np.pi, 90), 25.0, SETTINGS)
+    assert as_lists(found) == [(list(range(90)), False)]
 
 
-def test_after_a_long_gap_nothing_is_known_of_the_side_before():
-    first, second = stretches(*followed_about([30], gaps=range(25, 32)), 25.0, SETTINGS)
-    assert first.frames[-1] == 24 and second.frames[0] == 32
-    assert (first.sides == 1).all() and (second.sides == 1).all()
-    (one,) = stretches(*followed_about([30], gaps=range(29, 32)), 25.0, SETTINGS)
-    assert np.flatnonzero(one.sides == -1)[0] == 29 and one.frames[29] == 32
+def test_after_a_long_gap_nothing_is_known_of_the_way_round_before():
+    found = stretches(*followed_about([30], gaps=range(25, 32)), 25.0, SETTINGS)
+    assert as_lists(found) == [(list(range(25)), False), (list(range(32, 90)), False)]
+    found = stretches(*followed_about([30], gaps=range(29, 32)), 25.0, SETTINGS)
+    assert as_lists(found) == [(list(range(29)), False), (list(range(32, 90)), True)]
+    assert stretches(np.zeros(0, int), np.zeros(0), 25.0, SETTINGS) == []
+
+
+def found_by(turns, evidence, gaps=(), scatter=0.2):
+    """The frames found of somebody who was followed about at `turns`, by ``evidence(frame)`` and chance."""
+    rng = np.random.default_rng(5)
+    parts = stretches(*followed_about(turns, gaps=gaps), 25.0, SETTINGS)
+    told = followed_wrongly({7: parts}, lambda persons: ({7: evidence(frame) + rng.normal(0, scatter)} for frame in persons), SETTINGS)
+    return set(told.get(7, ()))
 
 
 @pytest.mark.parametrize("turns", [[70], [20], [30, 50], []])
 @pytest.mark.parametrize("right", [1, -1])
 def test_the_frames_of_the_wrong_side_are_turned_whichever_it_is(turns, right):
     """Evidence is for the body turned about where it was followed wrongly and against it elsewhere; both follow from the headings alone."""
-    rng = np.random.default_rng(5)
-    frames, headings = followed_about(turns)
+    _, headings = followed_about(turns)
     wrong = set(np.flatnonzero(np.cos(headings - headings[0] - (0 if right == 1 else np.pi)) < 0).tolist())
-
-    def evidence_in(persons):
-        for frame in persons:
-            yield {7: (0.3 if frame in wrong else -0.3) + rng.normal(0, 0.2)}
-
-    found = followed_wrongly({7: stretches(frames, headings, 25.0, SETTINGS)}, evidence_in, SETTINGS)
-    assert set(found.get(7, ())) == wrong
+    assert found_by(turns, lambda frame: 0.3 if frame in wrong else -0.3) == wrong
 
 
-def test_evidence_of_both_sides_adds_up():
-    """A little for one side and a little against the other decide, where the mean over the run says nothing."""
-    sides = np.where(np.arange(90) < 45, 1, -1)
-    found = followed_wrongly(
-        {0: [Stretch(np.arange(90), sides)]}, lambda persons: ({0: 0.1 if frame < 45 else -0.15} for frame in persons), SETTINGS
-    )
-    assert found == {0: list(range(45))}
+def test_a_little_evidence_of_each_side_adds_up():
+    assert found_by([45], lambda frame: 0.02 if frame < 45 else -0.07, scatter=0) == set(range(45))
+    assert found_by([45], lambda frame: -0.02 if frame < 45 else 0.01, scatter=0) == set(range(45, 90))
+
+
+def test_much_evidence_against_it_overrules_that_nobody_turns_about_in_a_frame():
+    """A pose that came round within some frames and jumped back is right on both sides of the jump."""
+    assert found_by([60], lambda frame: -0.3) == set()
+    assert found_by([60], lambda frame: 0.3) == set(range(90))
+
+
+def test_a_stretch_too_short_to_tell_is_as_its_neighbors_have_it():
+    assert found_by([50, 53], lambda frame: -0.3) == {50, 51, 52}
+    assert found_by([50, 53], lambda frame: 0.3) == set(range(90)) - {50, 51, 52}
+
+
+def test_the_best_way_is_that_of_all_ways():
+    """Against every combination, evidence drawn at random."""
+    rng, settings = np.random.default_rng(2), TurnedSettings(sure=np.inf)
+    for _ in range(50):
+        n = int(rng.integers(1, 7))
+        parts = [Stretch(np.arange(20 * k, 20 * k + 4), bool(k and rng.random() < 0.7)) for k in range(n)]
+        told = rng.normal(0, 0.3, (n, 4))
+        scores = {
+            ways: np.dot(ways, told.sum(axis=1)) - sum(parts[k].about and ways[k] == ways[k - 1] for k in range(1, n)) * settings.about
+            for ways in product((0, 1), repeat=n)
+        }
+        evidence = [{0: float(one)} for one in told.ravel()]
+        frames = np.concatenate([part.frames for part in parts]).tolist()
+        by_frame = dict(zip(frames, evidence, strict=True))
+        found = followed_wrongly({0: parts}, partial(map, by_frame.get), settings).get(0, [])
+        best = max(scores, key=scores.get)
+        assert found == [frame for part, way in zip(parts, best, strict=True) if way for frame in part.frames]
