@@ -123,7 +123,7 @@ def read_trajectories(folder: str | Path, fps: float | None = None, person: int 
     folder : path
         With ``joints.csv``; ``pose.npz`` where the method has angles; ``run.toml``.
     fps : float, optional
-        Frames a second; by default those of ``run.toml``.
+        Frames a second; by default those of ``run.toml``, or of ``pose.npz`` where poses were saved without one.
     person : int, optional
         This one alone.
 
@@ -138,7 +138,7 @@ def read_trajectories(folder: str | Path, fps: float | None = None, person: int 
     if not (folder / "joints.csv").is_file():
         raise InputError(f"{folder}: no joints.csv; make poses first (hmc pose)")
     states = read_pose(folder / "pose.npz") if (folder / "pose.npz").is_file() else None
-    poses, rate = read_joints(folder / "joints.csv"), fps or _fps_of(folder)
+    poses, rate = read_joints(folder / "joints.csv"), fps or _fps_of(folder, states)
     try:
         found = trajectories(poses, states, rate)
     except InputError as error:
@@ -163,11 +163,11 @@ def chosen(found: list[Trajectory], person: int | None, source: str) -> list[Tra
     return [one for one in found if one.person == person]
 
 
-def _fps_of(folder: Path) -> float:
+def _fps_of(folder: Path, states: PoseStates | None) -> float:
     run: Mapping[str, Any] = read_run(folder / "run.toml") if (folder / "run.toml").is_file() else {}
-    fps = run.get("parameters", {}).get("fps")
+    fps = run.get("parameters", {}).get("fps", None if states is None else states.fps)
     if not isinstance(fps, int | float) or not fps > 0:
-        raise InputError(f"{folder}: its run.toml does not say how many frames a second; give --fps")
+        raise InputError(f"{folder}: neither run.toml nor pose.npz says how many frames a second; give --fps")
     return float(fps)
 
 

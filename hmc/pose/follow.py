@@ -137,7 +137,7 @@ class PosedPeople(FinishedPeople):
             write_joints(Path(folder) / "feet.csv", feet)
         else:
             (Path(folder) / "feet.csv").unlink(missing_ok=True)
-        write_pose(Path(folder) / "pose.npz", replace(self.states, costs=self.costs))
+        write_pose(Path(folder) / "pose.npz", replace(self.states, costs=self.costs, fps=self.fps))
 
 
 @dataclass(frozen=True)

@@ -189,9 +189,13 @@ def test_triangles_of_the_flesh_look_outwards():
 
 def test_command_line(tmp_path, capsys):
     people = moving(persons=(0, 1))
-    people.save(tmp_path / "result")
+    replace(people, fps=None).save(tmp_path / "result")
     assert main(["export", str(tmp_path / "result"), "--to", "trc"]) == 2
     assert "give --fps" in capsys.readouterr().err
+    people.save(tmp_path / "saved")  # without run.toml
+    assert main(["export", str(tmp_path / "saved"), "--to", "csv"]) == 0
+    times = np.loadtxt(tmp_path / "saved" / "motion.csv", delimiter=",", skiprows=1, usecols=1)
+    assert np.isclose(times[1] - times[0], 1 / people.fps, atol=2e-6)
     assert main(["export", str(tmp_path / "result"), "--to", "trc", "--fps", "50", "--person", "7"]) == 2
     assert "there are 0, 1" in capsys.readouterr().err
     (tmp_path / "result" / "run.toml").write_text("[parameters]\nfps = 50.0\n")
