@@ -46,7 +46,7 @@ from hmc.voxels.run_options import RunOptions
 __all__ = ["FollowOptions", "PosedPeople", "follow", "for_method", "known_landmarks", "only_person", "persons_of", "unfitted_notes"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class PosedPeople(FinishedPeople):
     """The poses of all persons.
 

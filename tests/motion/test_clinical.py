@@ -255,6 +255,9 @@ def test_plots_and_animations_of_a_notebook():
 def test_a_small_table_is_shown():
     people = people_with_views()
     people = replace(people, costs=np.full(len(people.costs), 8.437e-5))
+    lines = repr(people).splitlines()
+    assert lines[0] == "PosedPeople:" and len(lines) == 3
+    assert lines[1].startswith("  person 0, frames 5–16, with a pose 12, stature (m) 1.71,")
     heads, *rows = [[cell.text for cell in row] for row in ElementTree.fromstring(people._repr_html_())]
     table = pd.DataFrame(rows, columns=heads)
     assert table["person"].tolist() == ["0", "1"] and table["with a pose"].tolist() == ["12", "12"]
