@@ -232,6 +232,13 @@ def test_plots_and_animations_of_a_notebook():
     assert np.allclose(drawn[0], own["l_knee_flexion_deg"]) and np.allclose(drawn[1], own["r_knee_flexion_deg"])
     shown = cv2.imdecode(np.frombuffer(figure._repr_png_(), np.uint8), cv2.IMREAD_COLOR)  # a notebook without pyplot asks for this
     assert shown.std() > 5
+    doubted = replace(people, poses=replace(people.poses, trust=np.where(people.frames[:, None] < 8, 0.5, np.ones(15))))
+    figure = doubted.plot_angles(["knee_flexion"])
+    assert len({line.get_linewidth() for line in figure.axes[0].get_lines() if len(line.get_xdata()) > 2}) == 1
+    page = figure.bbox.width
+    figure.draw_without_rendering()
+    box = figure._supxlabel.get_window_extent()
+    assert box.x0 >= 0 and box.x1 <= page  # the line below one narrow panel is not cut off
     with pytest.raises(InputError, match="no angle 'nose'"):
         people.plot_angles(["nose"])
 
