@@ -35,10 +35,12 @@ class Trajectory:
         Landmarks, world, metres; NaN in gaps.
     views : ndarray, shape (n, 15), optional
         Cameras that show each landmark clear; NaN where not known.
-    states : ndarray, shape (n, 33), optional
+    states : ndarray, shape (n, 37), optional
         Metres and radians, in the order of `hmc.body.joints.DOF_NAMES`; NaN in gaps.
     body : BodyModel, optional
         Whose states they are.
+    trust : ndarray, shape (n, 15), optional
+        How likely each landmark is within 60 mm of the truth; NaN where not known.
     """
 
     person: int
@@ -48,6 +50,7 @@ class Trajectory:
     views: np.ndarray | None = None
     states: np.ndarray | None = None
     body: BodyModel | None = None
+    trust: np.ndarray | None = None
 
     @property
     def times_s(self) -> np.ndarray:
@@ -103,8 +106,8 @@ def trajectories(poses: PoseTable, states: PoseStates | None, fps: float) -> lis
         own = own.where(fitted)
         frames, rows = np.arange(first, last + 1), own.frames - first
         positions = _spread(own.positions, rows, len(frames))
-        views = None if own.views is None else _spread(own.views, rows, len(frames))
-        one = Trajectory(person, fps, frames, positions, views)
+        views, trust = (None if values is None else _spread(values, rows, len(frames)) for values in (own.views, own.trust))
+        one = Trajectory(person, fps, frames, positions, views, trust=trust)
         if states is not None and person in states.bodies:
             of_person = np.flatnonzero(states.persons == person)
             kept = of_person[np.isin(states.frames[of_person], own.frames)]

@@ -103,7 +103,8 @@ class FinishedPeople:
         Returns
         -------
         pandas.DataFrame
-            ``frame``, ``time_s``, ``person`` and the names of `hmc.motion.clinical.CLINICAL_ANGLES`; NaN where an angle is not shown.
+            ``frame``, ``time_s``, ``person`` and the names of `hmc.motion.clinical.CLINICAL_ANGLES`; NaN where an angle is not shown. Where
+            trust is known, a column an angle more (``..._trust``): the least of the landmarks that it rests on.
 
         Raises
         ------

@@ -97,7 +97,7 @@ class PosedPeople(FinishedPeople):
 
     @property
     def angles(self) -> np.ndarray:
-        """Angles of the joints and of the root, radians, shape (n, 30), in the order of `angle_names`."""
+        """Angles of the joints and of the root, radians, shape (n, 34), in the order of `angle_names`."""
         return self.states.states[:, 3:]
 
     @property

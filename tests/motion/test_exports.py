@@ -209,6 +209,17 @@ def test_command_line(tmp_path, capsys):
     assert main(["export", str(tmp_path / "none"), "--to", "csv"]) == 2
 
 
+def test_tables_have_the_trust_of_landmarks_where_it_is_known(tmp_path):
+    people = moving()
+    trust = np.linspace(0.5, 1.0, people.positions[..., 0].size).reshape(people.positions.shape[:2]).round(3)
+    hmc.export(replace(people, poses=replace(people.poses, trust=trust)), tmp_path / "walk.csv")
+    hmc.export(people, tmp_path / "without.csv")
+    heads = [(tmp_path / name).read_text().split("\n", 1)[0].split(",") for name in ("walk.csv", "without.csv")]
+    assert [name for name in heads[0] if name not in heads[1]] == [f"{name}_trust" for name in LANDMARKS]
+    first = (tmp_path / "walk.csv").read_text().splitlines()[1].split(",")
+    assert [float(first[heads[0].index(f"{name}_trust")]) for name in LANDMARKS] == trust[0].tolist()
+
+
 def test_wrong_input(tmp_path):
     with pytest.raises(InputError, match="no format of that suffix"):
         hmc.export(moving(), tmp_path / "walk.fbx")
