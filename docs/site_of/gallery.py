@@ -14,13 +14,20 @@ from site_of.shell import Page
 
 __all__ = ["gallery_page", "notebook_page", "picture_of", "title_of"]
 
+#: What is said of a notebook in the gallery is made of whole sentences, until it is at least so long.
+LEAST_SAID = 70
 PNG = "image/png"
 
 
 def title_of(notebook: nbformat.NotebookNode) -> tuple[str, str]:
-    """A notebook's heading, and the first sentence below it."""
+    """A notebook's heading, and the first sentences below it: so many that they say something."""
     heading, _, rest = notebook.cells[0].source.partition("\n")
-    return heading.lstrip("# "), re.split(r"(?<=[.?])\s", re.sub(r"[*`]", "", rest.strip().replace("\n", " ")))[0]
+    said, plain = "", re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", re.sub(r"[*`]", "", rest.strip().replace("\n", " ")))
+    for sentence in re.split(r"(?<=[.?])\s", plain):
+        if len(said) >= LEAST_SAID:
+            break
+        said = f"{said} {sentence}".strip()
+    return heading.lstrip("# "), said
 
 
 def notebook_page(name: str, notebook: nbformat.NotebookNode, place_of: PlaceOf) -> tuple[Page, dict[str, bytes]]:
@@ -54,7 +61,7 @@ def picture_of(pictures: dict[str, bytes]) -> str:
 
 
 def gallery_page(cards: list[tuple[str, str, str, str]]) -> Page:
-    """One picture, heading and sentence of each notebook: cards of (name, title, sentence, picture's place)."""
+    """One picture, heading and what is said of each notebook: cards of (name, title, what is said, picture's place)."""
     parts = ["<h1>Notebooks</h1>", '<div class="gallery">']
     for name, title, sentence, picture in cards:
         image = f'<img alt="" src="{picture.removeprefix("gallery/")}" loading="lazy">' if picture else ""

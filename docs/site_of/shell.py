@@ -108,7 +108,10 @@ h2 { margin-top: 2.2rem; border-bottom: 1px solid var(--line); padding-bottom: .
 { visibility: hidden; margin-left: .4rem; font-weight: 400; } :hover > a.here { visibility: visible; }
 pre { background: var(--back); border-radius: 4px; padding: .7rem .9rem; overflow-x: auto; font-size: .84rem; line-height: 1.45; }
 pre.output { background: none; border-left: 3px solid #d4dae4; border-radius: 0; } code { font-size: .9em; }
-.table { overflow-x: auto; } table { border-collapse: collapse; font-size: .88rem; } th, td { border: 1px solid var(--line);
+.table { overflow-x: auto; background: linear-gradient(90deg, #fff 40%, #fff0) left / 2.5rem 100% local no-repeat,
+  linear-gradient(270deg, #fff 40%, #fff0) right / 2.5rem 100% local no-repeat, linear-gradient(90deg, #0003, #0000) left / .8rem 100%
+  no-repeat, linear-gradient(270deg, #0003, #0000) right / .8rem 100% no-repeat; }
+table { border-collapse: collapse; font-size: .88rem; } th, td { border: 1px solid var(--line);
   padding: .3rem .55rem; text-align: left; vertical-align: top; } th { background: var(--back); }
 .gallery { display: grid; grid-template-columns: repeat(auto-fill, minmax(17rem, 1fr)); gap: 1.5rem; }
 .gallery a { color: inherit; } .gallery .picture { height: 180px; overflow: hidden; border: 1px solid var(--line); border-radius: 4px;

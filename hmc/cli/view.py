@@ -68,5 +68,6 @@ def run(args: argparse.Namespace) -> int:
         (problems.append, lambda pictures, total: progress(pictures, total, "view", args.quiet)),
         not args.no_keypoints,
     )
+    print(f"wrote {args.out}")
     print_problems(problems)
     return 0

@@ -150,6 +150,8 @@ class PoseStates:
         Person number to that person's dimensions: a mapping from name (`height_m`, ...) to a number or an array of numbers.
     costs : ndarray, shape (n,), optional
         What the method minimised, of each row; NaN where there is none.
+    fps : float, optional
+        Frames a second of the recording.
 
     Raises
     ------
@@ -163,6 +165,7 @@ class PoseStates:
     dof_names: tuple[str, ...]
     bodies: Mapping[int, Mapping[str, float | np.ndarray]] = field(default_factory=dict)
     costs: np.ndarray | None = None
+    fps: float | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "dof_names", tuple(str(name) for name in self.dof_names))
@@ -327,6 +330,8 @@ def write_pose(path: str | Path, poses: PoseStates) -> None:
     arrays = {"frames": poses.frames, "persons": poses.persons, "states": poses.states, "dof_names": np.array(poses.dof_names, dtype=str)}
     if poses.costs is not None:
         arrays["costs"] = poses.costs
+    if poses.fps is not None:
+        arrays["fps"] = np.asarray(poses.fps, float)
     for person, body in poses.bodies.items():
         for name, value in body.items():
             arrays[f"body/{int(person)}/{name}"] = np.asarray(value, float)
@@ -354,7 +359,10 @@ def read_pose(path: str | Path) -> PoseStates:
                 bodies.setdefault(int(person), {})[name] = values
         names = tuple(str(name) for name in data["dof_names"])
         _refuse_far(data["frames"])
-        return PoseStates(data["frames"], data["persons"], data["states"], names, bodies, data.get("costs"))
+        fps = float(data["fps"]) if "fps" in data else None
+        if fps is not None and not 0 < fps < np.inf:
+            raise ValueError(f"fps is {fps}")
+        return PoseStates(data["frames"], data["persons"], data["states"], names, bodies, data.get("costs"), fps)
     except (ValueError, KeyError, TypeError, OverflowError) as error:
         raise InputError(f"{path}: not a pose file of this program ({error})") from error
 

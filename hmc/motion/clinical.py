@@ -39,13 +39,15 @@ CLINICAL_ANGLES: tuple[str, ...] = (
     )),
 )  # fmt: skip
 
-_HIPS = ("l_hip", "r_hip")
-#: The landmarks that an angle rests on; SIDE is the side's letter.
+#: What ends the name of a column of trust, in place of that of an angle.
+TRUST_SUFFIX = "_trust"
+_HIPS, _CHEST = ("l_hip", "r_hip"), ("pelvis", "neck", "l_shoulder", "r_shoulder")
+#: The landmarks that an angle rests on, as docs/angles.md has them; SIDE is the side's letter.
 _RESTS_ON: dict[str, tuple[str, ...]] = {
-    "pelvis": _HIPS, "trunk": (*_HIPS, "neck"), "trunk_rotation": (*_HIPS, "neck", "l_shoulder", "r_shoulder"),
+    "pelvis": _HIPS, "trunk": (*_HIPS, "neck"), "trunk_rotation": (*_HIPS, *_CHEST),
     "hip": (*_HIPS, "SIDE_knee"), "hip_internal_rotation": (*_HIPS, "SIDE_knee", "SIDE_ankle"),
     "knee": ("SIDE_hip", "SIDE_knee", "SIDE_ankle"), "ankle": ("SIDE_knee", "SIDE_ankle"), "foot": ("SIDE_ankle",),
-    "shoulder": ("neck", "SIDE_shoulder", "SIDE_elbow"), "shoulder_internal_rotation": ("SIDE_shoulder", "SIDE_elbow", "SIDE_wrist"),
+    "shoulder": (*_CHEST, "SIDE_elbow"), "shoulder_internal_rotation": (*_CHEST, "SIDE_elbow", "SIDE_wrist"),
     "elbow": ("SIDE_shoulder", "SIDE_elbow", "SIDE_wrist"),
 }  # fmt: skip
 
@@ -142,15 +144,23 @@ def angle_table(found: Sequence[Trajectory]) -> dict[str, np.ndarray]:
     -------
     dict
         ``frame``, ``time_s``, ``person`` and all of `CLINICAL_ANGLES`, each to an ndarray of shape (rows,): a row a person and frame,
-        person after person.
+        person after person. Where trust is known of somebody, a column an angle more, ``..._trust`` for ``..._deg``: the least trust of the
+        landmarks that the angle rests on, NaN where there is no angle.
     """
     angles = [clinical_angles(one.positions) | state_angles(one) for one in found]
-    return {
+    table = {
         "frame": np.concatenate([one.frames for one in found]),
         "time_s": np.concatenate([one.times_s for one in found]),
         "person": np.concatenate([np.full(len(one.frames), one.person) for one in found]),
         **{name: np.concatenate([of_one[name] for of_one in angles]) for name in CLINICAL_ANGLES},
     }
+    if all(one.trust is None for one in found):
+        return table
+    trust = np.concatenate([np.full(one.positions.shape[:2], np.nan) if one.trust is None else one.trust for one in found])
+    for name in CLINICAL_ANGLES:
+        least = trust[:, _rests_on(name)].min(axis=1)
+        table[name.removesuffix("_deg") + TRUST_SUFFIX] = np.where(np.isfinite(table[name]), least, np.nan)
+    return table
 
 
 def doubtful_angles(table: Mapping[str, np.ndarray], poses: PoseTable) -> dict[str, np.ndarray]:
@@ -174,10 +184,15 @@ def doubtful_angles(table: Mapping[str, np.ndarray], poses: PoseTable) -> dict[s
     known = np.zeros((len(places), len(LANDMARKS)), bool) if doubtful is None else np.where(places[:, None] >= 0, doubtful[places], False)
     found: dict[str, np.ndarray] = {}
     for column in (name for name in CLINICAL_ANGLES if name in table):
-        side, name = (column[0], column[2:]) if column[1] == "_" else ("", column)
-        names = _RESTS_ON.get(name.removesuffix("_deg")) or _RESTS_ON[name.partition("_")[0]]
-        found[column] = np.asarray(known[:, [landmark_index(one.replace("SIDE", side)) for one in names]].any(axis=1))
+        found[column] = np.asarray(known[:, _rests_on(column)].any(axis=1))
     return found
+
+
+def _rests_on(column: str) -> list[int]:
+    """Places of the landmarks that an angle rests on."""
+    side, name = (column[0], column[2:]) if column[1] == "_" else ("", column)
+    names = _RESTS_ON.get(name.removesuffix("_deg")) or _RESTS_ON[name.partition("_")[0]]
+    return [landmark_index(one.replace("SIDE", side)) for one in names]
 
 
 def _pelvis(at: dict[str, np.ndarray]) -> np.ndarray:

@@ -153,7 +153,7 @@ def _parquet(path: Path, found: Sequence[Trajectory]) -> Exported:
 
 
 def _columns(found: Sequence[Trajectory]) -> dict[str, np.ndarray]:
-    """Columns of all persons: landmarks, views where they are known, the body's degrees of freedom where there are any."""
+    """Columns of all persons: landmarks, views and trust where they are known, the body's degrees of freedom where there are any."""
     columns = {
         "frame": np.concatenate([one.frames for one in found]),
         "time_s": np.concatenate([one.times_s for one in found]),
@@ -169,9 +169,12 @@ def _columns(found: Sequence[Trajectory]) -> dict[str, np.ndarray]:
             [np.full((len(one.frames), *shape), np.nan) if own is None else own for one, own in zip(found, feet, strict=True)]
         )
     columns |= {f"{name}_{axis}_m": positions[:, k, a] for k, name in enumerate(every) for a, axis in enumerate("xyz")}
-    if any(one.views is not None for one in found):
-        views = np.concatenate([np.full(one.positions.shape[:2], np.nan) if one.views is None else one.views for one in found])
-        columns |= {f"{name}_views": views[:, k] for k, name in enumerate(LANDMARKS)}
+    for what, of_each in (("views", [one.views for one in found]), ("trust", [one.trust for one in found])):
+        if any(values is not None for values in of_each):
+            whole = [
+                np.full(one.positions.shape[:2], np.nan) if values is None else values for one, values in zip(found, of_each, strict=True)
+            ]
+            columns |= {f"{name}_{what}": values for name, values in zip(LANDMARKS, np.concatenate(whole).T, strict=True)}
     if any(one.states is not None for one in found):
         states = np.concatenate([np.full((len(one.frames), len(DOF_NAMES)), np.nan) if one.states is None else one.states for one in found])
         columns |= {f"{name}_{'m' if k < 3 else 'rad'}": states[:, k] for k, name in enumerate(DOF_NAMES)}

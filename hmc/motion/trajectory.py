@@ -35,10 +35,12 @@ class Trajectory:
         Landmarks, world, metres; NaN in gaps.
     views : ndarray, shape (n, 15), optional
         Cameras that show each landmark clear; NaN where not known.
-    states : ndarray, shape (n, 33), optional
+    states : ndarray, shape (n, 37), optional
         Metres and radians, in the order of `hmc.body.joints.DOF_NAMES`; NaN in gaps.
     body : BodyModel, optional
         Whose states they are.
+    trust : ndarray, shape (n, 15), optional
+        How likely each landmark is within 60 mm of the truth; NaN where not known.
     """
 
     person: int
@@ -48,6 +50,7 @@ class Trajectory:
     views: np.ndarray | None = None
     states: np.ndarray | None = None
     body: BodyModel | None = None
+    trust: np.ndarray | None = None
 
     @property
     def times_s(self) -> np.ndarray:
@@ -103,8 +106,8 @@ def trajectories(poses: PoseTable, states: PoseStates | None, fps: float) -> lis
         own = own.where(fitted)
         frames, rows = np.arange(first, last + 1), own.frames - first
         positions = _spread(own.positions, rows, len(frames))
-        views = None if own.views is None else _spread(own.views, rows, len(frames))
-        one = Trajectory(person, fps, frames, positions, views)
+        views, trust = (None if values is None else _spread(values, rows, len(frames)) for values in (own.views, own.trust))
+        one = Trajectory(person, fps, frames, positions, views, trust=trust)
         if states is not None and person in states.bodies:
             of_person = np.flatnonzero(states.persons == person)
             kept = of_person[np.isin(states.frames[of_person], own.frames)]
@@ -123,7 +126,7 @@ def read_trajectories(folder: str | Path, fps: float | None = None, person: int 
     folder : path
         With ``joints.csv``; ``pose.npz`` where the method has angles; ``run.toml``.
     fps : float, optional
-        Frames a second; by default those of ``run.toml``.
+        Frames a second; by default those of ``run.toml``, or of ``pose.npz`` where poses were saved without one.
     person : int, optional
         This one alone.
 
@@ -138,7 +141,7 @@ def read_trajectories(folder: str | Path, fps: float | None = None, person: int 
     if not (folder / "joints.csv").is_file():
         raise InputError(f"{folder}: no joints.csv; make poses first (hmc pose)")
     states = read_pose(folder / "pose.npz") if (folder / "pose.npz").is_file() else None
-    poses, rate = read_joints(folder / "joints.csv"), fps or _fps_of(folder)
+    poses, rate = read_joints(folder / "joints.csv"), fps or _fps_of(folder, states)
     try:
         found = trajectories(poses, states, rate)
     except InputError as error:
@@ -163,11 +166,11 @@ def chosen(found: list[Trajectory], person: int | None, source: str) -> list[Tra
     return [one for one in found if one.person == person]
 
 
-def _fps_of(folder: Path) -> float:
+def _fps_of(folder: Path, states: PoseStates | None) -> float:
     run: Mapping[str, Any] = read_run(folder / "run.toml") if (folder / "run.toml").is_file() else {}
-    fps = run.get("parameters", {}).get("fps")
+    fps = run.get("parameters", {}).get("fps", None if states is None else states.fps)
     if not isinstance(fps, int | float) or not fps > 0:
-        raise InputError(f"{folder}: its run.toml does not say how many frames a second; give --fps")
+        raise InputError(f"{folder}: neither run.toml nor pose.npz says how many frames a second; give --fps")
     return float(fps)
 
 

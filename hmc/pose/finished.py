@@ -103,7 +103,8 @@ class FinishedPeople:
         Returns
         -------
         pandas.DataFrame
-            ``frame``, ``time_s``, ``person`` and the names of `hmc.motion.clinical.CLINICAL_ANGLES`; NaN where an angle is not shown.
+            ``frame``, ``time_s``, ``person`` and the names of `hmc.motion.clinical.CLINICAL_ANGLES`; NaN where an angle is not shown. Where
+            trust is known, a column an angle more (``..._trust``): the least of the landmarks that it rests on.
 
         Raises
         ------
@@ -154,8 +155,20 @@ class FinishedPeople:
 
         return animate_sticks(self.poses.frames, self.poses.persons, self.poses.positions, self._known_fps(fps), step)
 
+    def __repr__(self) -> str:
+        """A line a person: what a terminal shows."""
+        heads, *rows = self._summary()
+        lines = [", ".join(f"{head} {cell}" for head, cell in zip(heads, row, strict=True)) for row in rows]
+        return "\n  ".join([f"{type(self).__name__}:", *lines])
+
     def _repr_html_(self) -> str:
         """A small table for notebooks: a row a person."""
+        heads, *rows = self._summary()
+        lines = [_html_row("th", heads), *(_html_row("td", row) for row in rows)]
+        return f"<table>{''.join(lines)}</table>"
+
+    def _summary(self) -> list[list[str]]:
+        """Heads, then a row a person."""
         heads = ["person", "frames", "with a pose", "stature (m)", "mean cost", "mean views", "mean trust"]
         rows = []
         for person in np.unique(self.poses.persons).tolist():
@@ -168,8 +181,7 @@ class FinishedPeople:
                 _mean(self.states.bodies.get(person, {}).get("height")), _mean(self.costs[fitted], "3g"),
                 *(_mean(values) for values in of_landmarks),
             ])  # fmt: skip
-        lines = [_html_row("th", heads), *(_html_row("td", row) for row in rows)]
-        return f"<table>{''.join(lines)}</table>"
+        return [heads, *rows]
 
     def _angle_table(self, fps: float | None) -> dict[str, np.ndarray]:
         from hmc.motion.clinical import angle_table

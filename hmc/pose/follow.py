@@ -46,7 +46,7 @@ from hmc.voxels.run_options import RunOptions
 __all__ = ["FollowOptions", "PosedPeople", "follow", "for_method", "known_landmarks", "only_person", "persons_of", "unfitted_notes"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class PosedPeople(FinishedPeople):
     """The poses of all persons.
 
@@ -97,7 +97,7 @@ class PosedPeople(FinishedPeople):
 
     @property
     def angles(self) -> np.ndarray:
-        """Angles of the joints and of the root, radians, shape (n, 30), in the order of `angle_names`."""
+        """Angles of the joints and of the root, radians, shape (n, 34), in the order of `angle_names`."""
         return self.states.states[:, 3:]
 
     @property
@@ -137,7 +137,7 @@ class PosedPeople(FinishedPeople):
             write_joints(Path(folder) / "feet.csv", feet)
         else:
             (Path(folder) / "feet.csv").unlink(missing_ok=True)
-        write_pose(Path(folder) / "pose.npz", replace(self.states, costs=self.costs))
+        write_pose(Path(folder) / "pose.npz", replace(self.states, costs=self.costs, fps=self.fps))
 
 
 @dataclass(frozen=True)

@@ -167,7 +167,7 @@ def _rig(rows: Sequence[_Row]) -> Iterator[str]:
             image = cv2.resize(image, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
             data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, RIG_QUALITY])[1].tobytes()
             yield f"<h2>The rig</h2>\n{_image(data, 'jpeg', 'the room from above, and what each camera sees')}"
-            yield f'<p class="small">As `hmc check` has it for {escape(row.trial.name)}.</p>'
+            yield f'<p class="small">As <code>hmc check</code> has it for {escape(row.trial.name)}.</p>'
             return
 
 

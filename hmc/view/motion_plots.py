@@ -21,6 +21,8 @@ __all__ = ["animate_sticks", "draw_angles"]
 MOST_FRAMES = 300
 _STYLES = ("-", "--", ":", "-.")
 _COLUMNS = 4
+#: How wide a curve is, points: the same whether or not a stretch of it is doubtful.
+LINE = 1.4
 #: How opaque a doubtful stretch of a curve is.
 PALE = 0.35
 
@@ -71,11 +73,11 @@ def draw_angles(
                 label = " ".join(part for part in (side, f"person {person}" if len(persons) > 1 else "") if part)
                 style = _STYLES[k % len(_STYLES)]
                 pale = np.zeros(own.sum(), bool) if doubtful is None else doubtful[column][own]
-                ax.plot(times, values, style, color=color, linewidth=1.2, label=label, alpha=PALE if pale.any() else 1.0)
+                ax.plot(times, values, style, color=color, linewidth=LINE, label=label, alpha=PALE if pale.any() else 1.0)
                 if pale.any():
                     sure.append((*_broken(table["time_s"][own], np.where(pale, np.nan, table[column][own])), style, color))
         for times, values, style, color in sure:  # over all pale ones
-            ax.plot(times, values, style, color=color, linewidth=1.6)
+            ax.plot(times, values, style, color=color, linewidth=LINE)
         some_pale |= bool(sure)
         ax.set_title(title, fontsize=9)
         ax.tick_params(labelsize=8)
@@ -89,7 +91,8 @@ def draw_angles(
         for handle in widest.legend(fontsize=7).get_lines():
             handle.set_alpha(1.0)
     if some_pale:
-        figure.supxlabel("pale: rests on a landmark that is doubtful (its trust in joints.csv)", fontsize=8)
+        said = "pale: rests on a landmark that is doubtful", "(its trust in joints.csv)"
+        figure.supxlabel(("\n" if across == 1 else " ").join(said), fontsize=8)
     return figure
 
 

@@ -88,7 +88,11 @@ def test_notebooks_and_their_gallery(part):
     assert pictures == {"gallery/01_it-1.png": b"x", "gallery/01_it-2.png": b"a picture"}
     assert gallery.picture_of(pictures) == "gallery/01_it-2.png"
     text = gallery.gallery_page([("01_it", *gallery.title_of(notebook), "gallery/01_it-2.png")]).body
-    assert 'href="01_it.html"' in text and "What it is" in text and "It shows something.</p>" in text and 'src="01_it-2.png"' in text
+    assert 'href="01_it.html"' in text and "What it is" in text and 'src="01_it-2.png"' in text
+    assert "It shows something. And more.</p>" in text
+    long = "A sentence that is as long as what is said of a notebook should be at the least."
+    notebook.cells[0].source = f"# What it is\nShort. {long} Another one."
+    assert gallery.title_of(notebook) == ("What it is", f"Short. {long}")
 
 
 def test_functions_from_their_docstrings(part):

@@ -232,6 +232,13 @@ def test_plots_and_animations_of_a_notebook():
     assert np.allclose(drawn[0], own["l_knee_flexion_deg"]) and np.allclose(drawn[1], own["r_knee_flexion_deg"])
     shown = cv2.imdecode(np.frombuffer(figure._repr_png_(), np.uint8), cv2.IMREAD_COLOR)  # a notebook without pyplot asks for this
     assert shown.std() > 5
+    doubted = replace(people, poses=replace(people.poses, trust=np.where(people.frames[:, None] < 8, 0.5, np.ones(15))))
+    figure = doubted.plot_angles(["knee_flexion"])
+    assert len({line.get_linewidth() for line in figure.axes[0].get_lines() if len(line.get_xdata()) > 2}) == 1
+    page = figure.bbox.width
+    figure.draw_without_rendering()
+    box = figure._supxlabel.get_window_extent()
+    assert box.x0 >= 0 and box.x1 <= page  # the line below one narrow panel is not cut off
     with pytest.raises(InputError, match="no angle 'nose'"):
         people.plot_angles(["nose"])
 
@@ -255,6 +262,9 @@ def test_plots_and_animations_of_a_notebook():
 def test_a_small_table_is_shown():
     people = people_with_views()
     people = replace(people, costs=np.full(len(people.costs), 8.437e-5))
+    lines = repr(people).splitlines()
+    assert lines[0] == "PosedPeople:" and len(lines) == 3
+    assert lines[1].startswith("  person 0, frames 5–16, with a pose 12, stature (m) 1.71,")
     heads, *rows = [[cell.text for cell in row] for row in ElementTree.fromstring(people._repr_html_())]
     table = pd.DataFrame(rows, columns=heads)
     assert table["person"].tolist() == ["0", "1"] and table["with a pose"].tolist() == ["12", "12"]
@@ -271,3 +281,31 @@ def test_angles_that_rest_on_doubtful_landmarks_are_told():
     table = {"frame": np.array([2, 3, 4]), "person": np.zeros(3, int)} | {name: np.zeros(3) for name in CLINICAL_ANGLES}
     told = {name: rows.tolist() for name, rows in doubtful_angles(table, poses).items() if rows.any()}
     assert told == {"l_elbow_flexion_deg": [False, False, True], "l_shoulder_internal_rotation_deg": [False, False, True]}
+    # the other shoulder is in the chest's frame: all of both arms that is told in it, and the trunk's rotation
+    trust[1] = np.where(np.arange(15) == landmark_index("r_shoulder"), 0.5, 1.0)
+    told = [name for name, rows in doubtful_angles(table, poses).items() if rows.any()]
+    arms = [name for name in CLINICAL_ANGLES if "shoulder" in name]
+    assert sorted(told) == sorted(["trunk_rotation_deg", "r_elbow_flexion_deg", *arms])
+
+
+def test_each_angle_has_the_least_trust_of_what_it_rests_on(tmp_path):
+    people = people_with_views()
+    assert not [name for name in people.clinical_angles() if name.endswith("_trust")]
+    trust = np.full(people.positions.shape[:2], 0.95)
+    trust[3, landmark_index("l_wrist")] = 0.4
+    people = replace(people, poses=replace(people.poses, trust=trust))
+    frame = people.clinical_angles()
+    columns = [name.replace("_deg", "_trust") for name in CLINICAL_ANGLES]
+    assert list(frame) == ["frame", "time_s", "person", *CLINICAL_ANGLES, *columns]
+    low = {name for name in columns if (frame[name] == 0.4).any()}
+    assert "l_elbow_flexion_trust" in low <= {"l_elbow_flexion_trust", "l_shoulder_internal_rotation_trust"}
+    row = frame.index[(frame["person"] == people.persons[3]) & (frame["frame"] == people.frames[3])]
+    assert (frame.index[frame["l_elbow_flexion_trust"] == 0.4] == row).all()
+    for angle, column in zip(CLINICAL_ANGLES, columns, strict=True):  # empty together
+        assert (frame[angle].isna() == frame[column].isna()).all(), angle
+    smooth = people.smoothed().clinical_angles()[columns]  # its angles may be shown in other frames
+    assert ((smooth == frame[columns]) | smooth.isna() | frame[columns].isna()).all(axis=None)
+    write_result(people, tmp_path / "result")
+    assert main(["angles", str(tmp_path / "result"), "--fps", "50"]) == 0
+    written = pd.read_csv(tmp_path / "result" / "clinical_angles.csv")
+    assert written["l_elbow_flexion_trust"].tolist() == frame["l_elbow_flexion_trust"].tolist()

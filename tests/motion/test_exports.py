@@ -189,9 +189,13 @@ def test_triangles_of_the_flesh_look_outwards():
 
 def test_command_line(tmp_path, capsys):
     people = moving(persons=(0, 1))
-    people.save(tmp_path / "result")
+    replace(people, fps=None).save(tmp_path / "result")
     assert main(["export", str(tmp_path / "result"), "--to", "trc"]) == 2
     assert "give --fps" in capsys.readouterr().err
+    people.save(tmp_path / "saved")  # without run.toml
+    assert main(["export", str(tmp_path / "saved"), "--to", "csv"]) == 0
+    times = np.loadtxt(tmp_path / "saved" / "motion.csv", delimiter=",", skiprows=1, usecols=1)
+    assert np.isclose(times[1] - times[0], 1 / people.fps, atol=2e-6)
     assert main(["export", str(tmp_path / "result"), "--to", "trc", "--fps", "50", "--person", "7"]) == 2
     assert "there are 0, 1" in capsys.readouterr().err
     (tmp_path / "result" / "run.toml").write_text("[parameters]\nfps = 50.0\n")
@@ -203,6 +207,17 @@ def test_command_line(tmp_path, capsys):
     assert "needs the body's angles" in capsys.readouterr().err
     assert main(["export", str(tmp_path / "result"), "--to", "csv"]) == 0
     assert main(["export", str(tmp_path / "none"), "--to", "csv"]) == 2
+
+
+def test_tables_have_the_trust_of_landmarks_where_it_is_known(tmp_path):
+    people = moving()
+    trust = np.linspace(0.5, 1.0, people.positions[..., 0].size).reshape(people.positions.shape[:2]).round(3)
+    hmc.export(replace(people, poses=replace(people.poses, trust=trust)), tmp_path / "walk.csv")
+    hmc.export(people, tmp_path / "without.csv")
+    heads = [(tmp_path / name).read_text().split("\n", 1)[0].split(",") for name in ("walk.csv", "without.csv")]
+    assert [name for name in heads[0] if name not in heads[1]] == [f"{name}_trust" for name in LANDMARKS]
+    first = (tmp_path / "walk.csv").read_text().splitlines()[1].split(",")
+    assert [float(first[heads[0].index(f"{name}_trust")]) for name in LANDMARKS] == trust[0].tolist()
 
 
 def test_wrong_input(tmp_path):

@@ -304,6 +304,7 @@ def test_a_person_who_could_not_be_fitted_is_an_ellipsoid(result, tmp_path):
 def test_view_writes_pictures_and_videos(recording, result, tmp_path, capsys):
     arguments = ["view", str(result), str(recording), "--quiet", "--voxel", "0.06"]
     assert main([*arguments, "--out", str(tmp_path / "new" / "one.png")]) == 0
+    assert capsys.readouterr().out == f"wrote {tmp_path / 'new' / 'one.png'}\n"
     one = cv2.imread(str(tmp_path / "new" / "one.png"))
     assert main([*arguments, "--out", str(tmp_path / "two.png"), "--frame", "0", "1"]) == 0
     two = cv2.imread(str(tmp_path / "two.png"))
