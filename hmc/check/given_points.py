@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,6 +23,8 @@ __all__ = ["GroundPoints", "board_points", "read_points"]
 WORST = 0.05
 #: A board's corners, seen by two cameras, must fall together to so many pixels of an image 640 wide.
 BOARD_PX = 3.0
+#: No pixel, and no metre, is as large.
+MOST = 1e6
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,12 +81,9 @@ def read_points(path: Path, rig: Rig) -> GroundPoints:
     for line, row in enumerate(rows, start=2):
         if row["camera"] not in rig.names:
             raise InputError(f"{path}, line {line}: no camera named {row['camera']!r}; the rig has {', '.join(rig.names)}")
-        try:
-            uv[names.index(row["point"]), rig.names.index(row["camera"])] = float(row["u"]), float(row["v"])
-            if all(row.get(axis) for axis in "xyz"):
-                places[names.index(row["point"])] = [float(row[axis]) for axis in "xyz"]
-        except (TypeError, ValueError):
-            raise InputError(f"{path}, line {line}: u, v, x, y and z must be numbers") from None
+        uv[names.index(row["point"]), rig.names.index(row["camera"])] = _numbers(path, line, row, "uv")
+        if all(row.get(axis) for axis in "xyz"):
+            places[names.index(row["point"])] = _numbers(path, line, row, "xyz")
     lonely = [name for name, seen in zip(names, np.isfinite(uv).all(axis=2).sum(axis=1), strict=True) if seen < 2]
     if lonely or len(names) < 3:
         what = f"point {lonely[0]!r} is marked in one camera only" if lonely else f"{len(names)} points"
@@ -94,6 +93,16 @@ def read_points(path: Path, rig: Rig) -> GroundPoints:
     if known.sum() >= 3:
         return _placed(path, rig, found[known], places[known])
     return _on_floor(rig, found, f"{path.name}: {len(names)} points of the floor")
+
+
+def _numbers(path: Path, line: int, row: Mapping[str, str | None], names: Sequence[str]) -> list[float]:
+    try:
+        values = [float(row[name] or "") for name in names]
+    except ValueError:
+        raise InputError(f"{path}, line {line}: u, v, x, y and z must be numbers") from None
+    if not all(abs(value) < MOST for value in values):
+        raise InputError(f"{path}, line {line}: {', '.join(names)} must be numbers below {MOST:.0e} (u, v pixels; x, y, z metres)")
+    return values
 
 
 def board_points(rig: Rig, images: Sequence[np.ndarray | None], size: tuple[int, int], square_m: float | None = None) -> GroundPoints:

@@ -195,10 +195,13 @@ def write_csv(file, header, rows):
         ([(0, "cam_00", 1, 2)], "in one camera only"),
         ([(0, "cam_99", 1, 2)], "no camera named 'cam_99'"),
         ([(0, "cam_00", "x", 2)], "line 2: u, v"),
+        ([(0, "cam_00", "nan", 2)], "line 2: u, v must be numbers below"),
+        ([(0, "cam_00", 1, 2, 0, "inf", 0)], "line 2: x, y, z must be numbers below"),
+        ([(0, "cam_00", 1, 2, 0, 1e300, 0)], "line 2: x, y, z must be numbers below"),
     ],
 )
 def test_points_that_are_no_points_are_told(ring, tmp_path, rows, said):
-    write_csv(tmp_path / "points.csv", "point,camera,u,v", rows)
+    write_csv(tmp_path / "points.csv", "point,camera,u,v,x,y,z", rows)
     with pytest.raises(InputError, match=said):
         read_points(tmp_path / "points.csv", ring)
 

@@ -17,7 +17,7 @@ from families import FAMILIES
 from hmc.camera.model import Rig, look_at
 from hmc.check.given_points import read_points
 from hmc.errors import InputError
-from hmc.experiments.engine.store import read_cell
+from hmc.experiments.engine.store import cell_text, read_cell
 from hmc.io.c3d import read_c3d
 from hmc.io.calibration import read_calibration, write_calibration
 from hmc.io.detections import read_detections
@@ -134,7 +134,7 @@ READERS = {
     "body model": Reader(read_hierarchy, "model.toml", MODEL),
     "kept arrays": Reader(kept, "00000003.npz", lambda path: np.savez(path, voxels=np.arange(3), levels=np.ones(3, np.uint8))),
     "person tree": Reader(read_tree, "tree.csv", "a,b\n1,2\n"),
-    "cell": Reader(read_cell, "cell.json", '{"parameters": {}, "results": {"a": 1}}'),
+    "cell": Reader(read_cell, "cell.json", cell_text({}, {"a": 1})),
     "image": Reader(read_image, "i.png", _image),
     "video": Reader(open_video, "v.avi", _video),
 }
