@@ -111,8 +111,8 @@ CATALOGUE = (
     ),
     Entry(
         "fig-4.13", CANTON, "measured and theoretical complexity (table 4.5)", "naive and PF grow with the voxels, SS with the samples",
-        why="What is there without any samples outweighs them at these sizes (second table). What one more sample costs is about the same at "
-        "all voxels, as by the theory; a particle's cost goes with the square of the voxels and not the cube, as PF sums whole columns.",
+        why="What is there without any samples outweighs them at these sizes (second table). What one more sample costs is about the same "
+        "at all voxels, as by the theory; a particle's cost goes with the square of the voxels and not the cube, as PF sums whole columns.",
     ),
     Entry("fig-4.14", CANTON, "MOTP and MOTA against the real-time factor", "SS above PF at equal factor", _CLEAR, _MEETINGS),
     Entry(
