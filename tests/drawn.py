@@ -35,9 +35,9 @@ def post(camera: Camera, x: float, y: float) -> np.ndarray:
     return mask.view(bool)
 
 
-def floor_patch(camera: Camera) -> np.ndarray:
-    """A camera's view of the shadow, (h, w) bool."""
-    (x0, y0), (x1, y1) = SHADOW
+def floor_patch(camera: Camera, sides: tuple[tuple[float, float], tuple[float, float]] = SHADOW) -> np.ndarray:
+    """A camera's view of a rectangle on the floor, (h, w) bool."""
+    (x0, y0), (x1, y1) = sides
     uv, valid = project(camera, np.array([[x0, y0, 0], [x1, y0, 0], [x1, y1, 0], [x0, y1, 0]]))
     assert valid.all()
     view = np.zeros(camera.size[::-1], np.uint8)

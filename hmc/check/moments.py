@@ -11,7 +11,7 @@ from hmc.camera.segmentation import BackgroundModel, segment, train_background
 from hmc.camera.shade import floor_pixels
 from hmc.io.recording import Frame, Recording, background_frames, iterate_frames
 
-__all__ = ["Masks", "learn_background", "moments", "probe_masks"]
+__all__ = ["Masks", "knows_the_floor", "learn_background", "moment_frames", "probe_masks"]
 
 #: Silhouettes of one moment, one a camera: bool, shape (height, width), or None.
 Masks = Sequence[np.ndarray | None]
@@ -48,22 +48,16 @@ def probe_masks(recording: Recording, frames: Sequence[Frame], medians: bool = F
     return list(masks)
 
 
-def moments(recording: Recording, n: int) -> list[Masks]:
-    """Silhouettes of so many moments, well spread over the recording's first frames.
-
-    Parameters
-    ----------
-    recording : Recording
-    n : int
-
-    Returns
-    -------
-    list (moments) of sequence (cameras) of ndarray of bool, shape (h, w), or None
-    """
+def moment_frames(recording: Recording, n: int) -> list[Frame]:
+    """So many moments, well spread over the recording's first frames."""
     span = min(recording.n_frames, SPAN)
     wanted = {recording.start + round(k) for k in np.linspace(0, span - 1, min(n, span))}
-    frames = [frame for frame in iterate_frames(recording, last=recording.start + span) if frame.index in wanted]
-    return probe_masks(recording, frames, medians=True)
+    return [frame for frame in iterate_frames(recording, last=recording.start + span) if frame.index in wanted]
+
+
+def knows_the_floor(recording: Recording) -> bool:
+    """Whether silhouettes are better for knowing where the floor is: shadows on it are told by an empty scene (`learn_background`)."""
+    return not recording.has_silhouettes and any(recording.n_background_frames)
 
 
 def learn_background(recording: Recording, index: int, frames: Sequence[Frame]) -> BackgroundModel | None:

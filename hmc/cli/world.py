@@ -3,11 +3,19 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from shlex import quote
+from typing import TYPE_CHECKING
 
 from hmc.cli.common import add_session_option, given_places, output_path, positive_float
 from hmc.io.files import real_path
+
+if TYPE_CHECKING:
+    from hmc.camera.model import Rig
+    from hmc.check.upright import Figure, Ground
+    from hmc.io.recording import Frame, Recording
 
 __all__ = ["add_parser", "run"]
 
@@ -70,14 +78,24 @@ def _board(text: str) -> tuple[int, int]:
     return columns, rows
 
 
+def _people(recording: Recording, frames: Sequence[Frame], rig: Rig) -> tuple[Sequence[Figure], Ground | None, tuple[str, ...]]:
+    """Who is seen in some frames of a recording, and what they say of a rig's world (`hmc.check.hidden.find_legs`)."""
+    from hmc.check.hidden import find_legs
+    from hmc.check.moments import probe_masks
+    from hmc.check.upright import find_figures, find_ground
+
+    masks = probe_masks(recording, frames, medians=True)
+    figures = find_figures(rig, masks)
+    return find_legs(rig, figures, masks, find_ground(rig, figures))
+
+
 def run(args: argparse.Namespace) -> int:
     """Print what was found, write the picture and, where it is another world, the calibration."""
+    from hmc.camera.coverage import estimate_room
     from hmc.camera.world import in_world
     from hmc.check.find_world import Known, find_world
     from hmc.check.given_points import board_points, read_points
-    from hmc.check.hidden import find_legs
-    from hmc.check.moments import moments
-    from hmc.check.upright import find_figures, find_ground
+    from hmc.check.moments import knows_the_floor, moment_frames
     from hmc.check.world_picture import save_world_picture
     from hmc.errors import InputError
     from hmc.io.new_world import write_new_world, write_session_world
@@ -95,14 +113,17 @@ def run(args: argparse.Namespace) -> int:
         points = read_points(args.points, rig)
     elif args.board is not None:
         points = board_points(rig, images, args.board, args.square)
-    masks = moments(recording, MOMENTS)
-    figures = find_figures(rig, masks)
-    ground = find_ground(rig, figures)
-    shown, ground, hidden = find_legs(rig, figures, masks, ground)
+    frames = moment_frames(recording, MOMENTS)
     heights = recording.subject_height_m
     known = Known(args.unit, args.distance, args.height or (heights[0] if len(heights) == 1 else None))
+    shown, ground, hidden = _people(recording, frames, rig)
     try:
         found = find_world(rig, ground, points, known, hidden)
+        if points is None and not found.as_it_was and knows_the_floor(recording):
+            # Shadows on a floor that is elsewhere were taken for people, who then stand too low, and aslant.
+            there = in_world(rig, found.world)
+            shown, ground, hidden = _people(replace(recording, rig=there, room=estimate_room(there)), frames, rig)
+            found = find_world(rig, ground, points, known, hidden)
     except InputError as error:
         raise InputError(f"{args.recording}: {error}") from None
     for line in found.lines:

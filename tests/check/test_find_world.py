@@ -7,7 +7,7 @@ from itertools import pairwise
 import cv2
 import numpy as np
 import pytest
-from drawn import HEIGHT_M, draw_recording, post, walk
+from drawn import HEIGHT_M, draw_recording, floor_patch, post, walk
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
@@ -248,6 +248,31 @@ def test_the_command_writes_a_calibration_that_check_finds_right(ring, tmp_path,
     assert "room" not in tomllib.loads((folder / "recording.toml").read_text())
     assert not [one for one in check_recording(folder) if one.severity == "error"]
     assert main(["world", str(folder), "--out", str(tmp_path / "world.png")]) == 0
+
+
+def test_shadows_do_not_sink_the_floor(ring, tmp_path, monkeypatch, capsys):
+    """Shadows are told from people where the floor is known: once it is found, people are looked at again in that world."""
+    places = [(0.7 * np.cos(a), 0.7 * np.sin(a)) for a in np.linspace(0, 5, 8)]
+    folder = draw_recording(tmp_path / "take", ring, [[place] for place in places], shape=post)
+    write_calibration(folder / "calibration.toml", in_world(ring, WORLDS["first camera"]))
+    heights = []
+
+    def masks(recording, frames, medians=False):
+        heights.append(recording.rig.centres[:, 2])
+        known = abs(heights[-1] - 2.0).max() < 0.5
+        shown = [[post(camera, *places[frame.index]) for camera in ring] for frame in frames]
+        for frame, views in zip(() if known else frames, shown, strict=False):
+            x, y = places[frame.index]
+            for camera, view in zip(ring, views, strict=True):
+                view |= floor_patch(camera, ((x - 0.15, x + 0.15), (y, y + 0.9)))
+        return shown
+
+    monkeypatch.setattr("hmc.check.moments.probe_masks", masks)
+    assert main(["world", str(folder), "--out", str(tmp_path / "world.png")]) == 0
+    assert len(heights) == 2
+    assert_allclose(heights[0], in_world(ring, WORLDS["first camera"]).centres[:, 2])
+    off = [abs(found - 2.0).max() for found in (heights[1], read_calibration(folder).centres[:, 2])]
+    assert off[0] > 0.1 and off[1] < 0.08, (off, capsys.readouterr().out)
 
 
 def test_a_recording_that_is_right_stays_as_it_is(ring, tmp_path, capsys):
