@@ -85,6 +85,7 @@ def _by_ffmpeg(program: str, path: Path, temporary: Path, pictures: Iterator[np.
     source = ["-f", "rawvideo", "-pix_fmt", "bgr24", "-s", f"{width}x{height}", "-r", f"{fps:.6f}", "-i", "-"]
     target = ["-an", "-c:v", "libx264", "-preset", SPEED, "-crf", str(CRF), "-pix_fmt", "yuv420p", "-movflags", "+faststart"]
     command = [program, "-hide_banner", "-loglevel", "error", "-nostdin", "-y", *source, *target, str(temporary)]
+    written = 0
     with tempfile.TemporaryFile() as said:
         process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=said)
         pipe = process.stdin
@@ -93,6 +94,7 @@ def _by_ffmpeg(program: str, path: Path, temporary: Path, pictures: Iterator[np.
                 with suppress(BrokenPipeError):  # why it ended is told below
                     for picture in _with_first(first, pictures):
                         pipe.write(_even(picture).data)
+                        written += 1
                     pipe.close()
             process.wait()
         except BaseException:
@@ -107,6 +109,7 @@ def _by_ffmpeg(program: str, path: Path, temporary: Path, pictures: Iterator[np.
             said.seek(0)
             words = said.read().decode(errors="replace").strip().splitlines()
             raise InputError(f"{path}: cannot be written as a video ({words[-1] if words else f'ffmpeg ended with {process.returncode}'})")
+    check_written(path, temporary, written)
 
 
 def _by_opencv(path: Path, temporary: Path, pictures: Iterator[np.ndarray], fps: float, on_problem: Callable[[str], None] | None) -> None:
@@ -138,7 +141,8 @@ def _by_opencv(path: Path, temporary: Path, pictures: Iterator[np.ndarray], fps:
 
 
 def check_written(path: str | Path, temporary: str | Path, n: int) -> None:
-    """Whether a video of OpenCV has all its frames: on a disk that is full it ends without a word.
+    """Whether a video has all its frames: on a disk that is full OpenCV ends without a word, and ffmpeg, where its index is what it has no
+    room for, as if all were well.
 
     Parameters
     ----------

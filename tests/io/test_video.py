@@ -1,5 +1,6 @@
 """Videos as OpenCV and ffprobe read them."""
 
+import os
 import shutil
 import subprocess
 
@@ -97,6 +98,19 @@ def test_a_video_of_opencv_that_ended_early_is_told(tmp_path, share):
     path.write_bytes(path.read_bytes()[: int(share * path.stat().st_size)])
     with pytest.raises(InputError, match=r"b\.avi: cannot be written \(of 12 frames \d+ arrived"):
         check_written(tmp_path / "b.avi", path, 12)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="a script stands in for the program")
+def test_a_program_that_ends_well_without_its_video_is_told(tmp_path, monkeypatch):
+    """As ffmpeg does where the disk has no room left for the index."""
+    program = tmp_path / "ffmpeg"
+    made = "case $last in *encoders) echo ' V..... libx264 ';; *) cat > /dev/null; echo cut > $last;; esac"
+    program.write_text(f"#!/bin/sh\nfor last; do :; done\n{made}\n")
+    program.chmod(0o755)
+    monkeypatch.setattr(video, "ffmpeg_path", lambda: str(program))
+    with pytest.raises(InputError, match=r"of 12 frames 0 arrived; is the disk full\?"):
+        write_video(tmp_path / "a.mp4", pictures(), 25.0)
+    assert [path.name for path in tmp_path.iterdir()] == ["ffmpeg"]
 
 
 def test_an_avi_is_motion_jpeg(tmp_path):
