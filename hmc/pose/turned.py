@@ -164,7 +164,7 @@ def followed_wrongly(
     stride = max(1, settings.frames // settings.first)
     found: list[list[float]] = [[] for _ in parts]
     for begin in ([0], range(1, stride)):
-        left = [k for k, told in enumerate(found) if not told or np.mean(told) > -settings.sure]
+        left = [k for k, told in enumerate(found) if len(told) < settings.first or np.mean(told) > -settings.sure]
         asked = sorted((frame, k) for k in left for first in begin for frame in chosen[k][first::stride])
         part_of = {(frame, parts[k][0]): k for frame, k in asked}
         by_frame = {frame: [parts[k][0] for _, k in some] for frame, some in groupby(asked, itemgetter(0))}

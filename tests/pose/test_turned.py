@@ -132,6 +132,10 @@ def test_a_stretch_too_short_to_tell_is_as_its_neighbors_have_it():
     assert found_by([50, 53], lambda frame: 0.3) == set(range(90)) - {50, 51, 52}
 
 
+def test_a_short_stretch_that_is_surely_right_tells_so():
+    assert found_by([50, 56], lambda frame: -0.6) == set()
+
+
 def test_the_best_way_is_that_of_all_ways():
     """Against every combination, evidence drawn at random."""
     rng, settings = np.random.default_rng(2), TurnedSettings(sure=np.inf)
