@@ -66,15 +66,15 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
         groups = {name: kehl_runs.of_variant(tests, variant) for name, variant in variants.items()}
         for name, own in groups.items():
             first = own[0].results
-            column[0].plot(first["frames"], 1000 * np.array(first["seconds"]), color=METHODS[name], label=name)
-            column[1].plot(first["frames"], kehl_runs.errors_mm(own[0]).mean(axis=1), color=METHODS[name])
+            column[0].plot(first["frames"], 1000 * np.array(first["seconds"]), color=METHODS[name])
+            column[1].plot(first["frames"], kehl_runs.errors_mm(own[0]).mean(axis=1), color=METHODS[name], label=name)
             rows.append(_row(name, family, own, stops.get(name, (None,))[0], PAPER.get(name, (None, None))))
         column[0].set(title=family, yscale="log")
         rows.append(_row(BESIDE[ending].replace(ending, ""), family, kehl_runs.of_variant(tests, BESIDE[ending]), None, (None, None)))
         if ending:
             claims = _claims(groups)
     panels[0, 0].set(ylabel="processor time, ms")
-    panels[0, 0].legend()
+    panels[1, -1].legend(loc="upper left")  # of `default`, whose errors leave room under those of the printed preset
     panels[1, 0].set(ylabel="mean joint error, mm", xlabel="frame")
     caption = (
         "Stochastic Meta Descent and Levenberg-Marquardt on kicks and a turn; the tracker's processor time. LM stops at the tolerance that "
