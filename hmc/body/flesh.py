@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from scipy import ndimage
@@ -11,8 +11,9 @@ from hmc.body.cones import cone_distance
 from hmc.body.joints import SEGMENTS
 from hmc.body.kinematics import segment_transforms
 from hmc.body.model import PARTS, BodyModel, neutral_state
+from hmc.landmarks import landmark_index
 
-__all__ = ["FleshTable", "SurfaceSamples", "flesh_points", "place_points", "surface_coordinates", "surface_samples"]
+__all__ = ["FleshTable", "SurfaceSamples", "beyond_wrist", "flesh_points", "place_points", "surface_coordinates", "surface_samples"]
 
 # The golden angle spreads points evenly around a cone.
 _GOLDEN = np.pi * (3 - np.sqrt(5))
@@ -51,12 +52,19 @@ class SurfaceSamples:
     points, normals : ndarray, shape (n, 3)
         Metres and unit vectors, segment's frame.
     segment, part : ndarray of int, shape (n,)
+    hand : ndarray of bool, shape (n,)
+        Beyond the wrist.
     """
 
     points: np.ndarray
     normals: np.ndarray
     segment: np.ndarray
     part: np.ndarray
+    hand: np.ndarray
+
+    def where(self, chosen: np.ndarray | slice) -> SurfaceSamples:
+        """The chosen samples: a mask, shape (n,), row numbers, or a slice."""
+        return SurfaceSamples(*(getattr(self, field.name)[chosen] for field in fields(self)))
 
 
 def flesh_points(body: BodyModel, spacing_m: float) -> FleshTable:
@@ -145,7 +153,28 @@ def surface_samples(body: BodyModel, coordinates: tuple[np.ndarray, np.ndarray, 
     # The gradient of the ellipse; the cone's slope tilts the normal by a few degrees only and is left out.
     normals = (cos / np.maximum(radii[:, 0], 1e-6))[:, None] * bases[:, 0] + (sin / np.maximum(radii[:, 1], 1e-6))[:, None] * bases[:, 1]
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return SurfaceSamples(points, normals, cones.segment[cone], cones.part[cone])
+    part = cones.part[cone]
+    return SurfaceSamples(points, normals, cones.segment[cone], part, beyond_wrist(body, points, part))
+
+
+def beyond_wrist(body: BodyModel, points: np.ndarray, part: np.ndarray) -> np.ndarray:
+    """Which points of the flesh are of a hand: those of a forearm that lie farther out than the wrist.
+
+    Parameters
+    ----------
+    body : BodyModel
+    points : ndarray, shape (n, 3)
+        Segment's frame, metres.
+    part : ndarray of int, shape (n,)
+
+    Returns
+    -------
+    ndarray of bool, shape (n,)
+    """
+    out = np.full(len(PARTS), np.inf)
+    for side in "rl":
+        out[PARTS.index(f"{side}_forearm")] = abs(body.tips[landmark_index(f"{side}_wrist"), 1])
+    return np.abs(points[:, 1]) > out[part] + 1e-6
 
 
 def place_points(rotations: np.ndarray, positions: np.ndarray, points: np.ndarray, segment: np.ndarray) -> np.ndarray:

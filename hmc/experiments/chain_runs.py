@@ -86,6 +86,7 @@ PARTS: dict[str, Part] = {
     "limb search": Part(preset={"search": None}),
     "fresh starts for who is lost": Part(back={"anew": None}),
     "turning about who faces backwards": Part(back={"turned": None}),
+    "colors of a person's parts": Part(back={"colors": None}),
     "feet that stand": Part(back={"standing_feet": False}),
     "the floor as others see it": Part(frontend={"ask_floor": False}),
     "completion by other cameras": Part(frontend={"complete": False}),

@@ -12,16 +12,16 @@ first second and a half. When the recording is over more is known:
    person was lost for long, so is a pose that is found anew (`hmc.pose.anew`).
 5. Each frame then has two poses, and more with limbs of one on the other; the best way through all of them is taken
    (`hmc.pose.mixtures`). Where nothing shows a limb, the way in from before and the way out to after are joined where they meet best.
+6. Limbs that are still in doubt are looked for by the colors of the person's own parts (`hmc.pose.limb_colors`).
 
-The third and the fourth go on where they were when a run was stopped; the others take a moment. Ours; the papers follow forward only.
+The third, fourth and last go on where they were when a run was stopped; the others take a moment. Ours; the papers follow forward only.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
-from typing import TypeVar
 
 import numpy as np
 
@@ -32,17 +32,18 @@ from hmc.body.proportions import make_bodies
 from hmc.io.journal import append_journal, open_journal
 from hmc.io.masks import kept_frames
 from hmc.io.recording import Recording, spread_frames
-from hmc.io.results import PoseStates, TrackTable
+from hmc.io.results import TrackTable
 from hmc.pose.anew import doubtful_frames, pose_anew
 from hmc.pose.contacts import standing_feet
 from hmc.pose.follow import FollowOptions, PosedPeople
-from hmc.pose.keypoint_cues import beside_body, learn_beside, with_keypoints
+from hmc.pose.keypoint_cues import beside_body, learn_beside
+from hmc.pose.limb_colors import Found, OtherLimb, limbs_by_color
 from hmc.pose.method import SURFACE_POINTS, Capture, PoseMethod, Subject, make_subject, other_rng
 from hmc.pose.mixtures import N_MIXTURES, BackwardSettings, choose_path, mixed_poses, mixture
 from hmc.pose.objectives.objective import Objective
-from hmc.pose.objectives.symmetric import body_distance
-from hmc.pose.occluders import HiddenPlaces, learn_hidden_places, unseen_voxels
+from hmc.pose.occluders import learn_hidden_places
 from hmc.pose.records import with_angles
+from hmc.pose.second_pass import SecondPass
 from hmc.pose.starts.fit_body import with_known_stature
 from hmc.pose.starts.own_body import choose_frames, own_body
 from hmc.pose.steps.polish import PolishSettings, fine_objective, polish
@@ -50,25 +51,16 @@ from hmc.pose.steps.proposal import shows_enough
 from hmc.pose.steps.refine import refine
 from hmc.pose.turned import followed_wrongly, stretches, turn_about
 from hmc.pose.views.keypoint_pose import keypoint_pose
-from hmc.pose.views.person_view import PersonView, views_of
-from hmc.processes import each_ahead
+from hmc.pose.views.person_view import PersonView
 from hmc.tracking.resumable import person_grid
-from hmc.voxels.carving import shared_tables
-from hmc.voxels.hulls import stream_hulls
 from hmc.voxels.run_options import RunOptions
 
-__all__ = ["backward", "with_own_rays"]
+__all__ = ["backward"]
 
-T = TypeVar("T")
-
-#: Of the random numbers of a frame: those of the backward pass.
-BACKWARD = 3
 #: Of those of the backward pass (`hmc.pose.method.other_rng`).
 ANEW, TURNED = 1, 2
 #: Frames from which it is learnt where a detector's keypoints lie, at most, well spread.
 BESIDE_FRAMES = 40
-#: A ray that passes another's body as near as this may be of that one, metres: as wide as clothes are.
-OTHERS_M = 0.03
 
 
 @dataclass(frozen=True)
@@ -136,7 +128,7 @@ def backward(
     first_bodies = make_bodies(people.states.bodies, method.limits)
     floor_z = float(recording.room[0, 2])
     records = open_journal(run.journal, with_angles(run.key), run.on_problem)
-    pass_ = _Pass(recording, tracks, settings, options, run, capture, people.states, first_bodies, places, {})
+    pass_ = SecondPass(recording, tracks, settings, options, run, capture, people.states, first_bodies, places, {})
     if records:
         turned = {int(person): frames for person, frames in records[0]["turned_frames"].items()}
     else:
@@ -157,95 +149,20 @@ def backward(
         persons = {
             number: replace(person, anew=frozenset(people.frames[person.rows[lost[number]]].tolist())) for number, person in persons.items()
         }
-    for record in records[1:]:
+    for record in [record for record in records if "rows" in record]:
         for person, own, back, costs in record["rows"]:
             _put(persons[person], record["frame"], np.array(own), np.array(back), np.array(costs))
         end = record["frame"]
     _sweep(pass_, persons, first, end)
-    return _joined(people, persons, recording.fps, settings)
+    people = _joined(people, persons, recording.fps, settings)
+    if settings.colors is None:
+        return people
+    run.say("asking colors")
+    subjects = {number: person.subject for number, person in persons.items()}
+    return limbs_by_color(pass_, subjects, people, settings.colors, *_kept_colors(records, run))
 
 
-@dataclass(frozen=True)
-class _Pass:
-    """What is the same for all people and frames."""
-
-    recording: Recording
-    tracks: TrackTable
-    settings: BackwardSettings
-    options: FollowOptions
-    run: RunOptions
-    capture: Capture
-    states: PoseStates
-    bodies: Mapping[int, BodyModel]
-    places: HiddenPlaces | None
-    standing: Mapping[int, Mapping[int, tuple[bool, ...]]]
-
-    def each(self, make: Callable[[Sequence[int]], Iterator[T]], frames: Sequence[int]) -> Iterator[T]:
-        """What is made of each of some frames, made ahead by processes."""
-        shared_tables(person_grid(self.recording, self.options.voxel_size_m), self.recording.rig)  # once, for all processes
-        return each_ahead(make, frames, self.run.workers)
-
-    def views_of(self, frames: Sequence[int]) -> Iterator[tuple[int, dict[int, PersonView]]]:
-        """What some frames show of all people, in any order, by what the first pass tells of the scene and of the others' poses."""
-        made = self._made([frame for frame in frames if self.recent(frame) is None])
-        for frame in frames:
-            recent = self.recent(frame)
-            views = self._on_their_feet(frame, next(made) if recent is None else recent)
-            if not self.settings.own_rays:
-                yield frame, views
-                continue
-            rows = np.flatnonzero(self.states.frames == frame)
-            rows = rows[np.isfinite(self.states.states[rows]).all(axis=1)]
-            poses = {
-                person: (self.bodies[person], self.states.states[row])
-                for person, row in zip(self.states.persons[rows].tolist(), rows, strict=True)
-            }
-            yield frame, {person: with_own_rays(view, person, poses) for person, view in views.items()}
-
-    def _on_their_feet(self, frame: int, views: dict[int, PersonView]) -> dict[int, PersonView]:
-        """The same with what is known of who stands."""
-        known = {person: self.standing.get(person, {}).get(frame, (False,) * 4) for person in views}
-        return {
-            person: replace(view, target=replace(view.target, standing=known[person]))
-            if view.target is not None and any(known[person])
-            else view
-            for person, view in views.items()
-        }
-
-    def recent(self, frame: int) -> dict[int, PersonView] | None:
-        """What the first pass saw in a frame, if that is still there and nothing has been learnt of the scene since."""
-        recent = self.options.recent
-        if recent is None or self.places is not None or frame not in recent.views:
-            return None
-        views = recent.views[frame]
-        return {person: view if self.options.keypoints else replace(view, keypoints=None) for person, view in views.items()}
-
-    def _made(self, frames: Sequence[int]) -> Iterator[dict[int, PersonView]]:
-        """The same of each of some frames, by its silhouettes."""
-        grid = person_grid(self.recording, self.options.voxel_size_m)
-        masks = kept_frames(self.run.masks or "", self.run.key, frames)
-        for hull in stream_hulls(self.recording, grid, self.run.frontend, masks=masks):
-            unseen = None if self.places is None else unseen_voxels(self.places, hull.masks)
-            views = views_of(self.recording, grid, self.tracks, hull, unseen=unseen)
-            yield with_keypoints(views, self.recording.rig, self.tracks, self.options.keypoints)
-
-    def rng(self, person: int, frame: int) -> np.random.Generator:
-        """The random numbers of a person's frame."""
-        return np.random.default_rng([self.options.seed, person, frame, BACKWARD])
-
-
-def with_own_rays(view: PersonView, person: int, poses: Mapping[int, tuple[BodyModel, np.ndarray]]) -> PersonView:
-    """A person's view without the rays that another's pose covers: what another may be of asks nothing."""
-    if view.target is None or view.target.rays is None or not len(view.target.rays):
-        return view
-    rays = view.target.rays
-    for other, (body, state) in poses.items():
-        if other != person and len(rays):
-            rays = rays[body_distance(body, state[None], rays)[0] > OTHERS_M]
-    return replace(view, target=replace(view.target, rays=rays))
-
-
-def _with_beside(pass_: _Pass, people: PosedPeople, fitted: np.ndarray, bodies: Mapping[int, BodyModel]) -> _Pass:
+def _with_beside(pass_: SecondPass, people: PosedPeople, fitted: np.ndarray, bodies: Mapping[int, BodyModel]) -> SecondPass:
     """The same with what is learnt of where the detector's keypoints lie, by poses that the hulls alone refine."""
     if pass_.options.keypoints is None:
         return pass_
@@ -267,7 +184,7 @@ def _with_beside(pass_: _Pass, people: PosedPeople, fitted: np.ndarray, bodies: 
     return replace(pass_, capture=replace(pass_.capture, beside=learn_beside([beside for beside, _ in found], [cost for _, cost in found])))
 
 
-def _bodies(pass_: _Pass, people: PosedPeople, fitted: np.ndarray) -> dict[int, BodyModel]:
+def _bodies(pass_: SecondPass, people: PosedPeople, fitted: np.ndarray) -> dict[int, BodyModel]:
     """Every person's body, fitted to frames of the whole run where others bear it out."""
     settings, bodies = pass_.settings, dict(pass_.bodies)
     persons = {number: _begun(people, fitted, number, make_subject(body, pass_.capture)) for number, body in bodies.items()}
@@ -300,7 +217,7 @@ def _bodies(pass_: _Pass, people: PosedPeople, fitted: np.ndarray) -> dict[int, 
     return bodies
 
 
-def _followed_wrongly(pass_: _Pass, people: PosedPeople, fitted: np.ndarray) -> dict[int, list[int]]:
+def _followed_wrongly(pass_: SecondPass, people: PosedPeople, fitted: np.ndarray) -> dict[int, list[int]]:
     """In which frames people were followed the wrong way round, by frames of the whole run."""
     settings = pass_.settings
     if settings.turned is None:
@@ -354,7 +271,7 @@ def _put(person: _Person, frame: int, own: np.ndarray, back: np.ndarray, costs: 
     person.own[k], person.back[k], person.costs[k] = own, back, costs
 
 
-def _sweep(pass_: _Pass, persons: Mapping[int, _Person], first: int, end: int) -> None:
+def _sweep(pass_: SecondPass, persons: Mapping[int, _Person], first: int, end: int) -> None:
     """Follow everybody back from before frame `end`; what is found goes into the persons' tables and the journal."""
     steps = _each_refined(pass_, persons, range(end - 1, first - 1, -1))
     for frame, refined in pass_.run.progress(steps, end - first) if pass_.run.progress else steps:
@@ -370,7 +287,7 @@ def _sweep(pass_: _Pass, persons: Mapping[int, _Person], first: int, end: int) -
 
 
 def _each_refined(
-    pass_: _Pass, persons: Mapping[int, _Person], frames: Sequence[int]
+    pass_: SecondPass, persons: Mapping[int, _Person], frames: Sequence[int]
 ) -> Iterator[tuple[int, dict[int, tuple[PersonView, list[np.ndarray]]]]]:
     """What some frames show of those people of whom it is enough, with their first pose, refined, and those that the keypoints show by
     themselves: all that needs no other frame."""
@@ -414,6 +331,21 @@ def _back(
     objective = fine_objective(rng, subject, view, settings)
     back, _, _ = polish(rng, objective, [own[0], after, *own[1:]], after, settings)
     return back, objective.cost(mixed_poses(own[0], back))
+
+
+def _kept_colors(records: Sequence[Mapping], run: RunOptions) -> tuple[Found, Callable[[int, Sequence[OtherLimb]], None]]:
+    """What a stopped run's journal holds of limbs that colors were asked for, and what adds to it."""
+    known = {
+        record["frame"]: [OtherLimb(one["person"], one["limb"], np.array(one["angles"]), np.array(one["costs"])) for one in record["limbs"]]
+        for record in records
+        if "limbs" in record
+    }
+
+    def keep(frame: int, limbs: Sequence[OtherLimb]) -> None:
+        if run.journal is not None:
+            append_journal(run.journal, {"frame": frame, "limbs": [asdict(one) for one in limbs]})
+
+    return known, keep
 
 
 def _joined(people: PosedPeople, persons: Mapping[int, _Person], fps: float, settings: BackwardSettings) -> PosedPeople:

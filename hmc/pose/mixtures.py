@@ -17,6 +17,7 @@ from hmc.body.limbs import CHAIN_OF_DOF, LIMBS
 from hmc.body.model import BodyModel
 from hmc.pose.anew import AnewSettings
 from hmc.pose.legs import LegSettings, choose_legs, limb_points
+from hmc.pose.limb_colors import ColorSettings
 from hmc.pose.steps.polish import PolishSettings
 from hmc.pose.turned import TurnedSettings
 
@@ -50,6 +51,8 @@ class BackwardSettings:
         Where a pose is looked for anew (`hmc.pose.anew`); None: nowhere.
     turned : TurnedSettings or None
         When somebody was followed the wrong way round (`hmc.pose.turned`); None: never.
+    colors : ColorSettings or None
+        Which limbs are looked for by the colors of the person's parts (`hmc.pose.limb_colors`); None: none.
     """
 
     polish: PolishSettings
@@ -62,6 +65,7 @@ class BackwardSettings:
     standing_feet: bool = True
     anew: AnewSettings | None = field(default_factory=AnewSettings)
     turned: TurnedSettings | None = field(default_factory=TurnedSettings)
+    colors: ColorSettings | None = field(default_factory=ColorSettings)
 
 
 def mixed_poses(one: np.ndarray, other: np.ndarray) -> np.ndarray:

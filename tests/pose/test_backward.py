@@ -68,11 +68,12 @@ def turned_about(people, wrong):
 
 
 @pytest.mark.parametrize(
-    ("switch", "function"), [("hidden_places", "learn_hidden_places"), ("own_rays", "with_own_rays"), ("best_way", "choose_path")]
+    ("switch", "function"),
+    [("hidden_places", "backward.learn_hidden_places"), ("own_rays", "second_pass.with_own_rays"), ("best_way", "backward.choose_path")],
 )
 def test_what_is_switched_off_is_not_done(one_pass, monkeypatch, switch, function):
     people, run = one_pass
-    monkeypatch.setattr(f"hmc.pose.backward.{function}", None)
+    monkeypatch.setattr(f"hmc.pose.{function}", None)
     method = pose_method("apf")
     off = second(people, run, replace(method, back=replace(method.back, **{switch: False}, fit_body=None)))
     assert np.nanmean(errors(off)) < 0.06
@@ -136,7 +137,7 @@ def test_who_was_followed_the_wrong_way_round_is_turned_about(part, one_pass, tm
 def test_views_that_the_first_pass_left_are_not_made_again_and_change_nothing(one_pass, monkeypatch):
     people, run = one_pass
     method = pose_method("apf")
-    method = replace(method, back=replace(method.back, hidden_places=False, fit_body=None, turned=None))
+    method = replace(method, back=replace(method.back, hidden_places=False, fit_body=None, turned=None, colors=None))
     clip, tracks = tiny_clip(FRAMES), true_tracks(FRAMES)
     grid = person_grid(clip, VOXEL_M)
     steps = stream_hulls(clip, grid, masks=kept_frames(run.masks, run.key, range(FRAMES)))
@@ -154,7 +155,7 @@ def test_views_that_the_first_pass_left_are_not_made_again_and_change_nothing(on
         return views_of(*args, **options)
 
     whole = second(people, run, method)
-    monkeypatch.setattr("hmc.pose.backward.views_of", counted)
+    monkeypatch.setattr("hmc.pose.second_pass.views_of", counted)
     for workers in (1, 2):
         carved.value = 0
         found = second(people, replace(run, workers=workers), method, recent)

@@ -16,7 +16,6 @@ from hmc.body.proportions import default_body
 from hmc.camera.model import Rig, look_at, project
 from hmc.io.masks import MaskStep, keep_masks
 from hmc.io.results import PoseStates
-from hmc.pose.backward import with_own_rays
 from hmc.pose.occluders import (
     HiddenPlaces,
     Sightings,
@@ -24,6 +23,7 @@ from hmc.pose.occluders import (
     learn_hidden_places,
     unseen_voxels,
 )
+from hmc.pose.second_pass import with_own_rays
 from hmc.pose.views.hull_target import distance_at, make_target
 from hmc.pose.views.person_view import PersonView
 from hmc.voxels.grid import VoxelGrid

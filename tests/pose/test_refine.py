@@ -1,5 +1,7 @@
 """Local refinement: residuals and their derivatives against the cost and finite differences, and recovery of rendered people's poses."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from acted import act
@@ -118,6 +120,23 @@ def test_nothing_pulls_beyond_the_cap(scene):
     both = slice(0, len(points.surface.points) + len(hull))
     assert not jacobian[both].any()
     assert residuals[both] @ residuals[both] == pytest.approx((1 + COST.uncovered_weight) * COST.cap_m**2, rel=1e-6)
+
+
+def test_hands_outside_cost_and_pull_no_more_than_their_own_cap(scene):
+    body, points, target, hull, true = scene
+    far = true.copy()
+    far[2] += 50.0
+    hands = points.surface.hand.mean()
+    assert 0.01 < hands < 0.1
+    for hand_cap_m in (0.0, 0.01):
+        objective = Symmetric(body, points, target, hull, replace(COST, hand_cap_m=hand_cap_m))
+        residuals, jacobian = residual_rows(objective.linearise(far))
+        outside = slice(0, len(points.surface.points))
+        assert not jacobian[outside].any()
+        expected = (1 - hands) * COST.cap_m**2 + hands * hand_cap_m**2
+        assert residuals[outside] @ residuals[outside] == pytest.approx(expected, rel=1e-6)
+        rest = Symmetric(body, points, target, hull, COST).cost(far[None])[0] - objective.cost(far[None])[0]
+        assert rest == pytest.approx(hands * (COST.cap_m**2 - hand_cap_m**2), rel=1e-5)
 
 
 @pytest.mark.parametrize("seed", range(4))

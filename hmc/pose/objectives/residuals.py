@@ -138,7 +138,7 @@ def distances(objective: Symmetric, state: np.ndarray, before: Candidates | None
             floor = np.r_[floor[0], bearing[:, 2]], np.concatenate([floor[1], bearing]), np.r_[floor[2], feet[stands]]
     spread = posture_spread(state)
     residuals = [
-        weights[0] * np.minimum(outside, settings.cap_m),
+        weights[0] * np.minimum(outside, objective.outside_caps),
         weights[1] * np.minimum(nearest.distance, settings.cap_m),
         weights[2] * depth,
         gap,
@@ -153,7 +153,7 @@ def distances(objective: Symmetric, state: np.ndarray, before: Candidates | None
 def _pulls(found: Distances) -> tuple[np.ndarray, np.ndarray]:
     body, samples, settings = found.objective.body, found.objective.points, found.objective.settings
     n_outside, n_asked = len(found.outside), len(found.nearest.distance)
-    out = np.flatnonzero((found.outside > 0) & (found.outside < settings.cap_m))
+    out = np.flatnonzero((found.outside > 0) & (found.outside < found.objective.outside_caps))
     pulled = found.nearest.distance[found.nearest.pulls]
     uncovered = np.flatnonzero((pulled > 0) & (pulled < settings.cap_m))
     deep = np.flatnonzero(found.depth)

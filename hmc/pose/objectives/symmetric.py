@@ -48,6 +48,8 @@ class SymmetricSettings:
     ----------
     cap_m : float
         Distances beyond this count as this (metres), so that furniture in the hull or a cut-off limb cannot pull without end.
+    hand_cap_m : float or None
+        The same of a hand outside the hull; None: as of all else. Silhouettes lose hands, skin before wood.
     uncovered_weight : float
         Weight of what the body does not cover against body outside the hull.
     ray_share : float
@@ -66,6 +68,7 @@ class SymmetricSettings:
     """
 
     cap_m: float = 0.06
+    hand_cap_m: float | None = None
     uncovered_weight: float = 0.4
     ray_share: float = 0.9
     overlap_weight: float = 2.0
@@ -94,9 +97,7 @@ def body_points(body: BodyModel, coordinates: tuple[np.ndarray, np.ndarray, np.n
 def thinned(points: BodyPoints, n: int) -> BodyPoints:
     """About `n` of the surface's points, evenly spread, and all of the axes'."""
     step = max(1, round(len(points.surface.points) / n))
-    surface = points.surface
-    few = SurfaceSamples(*(values[::step] for values in (surface.points, surface.normals, surface.segment, surface.part)))
-    return BodyPoints(few, points.axes)
+    return BodyPoints(points.surface.where(slice(None, None, step)), points.axes)
 
 
 def outside_distance(body: BodyModel, samples: SurfaceSamples, states: np.ndarray, target: HullTarget) -> np.ndarray:
@@ -232,6 +233,12 @@ class Symmetric:
     settings: SymmetricSettings = field(default_factory=SymmetricSettings)
     asked_part: np.ndarray | None = None
 
+    @property
+    def outside_caps(self) -> np.ndarray:
+        """How far outside the hull each of the body's points counts at most, float32, shape (n_points,), metres."""
+        cap_m, hand_cap_m = self.settings.cap_m, self.settings.hand_cap_m
+        return np.where(self.points.surface.hand, cap_m if hand_cap_m is None else hand_cap_m, cap_m).astype(np.float32)
+
     def cost(self, states: np.ndarray) -> np.ndarray:
         """Mean squared distance of body from hulls, of silhouettes and hull from the body, depth of its parts in one another, and posture.
 
@@ -305,7 +312,7 @@ class Symmetric:
         origin = places.mean(axis=0)
         placed = place_segments(body, states, origin)
         maps = cone_maps(body.cones, placed)
-        outside = np.minimum(_outside(self.points.surface, placed, self.target, origin), cap)
+        outside = np.minimum(_outside(self.points.surface, placed, self.target, origin), self.outside_caps[:, None])
         near, held = cones_near(body.cones, maps, places - origin, settings.cap_m, directions)
         asking = np.flatnonzero(~held)
         along = None if directions is None else directions[asking]

@@ -11,7 +11,6 @@ from typing import Literal
 
 import numpy as np
 
-from hmc.body.flesh import SurfaceSamples
 from hmc.body.keypoint_places import KEYPOINT_PART
 from hmc.body.limbs import CHAIN_OF_PART
 from hmc.body.model import PART_OF_SEGMENT, PARTS, BodyModel, Cones
@@ -86,7 +85,7 @@ def restricted(subject: Subject, keep: np.ndarray, free: np.ndarray | None = Non
         return replace(subject, free=free)
     surface, axes, cones = subject.points.surface, subject.points.axes, subject.body.cones
     rows = keep[surface.part]
-    surface = SurfaceSamples(surface.points[rows], surface.normals[rows], surface.segment[rows], surface.part[rows])
+    surface = surface.where(rows)
     # Points on the axes stay, so that overlap weighs as much as ever; those of missing parts meet nothing.
     there = keep[PART_OF_SEGMENT[axes.segment]]
     axes = replace(axes, against=axes.against[:, keep[cones.part]] & there[:, None])

@@ -1,0 +1,407 @@
+"""Limbs that silhouettes leave open, settled by the colors of the person's own parts.
+
+Both passes may have an arm folded before a thigh where it hangs beside it: hull and silhouettes bear out the one about as well as the
+other. The person's colors do not (`hmc.pose.part_colors`). They are learnt from the limbs that are trusted (`hmc.pose.trust`) and asked of
+the doubtful ones alone:
+
+1. Where patches of a doubtful limb hardly have its colors, other poses of that limb are looked for: drawn at random, then about the best of
+   these, closer and closer. What counts is what the frame asks of any pose (`hmc.pose.steps.polish.fine_objective`) less what colors say.
+2. The best of them and the pose as it was make a path through time (Viterbi, 1967): what counts in each frame, and how far the limb moves.
+
+Ours.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hmc.body.kinematics import landmarks
+from hmc.body.limbs import LIMBS
+from hmc.body.model import BodyModel
+from hmc.body.prior import POSTURE
+from hmc.camera.model import Rig
+from hmc.io.masks import kept_frames
+from hmc.io.recording import Recording, iterate_frames, spread_frames
+from hmc.landmarks import TRUSTED
+from hmc.motion.smoothing import stretches
+from hmc.pose.clear_views import kept_borne_out
+from hmc.pose.method import Subject, other_rng
+from hmc.pose.part_colors import (
+    FrameColors,
+    PartColors,
+    Shown,
+    Skin,
+    count_colors,
+    frame_colors,
+    gains,
+    learn_part_colors,
+    no_counts,
+    patch_sides,
+    shown,
+    skin_of,
+)
+from hmc.pose.steps.polish import fine_objective
+from hmc.pose.steps.proposal import shows_enough
+from hmc.pose.trust import trust_features, trust_of
+from hmc.pose.views.color_patches import OUTSIDE
+from hmc.pose.views.person_view import PersonView
+from hmc.search.truncated import truncated_normal
+
+if TYPE_CHECKING:
+    from hmc.pose.follow import PosedPeople
+    from hmc.pose.second_pass import SecondPass
+
+__all__ = ["ColorSettings", "Found", "OtherLimb", "limbs_by_color"]
+
+#: Of the random numbers of a frame (`hmc.pose.method.other_rng`): of the first limb; the others' follow.
+PURPOSE = 3
+#: Frames so near to one another are read in one go; files are opened anew for others.
+READ_THROUGH = 15
+
+
+@dataclass(frozen=True)
+class ColorSettings:
+    """When colors are asked where a limb is, and what they weigh.
+
+    Parameters
+    ----------
+    worst : float
+        A limb is asked for in stretches of doubt (`hmc.landmarks.TRUSTED`) in which one of its joints is trusted less than this.
+    learn_frames : int
+        Frames of the run from which colors are learnt, at most.
+    own_nats, least_patches : float, int
+        A doubtful limb is looked for where so many of its patches or more say less than this for it, nats a patch.
+    draws, about, best : int
+        Poses drawn of any kind; poses a round about the best; how many count as these.
+    spreads : tuple of float
+        How far about them, radians, round by round.
+    weight_m2 : float
+        Square metres of cost that one nat a camera outweighs.
+    hand_cap_m : float
+        How far outside the hull a hand counts at most, metres (`SymmetricSettings`): where colors tell where it is, silhouettes that lost
+        it are not asked.
+    margin_m2 : float
+        What a new pose of a limb has to be cheaper by, square metres: of many that are drawn one is always a little better.
+    step_weight : float
+        What the squared way of a limb's joints from one frame to the next costs, at 30 frames a second: square metres a square metre.
+    kept : int
+        Poses of a limb, beside the one that it had, through which a path is looked for.
+    apart_m : float
+        How far these are from one another.
+    """
+
+    worst: float = 0.7
+    learn_frames: int = 24
+    own_nats: float = 0.55
+    least_patches: int = 12
+    draws: int = 200
+    about: int = 60
+    best: int = 10
+    spreads: tuple[float, ...] = (0.4, 0.2, 0.1, 0.05)
+    weight_m2: float = 5e-6
+    hand_cap_m: float = 0.005
+    margin_m2: float = 2e-5
+    step_weight: float = 2e-3
+    kept: int = 4
+    apart_m: float = 0.03
+
+
+@dataclass(frozen=True)
+class OtherLimb:
+    """Poses of one limb of one person in one frame.
+
+    Parameters
+    ----------
+    person : int
+    limb : str
+        Of `hmc.body.limbs.LIMBS`.
+    angles : ndarray, shape (n, 4)
+        Radians; the first is the pose that it had.
+    costs : ndarray, shape (n,)
+        Square metres, less what colors say; with the margin of new poses.
+    """
+
+    person: int
+    limb: str
+    angles: np.ndarray
+    costs: np.ndarray
+
+
+#: Of each frame in which a limb is doubtful, what was found.
+Found = Mapping[int, Sequence[OtherLimb]]
+
+
+def limbs_by_color(
+    pass_: SecondPass,
+    subjects: Mapping[int, Subject],
+    people: PosedPeople,
+    settings: ColorSettings,
+    known: Found,
+    keep: Callable[[int, Sequence[OtherLimb]], Any],
+) -> PosedPeople:
+    """The poses with limbs where colors say that they are.
+
+    Parameters
+    ----------
+    pass_ : SecondPass
+    subjects : mapping of int to Subject
+        All people, with their own bodies.
+    people : PosedPeople
+        After the second pass.
+    settings : ColorSettings
+    known : mapping of int to sequence of OtherLimb
+        By frame, what a run that was stopped had found.
+    keep : callable
+        Called with each frame and what was found in it, in order of time.
+
+    Returns
+    -------
+    PosedPeople
+        As they were where there are no images, or where no limb is doubtful.
+    """
+    recording: Recording = pass_.recording
+    borne_out = kept_borne_out(people, recording, replace(pass_.run, progress=None)) if recording.has_images else None
+    if borne_out is None:
+        return people
+    trust = trust_of(trust_features(people.poses, borne_out, people.passes_apart, recording.fps))
+    doubts = _doubts(people, trust, list(subjects), settings)
+    frames = [frame for frame in np.unique(people.frames[doubts.asked.any(axis=0)]).tolist() if frame not in known]
+    found = dict(known)
+    if frames:
+        skins = {number: skin_of(subject.body) for number, subject in subjects.items()}
+        sides = patch_sides(recording.rig, np.nanmedian(people.positions[:, 0], axis=0))
+        asking = _Asking(replace(pass_, states=people.states), subjects, people, doubts, settings, skins, sides)
+        colors = asking.learn()
+        for frame, limbs in zip(frames, pass_.each(lambda some: asking.search(some, colors), frames), strict=True):
+            found[frame] = limbs
+            keep(frame, limbs)
+    return _along_paths(people, subjects, found, recording.fps, settings) if found else people
+
+
+@dataclass(frozen=True)
+class _Doubts:
+    """Limbs in the rows of a table, bool, shape (4, n) each: which are asked for, and from which colors are learnt."""
+
+    asked: np.ndarray
+    sure: np.ndarray
+
+
+def _doubts(people: PosedPeople, trust: np.ndarray, persons: Sequence[int], settings: ColorSettings) -> _Doubts:
+    """Which limbs are in doubt, by the trust in their joints, shape (n, 15)."""
+    asked, sure = np.zeros((2, len(LIMBS), len(people.frames)), bool)
+    fitted = np.array([status == "fitted" for status in people.status]) & np.isfinite(trust).all(axis=1)
+    for person in persons:
+        rows = np.flatnonzero(fitted & (people.persons == person))
+        rows = rows[np.argsort(people.frames[rows])]
+        for k, limb in enumerate(LIMBS.values()):
+            lowest = trust[rows][:, limb.landmarks].min(axis=1)
+            for some in stretches(lowest < TRUSTED):
+                asked[k, rows[some]] = lowest[some].min() < settings.worst
+            sure[k, rows] = lowest >= min(TRUSTED, np.median(lowest)) if len(rows) else False
+    return _Doubts(asked, sure)
+
+
+@dataclass(frozen=True)
+class _Asking:
+    """What is the same for all frames that are asked.
+
+    Parameters
+    ----------
+    pass_ : SecondPass
+        Others' rays by the poses after it.
+    subjects : mapping of int to Subject
+    people : PosedPeople
+    doubts : _Doubts
+    settings : ColorSettings
+    skins : mapping of int to Skin
+        Everybody's.
+    sides : tuple of int
+        Of the patches of each camera, pixels.
+    """
+
+    pass_: SecondPass
+    subjects: Mapping[int, Subject]
+    people: PosedPeople
+    doubts: _Doubts
+    settings: ColorSettings
+    skins: Mapping[int, Skin]
+    sides: tuple[int, ...]
+
+    @property
+    def rig(self) -> Rig:
+        """The recording's cameras."""
+        return self.pass_.recording.rig
+
+    def colors_in(self, frames: Sequence[int]) -> Iterator[FrameColors]:
+        """The patches of some frames, rising."""
+        masks = kept_frames(self.pass_.run.masks or "", self.pass_.run.key, frames) or ()
+        for step, images in zip(masks, _images(self.pass_.recording, frames), strict=True):
+            yield frame_colors(self.rig, images, step.masks, self.sides)
+
+    def rows(self, frame: int) -> dict[int, int]:
+        """The row of everybody with a pose in a frame."""
+        people = self.people
+        known = (people.frames == frame) & np.isin(people.persons, list(self.subjects)) & np.isfinite(people.states.states).all(axis=1)
+        return {int(people.persons[row]): int(row) for row in np.flatnonzero(known)}
+
+    def shown(self, frame: int, colors: FrameColors, person: int, without: int | None = None) -> dict[int, Shown]:
+        """What each camera shows of one person, behind and before all others; without one of the chains."""
+        everybody = []
+        for other, row in self.rows(frame).items():
+            skin = self.skins[other] if other == person else self.skins[other].of_another()
+            if other == person and without is not None:
+                skin = skin.where(skin.chain != without)
+            everybody.append((skin, skin.placed(self.subjects[other].body, self.people.states.states[row])))
+        return {k: shown(self.rig[k], side, everybody) for k, side in colors.sides.items()}
+
+    def learn(self) -> dict[int, PartColors]:
+        """Everybody's colors, from frames of the whole run: of the trunk and of limbs that are not doubtful or less so than usually."""
+
+        def count(some: Sequence[int]) -> Iterator[dict[int, np.ndarray]]:
+            for frame, colors in zip(some, self.colors_in(some), strict=True):
+                counts = {}
+                for person, row in self.rows(frame).items():
+                    counts[person] = no_counts(self.rig)
+                    sure = [0, *(1 + np.flatnonzero(self.doubts.sure[:, row])).tolist()]
+                    for camera, seen in self.shown(frame, colors, person).items():
+                        count_colors(counts[person], camera, seen, colors.bins[camera], sure)
+                yield counts
+
+        total = {person: no_counts(self.rig) for person in self.subjects}
+        for counts in self.pass_.each(count, spread_frames(np.unique(self.people.frames), self.settings.learn_frames)):
+            for person, own in counts.items():
+                total[person] += own
+        return {person: learn_part_colors(counts) for person, counts in total.items()}
+
+    def search(self, frames: Sequence[int], colors: Mapping[int, PartColors]) -> Iterator[list[OtherLimb]]:
+        """Of each frame the doubtful limbs that hardly have their own colors, with other poses of them."""
+        for seen, (frame, views) in zip(self.colors_in(frames), self.pass_.views_of(frames), strict=True):
+            found = []
+            for person, row in self.rows(frame).items():
+                view, asked = views.get(person), [name for name in LIMBS if self.doubts.asked[_chain(name) - 1, row]]
+                if view is None or not asked or not shows_enough(view.target):
+                    continue
+                with_all = self.shown(frame, seen, person)
+                for name in asked:
+                    if not self._has_its_colors(seen, with_all, _chain(name), colors[person]):
+                        found.append(self._others(frame, seen, person, name, view, colors[person]))
+            yield found
+
+    def _has_its_colors(self, seen: FrameColors, with_all: Mapping[int, Shown], chain: int, colors: PartColors) -> bool:
+        """Whether patches of a limb bear it out, or hardly any is seen."""
+        said = []
+        for camera, there in with_all.items():
+            own = there.chain == chain
+            bins = seen.bins[camera][there.patch[own]]
+            said.append(colors.said(camera, there.kind[own], bins)[bins != OUTSIDE])
+        all_said = np.concatenate(said) if said else np.zeros(0)
+        return len(all_said) < self.settings.least_patches or float(all_said.mean()) >= self.settings.own_nats
+
+    def _others(self, frame: int, seen: FrameColors, person: int, name: str, view: PersonView, colors: PartColors) -> OtherLimb:
+        settings, limb, subject, chain = self.settings, LIMBS[name], self.subjects[person], _chain(name)
+        state = self.people.states.states[self.rows(frame)[person]]
+        rng = other_rng(self.pass_.rng(person, frame), PURPOSE + chain)
+        polish = self.pass_.settings.polish
+        polish = replace(polish, symmetric=replace(polish.symmetric, hand_cap_m=settings.hand_cap_m))
+        objective = fine_objective(rng, subject, view, polish)
+        rest, own = self.shown(frame, seen, person, without=chain), self.skins[person].where(self.skins[person].chain == chain)
+
+        def cost(angles: np.ndarray) -> np.ndarray:
+            states = _with_angles(state, name, angles)
+            gained = gains(self.rig, colors, seen, rest, (own.placed(subject.body, states), own.kind))
+            return objective.cost(states) - settings.weight_m2 * gained
+
+        low, high = subject.body.limits.low[limb.dofs], subject.body.limits.high[limb.dofs]
+        common, any_ = settings.draws // 2, settings.draws - settings.draws // 2
+        drawn = np.concatenate(
+            [
+                state[None, limb.dofs],
+                truncated_normal(rng, np.tile(POSTURE[0][limb.dofs], (common, 1)), POSTURE[1][limb.dofs], low, high),
+                rng.uniform(low, high, (any_, len(limb.dofs))),
+            ]
+        )
+        costs = cost(drawn)
+        was, cost_was = drawn[0], costs[0]
+        for spread in settings.spreads:
+            best = np.argsort(costs, kind="stable")[: settings.best]
+            about = drawn[best[np.arange(settings.about) % len(best)]]
+            near = truncated_normal(rng, about, np.full(len(limb.dofs), spread), low, high)
+            drawn, costs = np.concatenate([drawn[best], near]), np.r_[costs[best], cost(near)]
+        picks = _apart(landmarks(subject.body, _with_angles(state, name, drawn))[:, limb.landmarks], costs, settings)
+        return OtherLimb(person, name, np.concatenate([was[None], drawn[picks]]), np.r_[cost_was, costs[picks] + settings.margin_m2])
+
+
+def _chain(name: str) -> int:
+    """The chain of a limb, as in `hmc.body.limbs.CHAIN_OF_PART`."""
+    return 1 + list(LIMBS).index(name)
+
+
+def _with_angles(state: np.ndarray, name: str, angles: np.ndarray) -> np.ndarray:
+    """A pose, shape (37,), with a limb at other angles, shape (n, 4): shape (n, 37)."""
+    states = np.repeat(state[None], len(angles), axis=0)
+    states[:, LIMBS[name].dofs] = angles
+    return states
+
+
+def _apart(places: np.ndarray, costs: np.ndarray, settings: ColorSettings) -> list[int]:
+    """The best of some poses of a limb that are apart, by where its joints are, shape (n, 2, 3), metres."""
+    picks: list[int] = []
+    for k in np.argsort(costs, kind="stable").tolist():
+        if len(picks) < settings.kept and all(np.linalg.norm(places[k] - places[one], axis=1).max() > settings.apart_m for one in picks):
+            picks.append(k)
+    return picks
+
+
+def _along_paths(people: PosedPeople, subjects: Mapping[int, Subject], found: Found, fps: float, settings: ColorSettings) -> PosedPeople:
+    """The poses with every limb on its cheapest path."""
+    states, positions = people.states.states.copy(), people.positions.copy()
+    others = {(frame, one.person, one.limb): one for frame, limbs in found.items() for one in limbs}
+    for person, subject in subjects.items():
+        rows = np.flatnonzero((people.persons == person) & np.isfinite(people.states.states).all(axis=1))
+        rows = rows[np.argsort(people.frames[rows])]
+        frames = people.frames[rows]
+        for name, limb in LIMBS.items():
+            choices = [others.get((int(frame), person, name)) for frame in frames]
+            if not any(choices):
+                continue
+            angles = [states[row, limb.dofs][None] if one is None else one.angles for row, one in zip(rows, choices, strict=True)]
+            costs = [np.zeros(1) if one is None else one.costs for one in choices]
+            posed = [_with_angles(states[row], name, some) for row, some in zip(rows, angles, strict=True)]
+            picks = _path(frames, costs, _limb_places(subject.body, posed, name), fps, settings)
+            states[rows] = [some[pick] for some, pick in zip(posed, picks, strict=True)]
+        positions[rows] = landmarks(subject.body, states[rows])
+    return replace(people, poses=replace(people.poses, positions=positions), states=replace(people.states, states=states))
+
+
+def _limb_places(body: BodyModel, posed: Sequence[np.ndarray], name: str) -> list[np.ndarray]:
+    """Where a limb's joints are in each of some poses of each frame, shape (n_poses, 2, 3) each, metres."""
+    places = landmarks(body, np.concatenate(posed))[:, LIMBS[name].landmarks]
+    return np.split(places, np.cumsum([len(some) for some in posed])[:-1])
+
+
+def _path(frames: np.ndarray, costs: Sequence[np.ndarray], places: Sequence[np.ndarray], fps: float, settings: ColorSettings) -> list[int]:
+    """The cheapest way through some poses of a limb a frame."""
+    best, came_from = costs[0], []
+    for k in range(1, len(frames)):
+        way = ((places[k][None] - places[k - 1][:, None]) ** 2).sum(axis=-1).mean(axis=-1)
+        steps = best[:, None] + settings.step_weight * fps / (30.0 * (frames[k] - frames[k - 1])) * way
+        came_from.append(steps.argmin(axis=0))
+        best = steps.min(axis=0) + costs[k]
+    path = [int(best.argmin())]
+    for back in reversed(came_from):
+        path.append(int(back[path[-1]]))
+    return path[::-1]
+
+
+def _images(recording: Recording, frames: Sequence[int]) -> Iterator[tuple[np.ndarray | None, ...]]:
+    """All cameras' images of some frames, rising."""
+    together = np.split(np.array(frames, int), np.flatnonzero(np.diff(frames) > READ_THROUGH) + 1)
+    for some in together:
+        wanted = set(some.tolist())
+        for frame in iterate_frames(recording, int(some[0]), int(some[-1]) + 1):
+            if frame.index in wanted:
+                yield frame.images
