@@ -1,4 +1,4 @@
-"""Curves of a trial over time, as one drawing: speed, knees, elbows, cost."""
+"""Curves of a trial over time, as one drawing: speed, knees, elbows, cost. Knees and elbows are pale where a landmark is doubtful."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from scipy.ndimage import uniform_filter1d
 
 from hmc.landmarks import landmark_index
 from hmc.trials.quality import TrialResult
+from hmc.view.curve import draw_curve
 
 __all__ = ["curves_svg", "flexion", "speed"]
 
@@ -80,12 +81,14 @@ def curves_svg(result: TrialResult) -> str:
         several = result.n_persons > 1
         for person, dash in zip(np.unique(result.poses.persons), dashes, strict=False):
             poses, tracks, rows = result.poses.of(person), result.tracks.of(person), result.states.persons == person
+            doubtful = np.zeros(poses.positions.shape[:2], bool) if poses.doubtful is None else poses.doubtful
             whose = f"person {person}" if several else ""
             _curve(axes[0], tracks.frames, speed(tracks.positions, tracks.frames, result.fps), result.fps, "#333333", dash, whose)
             for axis, sides in zip(axes[1:3], JOINTS.values(), strict=True):
                 for joint, color, side in zip(sides, (LEFT, RIGHT), ("left", "right"), strict=True):
                     label = f"{side}, {whose}" if several else side
-                    _curve(axis, poses.frames, flexion(poses.positions, joint), result.fps, color, dash, label)
+                    pale = doubtful[:, [landmark_index(name) for name in joint]].any(axis=1)
+                    _curve(axis, poses.frames, flexion(poses.positions, joint), result.fps, color, dash, label, pale)
             if result.states.costs is not None:
                 _curve(axes[3], result.states.frames[rows], result.states.costs[rows], result.fps, "#333333", dash, whose)
         names = ("centroid, m/s", "knees bent, deg", "elbows bent, deg", "cost")
@@ -102,12 +105,15 @@ def curves_svg(result: TrialResult) -> str:
     return text.getvalue()
 
 
-def _curve(axis, frames: np.ndarray, values: np.ndarray, fps: float, color: str, dash: str, label: str) -> None:
+def _curve(
+    axis, frames: np.ndarray, values: np.ndarray, fps: float, color: str, dash: str, label: str, pale: np.ndarray | None = None
+) -> None:
     """A curve with gaps where frames are missing."""
     if not len(frames):
         return
-    whole = np.full(frames.max() - frames.min() + 1, np.nan)
+    whole, doubtful = np.full(np.ptp(frames) + 1, np.nan), np.zeros(np.ptp(frames) + 1, bool)
     whole[frames - frames.min()] = values
-    step = max(1, -(-len(whole) // MOST_POINTS))
-    at = np.arange(0, len(whole), step)
-    axis.plot((at + frames.min()) / fps, whole[at], color=color, linestyle=dash, label=label or None)
+    if pale is not None:
+        doubtful[frames - frames.min()] = pale
+    at = np.arange(0, len(whole), max(1, -(-len(whole) // MOST_POINTS)))
+    draw_curve(axis, (at + frames.min()) / fps, whole[at], np.logical_or.reduceat(doubtful, at), label=label, color=color, linestyle=dash)

@@ -16,6 +16,7 @@ from hmc.trials.curves import curves_svg
 from hmc.trials.quality import TrialResult, read_trial_result
 from hmc.trials.session_file import Session, Trial
 from hmc.trials.state import DONE, FAILED, TrialState, read_state
+from hmc.view.curve import PALE_MEANS
 
 __all__ = ["CHECK_PICTURE", "MOMENTS_FOLDER", "VIDEO", "problems_of", "session_page"]
 
@@ -203,6 +204,7 @@ def _pictures(row: _Row, result: TrialResult) -> Iterator[str]:
     if result.n_persons:
         words = "speed of the centroid, how far knees and elbows are bent, and cost over time"
         yield _image(curves_svg(result).encode(), "svg+xml", words, "curves")
+        yield f'<p class="small">Knees and elbows, {PALE_MEANS}.</p>'
 
 
 def _image(data: bytes, kind: str, words: str, style: str = "") -> str:

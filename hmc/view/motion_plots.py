@@ -13,6 +13,7 @@ from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
 from hmc.errors import InputError
 from hmc.landmarks import BONES, landmark_index
+from hmc.view.curve import PALE_MEANS, draw_curve
 from hmc.view.overlay import LEFT, RIGHT, person_color
 
 __all__ = ["animate_sticks", "draw_angles"]
@@ -21,10 +22,8 @@ __all__ = ["animate_sticks", "draw_angles"]
 MOST_FRAMES = 300
 _STYLES = ("-", "--", ":", "-.")
 _COLUMNS = 4
-#: How wide a curve is, points: the same whether or not a stretch of it is doubtful.
+#: How wide a curve is, points.
 LINE = 1.4
-#: How opaque a doubtful stretch of a curve is.
-PALE = 0.35
 
 
 class ShownFigure(Figure):
@@ -63,22 +62,17 @@ def draw_angles(
     persons, some_pale = np.unique(table["person"]).tolist(), False
     for place, (title, columns) in enumerate(panels.items()):
         ax = figure.add_subplot(rows, across, place + 1)
-        sure = []
         for k, person in enumerate(persons):
             own = table["person"] == person
             for column in columns:
                 color = {"l_": _rgb(LEFT), "r_": _rgb(RIGHT)}.get(column[:2], "0.25")
-                times, values = _broken(table["time_s"][own], table[column][own])
                 side = {"l_": "left", "r_": "right"}.get(column[:2], "")
                 label = " ".join(part for part in (side, f"person {person}" if len(persons) > 1 else "") if part)
                 style = _STYLES[k % len(_STYLES)]
                 pale = np.zeros(own.sum(), bool) if doubtful is None else doubtful[column][own]
-                ax.plot(times, values, style, color=color, linewidth=LINE, label=label, alpha=PALE if pale.any() else 1.0)
-                if pale.any():
-                    sure.append((*_broken(table["time_s"][own], np.where(pale, np.nan, table[column][own])), style, color))
-        for times, values, style, color in sure:  # over all pale ones
-            ax.plot(times, values, style, color=color, linewidth=LINE)
-        some_pale |= bool(sure)
+                curve = _broken(table["time_s"][own], table[column][own], pale)
+                draw_curve(ax, *curve, label, color=color, linestyle=style, linewidth=LINE)
+                some_pale |= bool(pale.any())
         ax.set_title(title, fontsize=9)
         ax.tick_params(labelsize=8)
         ax.axhline(0, color="0.8", linewidth=0.8, zorder=0)
@@ -88,11 +82,9 @@ def draw_angles(
             ax.set_xlabel("s", fontsize=8)
     widest = max(figure.axes, key=lambda ax: len(ax.get_legend_handles_labels()[1]))
     if any(widest.get_legend_handles_labels()[1]):
-        for handle in widest.legend(fontsize=7).get_lines():
-            handle.set_alpha(1.0)
+        widest.legend(fontsize=7)
     if some_pale:
-        said = "pale: rests on a landmark that is doubtful", "(its trust in joints.csv)"
-        figure.supxlabel(("\n" if across == 1 else " ").join(said), fontsize=8)
+        figure.supxlabel(PALE_MEANS.replace(" (", "\n(") if across == 1 else PALE_MEANS, fontsize=8)
     return figure
 
 
@@ -166,10 +158,10 @@ def _panels(table: Mapping[str, np.ndarray], names: Sequence[str] | None) -> dic
     return panels
 
 
-def _broken(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The curve, broken where it goes through 180 degrees."""
+def _broken(times: np.ndarray, values: np.ndarray, pale: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The curve and what of it is pale, broken where it goes through 180 degrees."""
     jumps = np.flatnonzero(np.abs(np.diff(values)) > 180) + 1
-    return np.insert(times, jumps, np.nan), np.insert(values, jumps, np.nan)
+    return np.insert(times, jumps, np.nan), np.insert(values, jumps, np.nan), np.insert(pale, jumps, False)
 
 
 def _rgb(bgr: tuple[int, int, int]) -> tuple[float, float, float]:

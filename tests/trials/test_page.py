@@ -1,6 +1,7 @@
 """A session's report from what lies in the trials' folders: whole in itself, and told where something is missing."""
 
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import cv2
@@ -12,11 +13,12 @@ from hmc.io.places import RecordingPlaces
 from hmc.io.results import PoseStates, PoseTable, TrackTable, write_joints, write_pose, write_run, write_tracks
 from hmc.landmarks import LANDMARKS, landmark_index
 from hmc.trials import state as state_file
-from hmc.trials.curves import curves_svg, flexion, speed
+from hmc.trials.curves import MOST_POINTS, curves_svg, flexion, speed
 from hmc.trials.page import session_page
 from hmc.trials.quality import read_trial_result
 from hmc.trials.session_file import Session, SessionPerson, Trial
 from hmc.trials.state import DONE, FAILED, TrialState, only_one, read_state, write_state
+from hmc.view.curve import PALE, PALE_MEANS
 
 N = 8
 
@@ -87,6 +89,7 @@ def test_a_page_is_whole_in_itself(tmp_path):
         "2.00e+00",
         "50 %",
         "0.50 s, frame 5",
+        PALE_MEANS,
     ):
         assert said in page.text, said
     assert "<time>3 s</time>" in text and text == session_page(session_of(tmp_path, "one", "two people", "bad", "later"), tmp_path)
@@ -117,6 +120,30 @@ def test_curves_are_of_what_they_say(tmp_path):
     assert np.allclose(flexion(points, ("l_hip", "l_knee", "l_ankle")), 90)
     text = curves_svg(result)
     assert text == curves_svg(result) and "knees bent, deg" in text and "date" not in text
+
+
+@pytest.mark.parametrize(("landmark", "curves"), [("l_ankle", 1), ("r_hip", 1), ("r_wrist", 1), ("neck", 0)])
+def test_curves_are_pale_where_a_landmark_of_theirs_is_doubtful(tmp_path, landmark, curves):
+    write_result(tmp_path)
+    sure = read_trial_result(tmp_path)
+    trust = np.ones((N, len(LANDMARKS)))
+    sure = replace(sure, poses=replace(sure.poses, trust=trust))
+    assert f"stroke-opacity: {PALE}" not in curves_svg(sure)
+    trust = trust.copy()
+    trust[2:4, landmark_index(landmark)] = 0.1
+    drawn = curves_svg(replace(sure, poses=replace(sure.poses, trust=trust)))
+    assert drawn.count(f"stroke-opacity: {PALE}") == curves
+
+
+def test_a_short_doubt_is_seen_in_a_long_trial(tmp_path):
+    """Of a long trial not every frame is drawn, but what is doubtful between two that are is pale."""
+    write_result(tmp_path)
+    n = 3 * MOST_POINTS
+    positions = np.random.default_rng(0).normal(size=(n, len(LANDMARKS), 3))
+    trust = np.ones((n, len(LANDMARKS)))
+    trust[7, landmark_index("l_knee")] = 0.1
+    poses = PoseTable(np.arange(n), np.zeros(n, int), positions, trust=trust)
+    assert curves_svg(replace(read_trial_result(tmp_path), poses=poses)).count(f"stroke-opacity: {PALE}") == 1
 
 
 def test_only_one_run_works_in_a_folder(tmp_path, monkeypatch):

@@ -19,6 +19,7 @@ from hmc.io.results import PoseTable, TrackTable
 from hmc.landmarks import BONES
 from hmc.metrics.scores import evaluate_pose
 from hmc.view import plots as plotting
+from hmc.view.curve import PALE, draw_curve
 from hmc.view.mosaic import Person
 from hmc.view.overlay import LEFT
 from hmc.voxels.grid import VoxelGrid
@@ -147,3 +148,17 @@ def test_scores_put_the_worst_landmark_first():
     ax = plotting.draw_scores(rows)
     assert ax.get_yticklabels()[0].get_text() == "r_wrist"
     assert ax.patches[0].get_width() == pytest.approx(70) and len(ax.patches) == 15
+
+
+def test_a_curve_is_pale_where_it_is_doubtful_and_its_legend_is_not():
+    ax = plt.figure().add_subplot()
+    times, values = np.arange(6.0), np.array([1.0, 2, np.nan, 4, 5, 6])
+    draw_curve(ax, times, values, np.array([False, True, False, False, True, False]), "left", color="red")
+    draw_curve(ax, times, 2 * values, np.zeros(6, bool), "right", color="blue")
+    below, left, right = ax.lines
+    assert below.get_alpha() == PALE and below.get_zorder() < min(left.get_zorder(), right.get_zorder())
+    np.testing.assert_array_equal(below.get_ydata(), values)
+    np.testing.assert_array_equal(left.get_ydata(), [1, np.nan, np.nan, 4, np.nan, 6])
+    np.testing.assert_array_equal(right.get_ydata(), 2 * values)
+    handles, labels = ax.get_legend_handles_labels()
+    assert handles == [left, right] and labels == ["left", "right"] and {one.get_alpha() for one in handles} == {None}
