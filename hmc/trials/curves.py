@@ -94,6 +94,7 @@ def curves_svg(result: TrialResult) -> str:
         names = ("centroid, m/s", "knees bent, deg", "elbows bent, deg", "cost")
         for axis, name in zip(axes, names, strict=True):
             axis.set_ylabel(name)
+            axis.axhline(0, linewidth=0)  # so that the margin above is a share of all that is shown
             axis.set_ylim(bottom=0)
             if axis.get_legend_handles_labels()[1]:
                 axis.legend(loc="lower right", bbox_to_anchor=(1, 0.98), ncols=4, borderaxespad=0)

@@ -13,7 +13,7 @@ import numpy as np
 
 from hmc.errors import InputError
 from hmc.trials.curves import curves_svg
-from hmc.trials.quality import TrialResult, read_trial_result
+from hmc.trials.quality import TrialResult, read_trial_result, trust_line
 from hmc.trials.session_file import Session, Trial
 from hmc.trials.state import DONE, FAILED, TrialState, read_state
 from hmc.view.curve import PALE_MEANS
@@ -179,8 +179,9 @@ def _trial(row: _Row) -> Iterator[str]:
         yield f"<p>With {escape(', '.join(map(str, trial.persons)))}.</p>"
     if result is not None:
         known = np.isfinite(result.poses.positions).all(axis=(1, 2))
-        fitted = f"; a pose in {100 * known.mean():.0f} % of their frames" if len(known) else ""
-        yield f"<p>{result.n_frames} frames, {result.fps:g} a second: {escape('; '.join(result.lines))}{fitted}.</p>"
+        fitted = [f"a pose in {100 * known.mean():.0f} % of their frames"] if len(known) else []
+        lines = "; ".join([*result.lines, *fitted, *trust_line(result.poses)])
+        yield f"<p>{result.n_frames} frames, {result.fps:g} a second: {escape(lines)}.</p>"
     if row.problems:
         yield "<ul>"
         yield from (f"<li>{escape(line)}</li>" for line in row.problems)

@@ -90,6 +90,7 @@ def test_a_page_is_whole_in_itself(tmp_path):
         "50 %",
         "0.50 s, frame 5",
         PALE_MEANS,
+        "; of 120 landmarks 60 are doubtful (50.0%): pelvis of person 0 in 4 frames, ",
     ):
         assert said in page.text, said
     assert "<time>3 s</time>" in text and text == session_page(session_of(tmp_path, "one", "two people", "bad", "later"), tmp_path)
