@@ -17,6 +17,7 @@ import numpy as np
 
 from hmc.camera.coverage import estimate_room, in_view
 from hmc.camera.model import Camera, Rig, undistort
+from hmc.check.cures import sync_command
 from hmc.check.keypoints import KeypointAgreement, keypoint_agreement, keypoint_findings
 from hmc.check.moments import probe_masks
 from hmc.check.silhouettes import hull_findings
@@ -76,6 +77,11 @@ class Inspection:
         """Whether nothing was found that stands in the way of a run."""
         return not any(finding.severity == "error" for finding in self.findings)
 
+    @property
+    def out_of_time(self) -> bool:
+        """Whether a finding asks for `hmc.check.cures.sync_command`."""
+        return self.recording is not None and any(sync_command(self.recording.path) in finding.sentence for finding in self.findings)
+
 
 def check_recording(path: AnyPlaces, cameras: Sequence[str] | None = None, read_all: bool = False) -> list[Finding]:
     """Find what is wrong with a recording.
@@ -111,6 +117,7 @@ def inspect_recording(path: AnyPlaces, cameras: Sequence[str] | None = None, rea
     settings: dict[str, Any] = {}
     try:
         settings = places.read_settings()
+        say("note", empty_settings(path))
     except InputError as error:
         say("error", [str(error)])
     room = settings.get("room")
@@ -163,7 +170,7 @@ def inspect_recording(path: AnyPlaces, cameras: Sequence[str] | None = None, rea
         say("warning", warnings)
         try:
             keypoints = _compare_keypoints(recording)
-            say("warning", [] if keypoints is None else keypoint_findings(keypoints))
+            say("warning", [] if keypoints is None else keypoint_findings(keypoints, path))
         except InputError as error:
             say("warning", [str(error)])
     return Inspection(_sorted(found), rig, room, images, recording, keypoints)
@@ -210,6 +217,14 @@ def _usable_rig(
         if cameras:
             say("error", [str(error)])
         return None
+
+
+def empty_settings(path: Path) -> list[str]:
+    """A sentence on a ``recording.toml`` without a letter in it, which is as good as none: was it saved?"""
+    file = path / "recording.toml"
+    if not file.is_file() or file.read_text().strip():
+        return []
+    return [f"{file} is empty: frames a second, the room and all else are taken from the videos or estimated; was it saved?"]
 
 
 def named_files(path: Path, names: Sequence[str], settings: Mapping[str, Any]) -> tuple[set[Path], set[str]]:

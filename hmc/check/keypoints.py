@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from hmc.camera.epipolar import epipolar_lines, fundamental_matrices, undistorted_pixels
 from hmc.camera.model import Rig
+from hmc.check.cures import sync_command
 from hmc.io.keypoints import KEYPOINTS, KeypointSource
 from hmc.io.recording import Recording
 
@@ -136,8 +138,14 @@ def keypoint_agreement(recording: Recording, keypoints: KeypointSource) -> Keypo
     )
 
 
-def keypoint_findings(agreement: KeypointAgreement) -> list[str]:
+def keypoint_findings(agreement: KeypointAgreement, recording: Path) -> list[str]:
     """Name the cameras that are off in time or in place.
+
+    Parameters
+    ----------
+    agreement : KeypointAgreement
+    recording : Path
+        Its folder, for the command that finds more.
 
     Returns
     -------
@@ -150,6 +158,7 @@ def keypoint_findings(agreement: KeypointAgreement) -> list[str]:
     late = {c: shift for c in known if (shift := _late(agreement, c))}
     off = [c for c in known if _is_off(agreement, c)]
     names, residual = agreement.cameras, agreement.residual
+    sync = sync_command(recording)
     if len(known) == 2:
         one, other = known
         pair = f"cameras '{names[one]}' and '{names[other]}': their keypoints are {residual[one]:.1f} px from each other's epipolar lines"
@@ -157,8 +166,8 @@ def keypoint_findings(agreement: KeypointAgreement) -> list[str]:
             shift = late.get(other, -late.get(one, 0))
             share = agreement.by_shift[other, MOST_SHIFT + shift]
             then = "" if np.isnan(share) else f", {share * residual[other]:.1f} px"
-            cure = "which of them is early or late cannot be told; `first_frame` for either, as from hmc sync RECORDING, mends it"
-            return [f"{pair}{then} if those of '{names[other]}' are taken {_frames(shift)}; {cure}"]
+            cure = "which of them is early or late cannot be told; `first_frame` for either in recording.toml mends it, and is found by"
+            return [f"{pair}{then} if those of '{names[other]}' are taken {_frames(shift)}; {cure}: {sync}"]
         if residual[one] > MOST_PX * agreement.scales[[one, other]].mean():
             return [f"{pair}; have they moved since they were calibrated? Which one cannot be told from two"]
         return []
@@ -171,7 +180,7 @@ def keypoint_findings(agreement: KeypointAgreement) -> list[str]:
         sentences.append(
             f"camera '{names[c]}': its keypoints are {residual[c]:.1f} px from the other cameras' epipolar lines, {then:.1f} px if they "
             f"are taken {_frames(shift)}; its video seems to begin {_count(shift)} {'before' if shift > 0 else 'after'} the others': "
-            "`first_frame` in recording.toml mends that, and is found by: hmc sync RECORDING"
+            f"`first_frame` in recording.toml mends that, and is found by: {sync}"
         )
     rest = [c for c in off if c not in late]
     if 2 * len(rest) > len(known) or (not sentences and not rest and _median(residual[known] / agreement.scales[known]) > MOST_PX):
@@ -179,7 +188,7 @@ def keypoint_findings(agreement: KeypointAgreement) -> list[str]:
         return [
             *sentences,
             f"keypoints and calibration disagree (px from the other cameras' epipolar lines: {listed}); are they of these videos, "
-            "at their size, and are the cameras synchronised (hmc sync RECORDING)?",
+            f"at their size, and are the cameras synchronised ({sync})?",
         ]
     for c in rest:
         sentences.append(

@@ -10,6 +10,7 @@ import numpy as np
 
 from hmc.camera.coverage import inside_image
 from hmc.camera.model import Camera, project
+from hmc.check.cures import sync_command
 from hmc.check.hull import Hull, best_move, beyond_room, coarse_grid, fine_hull, floor_height, misfit, odd_camera
 from hmc.io.recording import Recording
 
@@ -76,7 +77,7 @@ def disagreements(recording: Recording, masks: Sequence[Sequence[np.ndarray | No
             return [
                 f"camera '{names[index]}': its silhouettes do not fit the calibration and the other cameras', which fit each other; "
                 "is this its video, and has it moved since it was calibrated? If it is early or late, by how much finds: "
-                f"hmc sync {recording.path}"
+                f"{sync_command(recording.path)}"
             ]
     if known.min() >= LEAST_AGREEMENT:
         return []
@@ -84,7 +85,7 @@ def disagreements(recording: Recording, masks: Sequence[Sequence[np.ndarray | No
     return [
         f"silhouettes and calibration disagree (share of each that fits the others': {listed}); "
         f"is each video that of its camera, and are they synchronised? That finds: "
-        f"hmc sync {recording.path}"
+        f"{sync_command(recording.path)}"
     ]
 
 
@@ -138,7 +139,7 @@ def _odd_camera(recording: Recording, hulls: Sequence[Hull]) -> list[str]:
         sentence += f"; {then:.1%} of its own would if they were moved {way}"
     return [
         f"{sentence}; has it moved since it was calibrated, or is its video early or late? When each camera's frames were taken, finds: "
-        f"hmc sync {recording.path}"
+        f"{sync_command(recording.path)}"
     ]
 
 

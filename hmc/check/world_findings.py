@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from shlex import quote
 
 import numpy as np
 
+from hmc.check.cures import sync_command, world_command
 from hmc.check.moments import Masks
 from hmc.check.silhouettes import covered_shares
 from hmc.check.upright import Figure, find_figures, find_ground, level_share
@@ -41,8 +41,7 @@ def world_findings(recording: Recording, masks: Sequence[Masks]) -> list[str]:
     if len(rig) < 3 or not shown:
         return []
     figures = find_figures(rig, shown)
-    place = quote(str(recording.path))
-    cure = f"find up, the floor and the scale by: hmc world {place}"
+    cure = f"find up, the floor and the scale by: {world_command(recording.path)}"
     if not figures:
         return []  # that silhouettes do not meet is told by how far they agree
     ground = find_ground(rig, figures)
@@ -55,7 +54,8 @@ def world_findings(recording: Recording, masks: Sequence[Masks]) -> list[str]:
             said = f"people come out {ground.stature:.3g} m tall"
             covered = covered_shares(recording, shown)
             if np.isfinite(covered).any() and np.nanmedian(covered) < IN_TIME:
-                return [f"{said}, and little of what cameras see fits together: are they out of time (hmc sync {place})? Else {cure}"]
+                sync = sync_command(recording.path)
+                return [f"{said}, and little of what cameras see fits together: are they out of time ({sync})? Else {cure}"]
             return [f"{said}; the calibration is in other units than metres; {cure}"]
     if not any(_inside(one, room) >= INSIDE for one in figures):
         where = ", ".join(f"{value:.1f}" for value in np.median(np.concatenate([one.points for one in figures]), axis=0))

@@ -31,6 +31,7 @@ def add_parser(subparsers) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print one line a finding, a table of keypoints where there are some, and a last line that sums up; write the picture."""
     from hmc.check import inspect_recording
+    from hmc.check.cures import sync_command
 
     inspection = inspect_recording(given_places(args), args.cameras, args.all)
     for finding in inspection.findings:
@@ -51,7 +52,8 @@ def run(args: argparse.Namespace) -> int:
         print(f"picture: {out}")
     if inspection.usable and args.session is None:
         chosen = f" --cameras {quote(','.join(args.cameras))}" if args.cameras else ""
-        print(f"next: hmc pose {quote(str(args.recording))} --out {quote(f'{name}-result')}{chosen}")
+        pose = f"hmc pose {quote(str(args.recording))} --out {quote(f'{name}-result')}{chosen}"
+        print(*([f"next: {sync_command(args.recording)}", f"then: {pose}"] if inspection.out_of_time else [f"next: {pose}"]), sep="\n")
     print(verdict)
     return 0 if inspection.usable else 2
 

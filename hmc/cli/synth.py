@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import os
 from dataclasses import replace
+from shlex import quote
 
 from hmc.cli.common import output_path, positive_float, whole_number
 
@@ -40,9 +41,10 @@ def add_parser(subparsers) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Render."""
+    """Render, and tell what was written."""
     from tqdm import tqdm
 
+    from hmc.io.calibration import read_calibration
     from hmc.synthetic.recipe import check_recipe, load_recipe
     from hmc.synthetic.render import render_recording
 
@@ -55,4 +57,6 @@ def run(args: argparse.Namespace) -> int:
         render_recording(
             recipe, args.out, args.seed, args.workers or os.cpu_count() or 1, on_progress=lambda done, _: bar.update(done - bar.n)
         )
+    print(f"{args.out}: a recording of {len(read_calibration(args.out))} cameras, {recipe.n_frames} frames each, with truth")
+    print(f"next: hmc check {quote(str(args.out))}")
     return 0

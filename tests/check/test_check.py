@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 from hmc.camera.model import Camera, Rig, look_at, project
 from hmc.camera.rig_picture import _free_offset, draw_rig, draw_view, rig_figure, view_cone
 from hmc.check import check_recording, inspect_recording
+from hmc.cli import main
 from hmc.io.calibration import write_calibration
 from hmc.io.files import write_figure
 
@@ -67,14 +68,18 @@ def test_a_camera_that_is_a_few_pixels_off_is_named(tmp_path, ring, camera, degr
     assert 2 <= int(pixels) <= 6 and way == ("right" if degrees > 0 else "left")
 
 
-def test_a_video_that_is_late_is_named(tmp_path, ring):
-    folder = draw_recording(tmp_path / "walk", ring, walk(12), silhouettes=True)
+def test_a_video_that_is_late_is_named(tmp_path, ring, capsys):
+    folder = draw_recording(tmp_path / "a walk", ring, walk(12), silhouettes=True)
     assert sentences(check_recording(folder), "warning") == []
+    pose = f"hmc pose '{folder}' --out 'a walk-result'\n"
+    assert main(["check", str(folder), "--out", str(tmp_path / "rig.png")]) == 0 and f"\nnext: {pose}" in capsys.readouterr().out
     late = folder / "silhouettes" / "cam_02"
     for index in range(11, 0, -1):
         (late / f"{index:06d}.png").write_bytes((late / f"{max(0, index - 2):06d}.png").read_bytes())
     (warning,) = sentences(check_recording(folder), "warning")
-    assert warning.startswith("camera 'cam_02': ") and "early or late" in warning
+    assert warning.startswith("camera 'cam_02': ") and "early or late" in warning and warning.endswith(f"finds: hmc sync '{folder}'")
+    assert main(["check", str(folder), "--out", str(tmp_path / "rig.png")]) == 0
+    assert f"\nnext: hmc sync '{folder}'\nthen: {pose}" in capsys.readouterr().out
 
 
 def test_legs_behind_a_table_are_nobody_s_fault(tmp_path, ring):
@@ -222,6 +227,18 @@ def test_good_recordings_of_another_program_are_quiet(shared_data, name):
 def test_a_calibration_that_is_known_to_be_off_is_told(shared_data):
     (warning,) = sentences(check_recording(shared_data / "bodytrack"), "warning")
     assert warning.startswith("camera 'cam_03': ")
+
+
+def test_settings_with_nothing_in_them_are_told(recording_folder):
+    def told():
+        return [note for note in sentences(check_recording(recording_folder), "note") if "recording.toml is empty" in note]
+
+    file = recording_folder / "recording.toml"
+    for text, n in (("fps = 20\n", 0), ("# room = 3\n", 0), (" \n", 1), ("", 1)):
+        file.write_text(text)
+        assert len(told()) == n
+    file.unlink()
+    assert told() == []
 
 
 def test_background_is_told(recording_folder, ring):

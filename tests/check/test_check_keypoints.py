@@ -30,7 +30,7 @@ def clip(tmp_path):
 
 def told(folder, cameras=None):
     recording = hmc.open_recording(folder, cameras=cameras)
-    return keypoint_findings(keypoint_agreement(recording, open_keypoints(recording)))
+    return keypoint_findings(keypoint_agreement(recording, open_keypoints(recording)), recording.path)
 
 
 def turn(folder, name, degrees):
@@ -78,6 +78,7 @@ def test_a_camera_that_is_early_or_late_is_named_with_its_frames(clip, camera, f
     found, way = re.search(r"if they are taken (\d+) frames? (later|earlier)", sentence).groups()
     assert sentence.startswith(f"camera '{camera}': ") and abs(int(found) - abs(frames)) <= 1
     assert way == ("later" if frames > 0 else "earlier") and "`first_frame`" in sentence
+    assert sentence.endswith(f"hmc sync {clip}")
 
 
 def test_of_two_cameras_none_is_named(clip):
@@ -86,6 +87,7 @@ def test_of_two_cameras_none_is_named(clip):
     shift(clip, "cam_01", 5)
     (sentence,) = told(clip, pair)
     assert "which of them is early or late cannot be told" in sentence and re.search("[456] frames later", sentence)
+    assert sentence.endswith(f"hmc sync {clip}")
     turn(clip, "cam_00", 12)
     (sentence,) = told(clip, pair)
     assert "cannot be told" in sentence
@@ -121,8 +123,8 @@ def test_a_real_detector(shared_data, name):
     print("\n".join(agreement_lines(agreement)))
     known = np.isfinite(agreement.residual)
     assert known.sum() >= 3 and (agreement.residual[known] / agreement.scales[known] < 15).all()
-    assert not [one for one in keypoint_findings(agreement) if "taken" in one] and (name == "balancing") == bool(
-        keypoint_findings(agreement)
+    assert not [one for one in keypoint_findings(agreement, recording.path) if "taken" in one] and (name == "balancing") == bool(
+        keypoint_findings(agreement, recording.path)
     )
 
 

@@ -269,6 +269,8 @@ def test_the_command_renders_and_explains(tmp_path, capsys):
     (tmp_path / "quick.toml").write_text(text)
     assert main(["synth", str(tmp_path / "quick.toml"), "--out", str(tmp_path / "out"), "--quiet", "--workers", "1"]) == 0
     assert open_recording(tmp_path / "out").n_frames == 1
+    said = f"{tmp_path / 'out'}: a recording of 4 cameras, 1 frames each, with truth\nnext: hmc check {tmp_path / 'out'}\n"
+    assert capsys.readouterr().out == said
     assert main(["synth", "demmo", "--out", str(tmp_path / "none"), "--quiet"]) == 2
     assert "did you mean 'demo'" in capsys.readouterr().err
 
