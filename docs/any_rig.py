@@ -5,11 +5,16 @@
 Makes four recordings of one with truth, which differ in their calibration's world alone (the first camera's; squares of a board; Y up
 in millimetres; Z down), and runs `hmc check`, which must refuse each, `hmc world` and `hmc pose` on them, and `hmc pose` on the recording
 as it is. Poses are brought back into the recording's world by the cameras' places, and compared with the truth.
+
+    python docs/any_rig.py RECORDING... --up
+
+tells of each recording how far up is off in the first camera's world, and what `hmc world` says of that.
 """
 
 from __future__ import annotations
 
 import argparse
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -72,29 +77,55 @@ def error_mm(result: Path, source: Path, world: World) -> float:
     return float(1000 * np.nanmean(np.linalg.norm(world.points(found.positions[first]) - places, axis=-1)))
 
 
+def tilt_deg(world: World) -> float:
+    """How far z is from the proper rig's, degrees."""
+    return float(np.rad2deg(np.arccos(np.clip(world.rotation[2, 2], -1, 1))))
+
+
+def compare_up(sources: list[Path], out: Path) -> int:
+    """How many of the recordings are as near as `hmc world` says; the exit code."""
+    near, told = 0, 0
+    for source in sources:
+        proper, folder = open_recording(source), out / f"{source.resolve().name}-up"
+        make(source, folder, in_world(proper.rig, worlds(proper.rig)["first_camera"][0]), proper.fps)
+        said = hmc("world", str(folder), "--unit", "1", "--out", f"{folder}.png")
+        within = re.search(r"to within (\S+) deg", said.stdout)
+        if within is None:
+            print(f"{source.name}: {said.stderr.strip() or 'nothing is told'}")
+            continue
+        off = tilt_deg(back(read_calibration(folder), proper.rig))
+        told, near = told + 1, near + (off <= float(within[1]))
+        print(f"{source.name}: up is {off:.1f} deg off, {within[0]}", flush=True)
+    print(f"{near} of {told} as near as is said")
+    return 0
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("recording", type=Path)
+    parser.add_argument("recordings", type=Path, nargs="+", metavar="RECORDING", help="one, or with --up several")
+    parser.add_argument("--up", action="store_true", help="look at the direction of up alone")
     parser.add_argument("--out", type=Path, default=Path("out/any_rig"))
     parser.add_argument("--frames", default="90")
     given = parser.parse_args()
-    proper = open_recording(given.recording)
+    if given.up:
+        return compare_up(given.recordings, given.out)
+    (source,) = given.recordings
+    proper = open_recording(source)
     options = ["--height", "auto", "--cues", "silhouettes", "--frames", given.frames, "--quiet"]
-    hmc("pose", str(given.recording), "--out", str(given.out / "proper"), *options)
-    lines = [f"proper: {error_mm(given.out / 'proper', given.recording, World()):.1f} mm"]
+    hmc("pose", str(source), "--out", str(given.out / "proper"), *options)
+    lines = [f"proper: {error_mm(given.out / 'proper', source, World()):.1f} mm"]
     for name, (world, words) in worlds(proper.rig).items():
         folder, result = given.out / name, given.out / f"{name}-pose"
-        make(given.recording, folder, in_world(proper.rig, world), proper.fps)
+        make(source, folder, in_world(proper.rig, world), proper.fps)
         checked = hmc("check", str(folder), "--out", str(given.out / f"{name}_check.png"))
         print(*(line for line in checked.stdout.splitlines() if line.startswith("error")), sep="\n")
         print(hmc("world", str(folder), *words, "--out", str(given.out / f"{name}_world.png")).stdout, end="")
         again = hmc("check", str(folder), "--out", str(given.out / f"{name}_check_after.png"))
         hmc("pose", str(folder), "--out", str(result), *options)
         brought = back(read_calibration(folder), proper.rig)
-        tilt = np.rad2deg(np.arccos(np.clip(brought.rotation[2, 2], -1, 1)))
         lines.append(
-            f"{name}: check {checked.returncode}, after world {again.returncode}; {error_mm(result, given.recording, brought):.1f} mm; up "
-            f"{tilt:.1f} deg and the floor {-100 * brought.points(np.zeros(3))[2]:.1f} cm off, scale {1 / brought.scale:.3f}"
+            f"{name}: check {checked.returncode}, after world {again.returncode}; {error_mm(result, source, brought):.1f} mm; up "
+            f"{tilt_deg(brought):.1f} deg and the floor {-100 * brought.points(np.zeros(3))[2]:.1f} cm off, scale {1 / brought.scale:.3f}"
         )
     print(*lines, sep="\n")
     return 0

@@ -37,7 +37,9 @@ STATURE_M = 1.7
 TALL, LEAST_LENGTH = 0.75, 0.75
 #: How far feet are from a plane, metres; the mean long axis of standing bodies from upright (a walker leans 2 or 3 degrees), and a camera
 #: on a stand from level, radians: others are not level at all, and do not count.
-FEET_M, LEAN, MOUNTED = 0.015, np.deg2rad(2.5), np.deg2rad(3.0)
+FEET_M, LEAN, MOUNTED = 0.03, np.deg2rad(2.5), np.deg2rad(3.0)
+#: Feet that are in one square of so many metres count once: there the same cameras see them, or do not, and hulls err alike.
+PLACE_M = 0.3
 #: How near a figure or a camera's edge has to be to a direction to vote for it, radians.
 VOTE = np.deg2rad(12.0)
 #: Share of a hull's points that lie beyond what counts as its lower and upper end.
@@ -259,7 +261,7 @@ def _plane(rig: Rig, standing: Sequence[Figure], up: np.ndarray) -> tuple[np.nda
         low = _feet(height, metre)
         feet.append([*(across @ one.points[height < low + 0.05 * metre].mean(axis=0)), low])
     x = np.array(feet)
-    x = (x - x.mean(axis=0)) / metre
+    x = _by_place((x - x.mean(axis=0)) / metre)
     edges = np.array([min(camera.rotation[:2], key=lambda edge: abs(edge @ up)) for camera in rig])
     level, turn = edges @ up, edges @ across.T
 
@@ -271,6 +273,12 @@ def _plane(rig: Rig, standing: Sequence[Figure], up: np.ndarray) -> tuple[np.nda
     normal = up + fit.x[:2] @ across
     doubt = np.linalg.inv(fit.jac.T @ fit.jac)[:2, :2]
     return normal / np.linalg.norm(normal), float(np.sqrt(np.linalg.eigvalsh(doubt)[-1]))
+
+
+def _by_place(feet: np.ndarray) -> np.ndarray:
+    """The median of feet, (n, 3), of each square of `PLACE_M` in the first two axes."""
+    squares, place = np.unique(np.floor(feet[:, :2] / PLACE_M), axis=0, return_inverse=True)
+    return np.array([np.median(feet[place.ravel() == k], axis=0) for k in range(len(squares))])
 
 
 def _feet(height: np.ndarray, metre: float) -> float:
