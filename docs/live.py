@@ -1,6 +1,6 @@
 """People live: a recording's videos at their own speed, or webcams, through a session; tells who is there, and how many frames it dropped.
 
-    python docs/live.py data/synthetic/tiny --fps 5
+    python docs/live.py out/demo --fps 5
     python docs/live.py my_rig --webcams 0 1 2 3 --fps 5 --picture out/live.jpg
 
 For webcams the folder has the calibration, in the devices' order, and the room has to be empty for the first two seconds.
