@@ -87,7 +87,7 @@ def curves_svg(result: TrialResult) -> str:
             for axis, sides in zip(axes[1:3], JOINTS.values(), strict=True):
                 for joint, color, side in zip(sides, (LEFT, RIGHT), ("left", "right"), strict=True):
                     label = f"{side}, {whose}" if several else side
-                    pale = doubtful[:, [landmark_index(name) for name in joint]].any(axis=1)
+                    pale = np.asarray(doubtful[:, [landmark_index(name) for name in joint]].any(axis=1))
                     _curve(axis, poses.frames, flexion(poses.positions, joint), result.fps, color, dash, label, pale)
             if result.states.costs is not None:
                 _curve(axes[3], result.states.frames[rows], result.states.costs[rows], result.fps, "#333333", dash, whose)

@@ -16,7 +16,6 @@ from hmc.trials.curves import curves_svg
 from hmc.trials.quality import TrialResult, read_trial_result, trust_line
 from hmc.trials.session_file import Session, Trial
 from hmc.trials.state import DONE, FAILED, TrialState, read_state
-from hmc.view.curve import PALE_MEANS
 
 __all__ = ["CHECK_PICTURE", "MOMENTS_FOLDER", "VIDEO", "problems_of", "session_page"]
 
@@ -35,6 +34,7 @@ _MOMENTS_LEGEND = (
     "Left limbs orange, right blue, the trunk in the person's color, the body's flesh as a thin outline; broken lines without white dots: "
     "doubtful."
 )
+_CURVES_LEGEND = "Curves of knees and elbows are pale where they rest on a landmark that is doubtful (its trust in joints.csv)."
 _CHIP = {DONE: "good", FAILED: "bad"}
 
 _STYLE = """
@@ -205,7 +205,7 @@ def _pictures(row: _Row, result: TrialResult) -> Iterator[str]:
     if result.n_persons:
         words = "speed of the centroid, how far knees and elbows are bent, and cost over time"
         yield _image(curves_svg(result).encode(), "svg+xml", words, "curves")
-        yield f'<p class="small">Knees and elbows, {PALE_MEANS}.</p>'
+        yield f'<p class="small">{_CURVES_LEGEND}</p>'
 
 
 def _image(data: bytes, kind: str, words: str, style: str = "") -> str:

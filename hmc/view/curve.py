@@ -9,11 +9,10 @@ import numpy as np
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["PALE", "PALE_MEANS", "draw_curve"]
+__all__ = ["PALE", "draw_curve"]
 
-#: How opaque a doubtful stretch of a curve is, and what is said of it below a plot.
+#: How opaque a doubtful stretch of a curve is.
 PALE = 0.35
-PALE_MEANS = "pale: rests on a landmark that is doubtful (its trust in joints.csv)"
 #: Curves lie over their pale stretches, whoever's they are.
 _BELOW, _ABOVE = 2.0, 2.1
 

@@ -13,7 +13,7 @@ from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
 from hmc.errors import InputError
 from hmc.landmarks import BONES, landmark_index
-from hmc.view.curve import PALE_MEANS, draw_curve
+from hmc.view.curve import draw_curve
 from hmc.view.overlay import LEFT, RIGHT, person_color
 
 __all__ = ["animate_sticks", "draw_angles"]
@@ -84,7 +84,8 @@ def draw_angles(
     if any(widest.get_legend_handles_labels()[1]):
         widest.legend(fontsize=7)
     if some_pale:
-        figure.supxlabel(PALE_MEANS.replace(" (", "\n(") if across == 1 else PALE_MEANS, fontsize=8)
+        said = "pale: rests on a landmark that is doubtful", "(its trust in joints.csv)"
+        figure.supxlabel(("\n" if across == 1 else " ").join(said), fontsize=8)
     return figure
 
 

@@ -18,7 +18,7 @@ from hmc.trials.page import session_page
 from hmc.trials.quality import read_trial_result
 from hmc.trials.session_file import Session, SessionPerson, Trial
 from hmc.trials.state import DONE, FAILED, TrialState, only_one, read_state, write_state
-from hmc.view.curve import PALE, PALE_MEANS
+from hmc.view.curve import PALE
 
 N = 8
 
@@ -89,7 +89,7 @@ def test_a_page_is_whole_in_itself(tmp_path):
         "2.00e+00",
         "50 %",
         "0.50 s, frame 5",
-        PALE_MEANS,
+        "Curves of knees and elbows are pale where",
         "; of 120 landmarks 60 are doubtful (50.0%): pelvis of person 0 in 4 frames, ",
     ):
         assert said in page.text, said
