@@ -4,8 +4,9 @@ Both passes may have an arm folded before a thigh where it hangs beside it: hull
 other. The person's colors do not (`hmc.pose.part_colors`). They are learnt from the limbs that are trusted (`hmc.pose.trust`) and asked of
 the doubtful ones alone:
 
-1. Where patches of a doubtful limb hardly have its colors, other poses of that limb are looked for: drawn at random, then about the best of
-   these, closer and closer. What counts is what the frame asks of any pose (`hmc.pose.steps.polish.fine_objective`) less what colors say.
+1. Where patches of a doubtful limb say less for it than its colors usually do, other poses of that limb are looked for: drawn at random,
+   then about the best of these, closer and closer. What counts is what the frame asks of any pose
+   (`hmc.pose.steps.polish.fine_objective`) less what colors say.
 2. The best of them and the pose as it was make a path through time (Viterbi, 1967): what counts in each frame, and how far the limb moves.
 
 Ours.
@@ -73,8 +74,9 @@ class ColorSettings:
         A limb is asked for in stretches of doubt (`hmc.landmarks.TRUSTED`) in which one of its joints is trusted less than this.
     learn_frames : int
         Frames of the run from which colors are learnt, at most.
-    own_nats, least_patches : float, int
-        A doubtful limb is looked for where so many of its patches or more say less than this for it, nats a patch.
+    own_share, least_nats, least_patches : float, float, int
+        A doubtful limb is looked for where its patches say less for it than this share of what its colors usually say. Where that is less
+        than so many nats a patch, or so few patches are seen, colors tell nothing of it.
     draws, about, best : int
         Poses drawn of any kind; poses a round about the best; how many count as these.
     spreads : tuple of float
@@ -96,12 +98,13 @@ class ColorSettings:
 
     worst: float = 0.7
     learn_frames: int = 24
-    own_nats: float = 0.55
+    own_share: float = 0.8
+    least_nats: float = 0.2
     least_patches: int = 12
-    draws: int = 200
-    about: int = 60
+    draws: int = 120
+    about: int = 50
     best: int = 10
-    spreads: tuple[float, ...] = (0.4, 0.2, 0.1, 0.05)
+    spreads: tuple[float, ...] = (0.4, 0.15, 0.06)
     weight_m2: float = 5e-6
     hand_cap_m: float = 0.005
     margin_m2: float = 2e-5
@@ -292,14 +295,16 @@ class _Asking:
             yield found
 
     def _has_its_colors(self, seen: FrameColors, with_all: Mapping[int, Shown], chain: int, colors: PartColors) -> bool:
-        """Whether patches of a limb bear it out, or hardly any is seen."""
-        said = []
+        """Whether patches of a limb bear it out, or cannot tell."""
+        said, usual, n = 0.0, 0.0, 0
         for camera, there in with_all.items():
-            own = there.chain == chain
-            bins = seen.bins[camera][there.patch[own]]
-            said.append(colors.said(camera, there.kind[own], bins)[bins != OUTSIDE])
-        all_said = np.concatenate(said) if said else np.zeros(0)
-        return len(all_said) < self.settings.least_patches or float(all_said.mean()) >= self.settings.own_nats
+            bins = seen.bins[camera][there.patch]
+            own = (there.chain == chain) & (bins != OUTSIDE)
+            said += float(colors.said(camera, there.kind[own], bins[own]).sum())
+            usual += float(colors.usual[camera][there.kind[own]].sum())
+            n += int(own.sum())
+        tell = n >= self.settings.least_patches and usual >= self.settings.least_nats * n
+        return not tell or said >= self.settings.own_share * usual
 
     def _others(self, frame: int, seen: FrameColors, person: int, name: str, view: PersonView, colors: PartColors) -> OtherLimb:
         settings, limb, subject, chain = self.settings, LIMBS[name], self.subjects[person], _chain(name)

@@ -125,9 +125,12 @@ class PartColors:
     ----------
     ratio : ndarray of float32, shape (n_cameras, n_kinds, n_bins)
         Nats; 0 where a camera has hardly seen the part.
+    usual : ndarray of float32, shape (n_cameras, n_kinds)
+        Its mean over the part's own colors, nats a patch (Kullback and Leibler, 1951): how much they tell.
     """
 
     ratio: np.ndarray
+    usual: np.ndarray
 
     def said(self, camera: int, kind: np.ndarray, bins: np.ndarray) -> np.ndarray:
         """What patches of some bins say for some kinds of parts there, nats; 0 where there is no silhouette or another person."""
@@ -203,7 +206,8 @@ def learn_part_colors(counts: np.ndarray) -> PartColors:
     smooth = ndimage.gaussian_filter(cubes, (0, 0, SMOOTHING, SMOOTHING, SMOOTHING), mode="constant").reshape(counts.shape)
     known = counts.sum(axis=2, keepdims=True) >= LEAST_PATCHES
     likely, whole = _chances(smooth), _chances(smooth.sum(axis=1, keepdims=True))
-    return PartColors(np.where(known, np.clip(np.log(likely / whole), -MOST_NATS, MOST_NATS), 0.0).astype(np.float32))
+    ratio = np.where(known, np.clip(np.log(likely / whole), -MOST_NATS, MOST_NATS), 0.0)
+    return PartColors(ratio.astype(np.float32), (likely * ratio).sum(axis=2).astype(np.float32))
 
 
 def _chances(counts: np.ndarray) -> np.ndarray:

@@ -77,7 +77,7 @@ def test_images_of_one_color_change_nothing(one_pass, no_sweep, monkeypatch):
             yield tuple(None if image is None else np.full_like(image, 120) for image in one)
 
     monkeypatch.setattr(limb_colors, "_images", grey)
-    found = second(lost, run, ColorSettings(own_nats=-0.1))
+    found = second(lost, run, ColorSettings(own_share=2.0, least_nats=-1.0))
     np.testing.assert_allclose(found.positions, lost.positions, atol=1e-9)
 
 

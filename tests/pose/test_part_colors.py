@@ -100,7 +100,8 @@ def test_gains_are_what_the_whole_person_says_less_what_is_said_without_the_limb
     other = STATE.copy()
     other[:2] += 0.35
     before = SKIN.of_another(), SKIN.placed(BODY, other)
-    colors = PartColors(rng.normal(0, 1, (len(RIG), len(KINDS), N_BINS)).astype(np.float32))
+    ratio = rng.normal(0, 1, (len(RIG), len(KINDS), N_BINS)).astype(np.float32)
+    colors = PartColors(ratio, np.zeros(ratio.shape[:2], np.float32))
     bins = {k: rng.integers(-1, N_BINS, int(np.prod(patch_shape(RIG[k], SIDES[k])))).astype(np.int16) for k in (0, 1, 4)}
     frame = FrameColors({k: SIDES[k] for k in bins}, bins)
     states = np.repeat(STATE[None], 6, axis=0)
@@ -139,10 +140,13 @@ def test_each_part_is_borne_out_by_its_own_color_alone():
     at_own = ratio[0][:, own]
     assert (np.diag(at_own) > 1).all() and np.abs(ratio).max() <= MOST_NATS
     assert (at_own[~np.eye(len(KINDS), dtype=bool)] < -0.5).all()
+    # What a part's colors usually say is less than that of its middle: light and shade move them.
+    assert (_learnt(own).usual[0] > 0.5).all() and (_learnt(own).usual[0] < np.diag(at_own)).all()
 
 
 def test_a_person_of_one_color_and_one_who_was_hardly_seen_say_nothing():
-    assert np.abs(_learnt([200] * len(KINDS)).ratio).max() < 1e-6
+    plain = _learnt([200] * len(KINDS))
+    assert np.abs(plain.ratio).max() < 1e-6 and np.abs(plain.usual).max() < 1e-6
     assert not learn_part_colors(no_counts(RIG)).ratio.any()
 
 
