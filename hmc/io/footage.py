@@ -6,7 +6,7 @@ Frames stream: a reader holds one decoder and one image. A frame that cannot be 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
@@ -324,7 +324,9 @@ def _decoded_times(footage: Footage) -> np.ndarray:
     return found
 
 
-def read_footage(footage: Footage, first: int, last: int, on_problem: Callable[[str], None], label: str) -> Iterator[np.ndarray | None]:
+def read_footage(
+    footage: Footage, first: int, last: int, on_problem: Callable[[str], None], label: str, only: Container[int] | None = None
+) -> Iterator[np.ndarray | None]:
     """Frames ``first`` to ``last`` (not included) of one camera, in order.
 
     Parameters
@@ -335,17 +337,19 @@ def read_footage(footage: Footage, first: int, last: int, on_problem: Callable[[
         Called with one line for each fault.
     label : str
         What the lines call this footage.
+    only : container of int, optional
+        Frames that are wanted; others are passed over, as None, as quickly as the files allow.
 
     Yields
     ------
     ndarray, shape (h, w, 3), uint8 BGR, or None
         None where the frame is missing, unreadable or of another size.
     """
-    images = footage.images
+    images, wanted = footage.images, range(first, last) if only is None else only
     if footage.arrays is not None:
         frames: Iterable[np.ndarray | None] = (_as_image(one) for one in islice(_from(footage.arrays, first), last - first))
     else:
-        frames = _read_video(footage, first, last) if images is None else _read_images(images, first, last)
+        frames = _read_video(footage, first, last, wanted) if images is None else _read_images(images, first, last, wanted)
     lost: list[int] = []
 
     def say_lost() -> None:
@@ -360,7 +364,13 @@ def read_footage(footage: Footage, first: int, last: int, on_problem: Callable[[
                     f"{label}: frame {index} is {image.shape[1]} x {image.shape[0]} and not {footage.size[0]} x {footage.size[1]}; left out"
                 )
                 image = None
-            elif image is None and index < footage.n_frames and footage.arrays is None and _should_be_there(footage, index):
+            elif (
+                image is None
+                and index in wanted
+                and index < footage.n_frames
+                and footage.arrays is None
+                and _should_be_there(footage, index)
+            ):
                 lost.append(index)
             # A caller that knows how many frames there are asks for no more after the last.
             if image is not None or index + 1 == last:
@@ -371,7 +381,9 @@ def read_footage(footage: Footage, first: int, last: int, on_problem: Callable[[
 
 
 def _should_be_there(footage: Footage, index: int) -> bool:
-    """Whether files of a camera have a frame."""
+    """Whether files of a camera have a frame; False of images in memory."""
+    if footage.arrays is not None:
+        return False
     return footage.in_file(index) is not None if footage.images is None else index in footage.images
 
 
@@ -390,7 +402,7 @@ def _frames(indices: list[int]) -> str:
     return f"frame {indices[0]}" if len(indices) == 1 else f"frames {indices[0]} to {indices[-1]}"
 
 
-def _read_video(footage: Footage, first: int, last: int) -> Iterator[np.ndarray | None]:
+def _read_video(footage: Footage, first: int, last: int, only: Container[int]) -> Iterator[np.ndarray | None]:
     capture = cv2.VideoCapture(str(footage.path))
     try:
         # Grabbing up to the first frame is slower than seeking, but exact for every codec and container.
@@ -400,16 +412,16 @@ def _read_video(footage: Footage, first: int, last: int) -> Iterator[np.ndarray 
             wanted = footage.in_file(frame)
             while wanted is not None and index < wanted:
                 index = next(grabbed, END)
-            yield capture.retrieve()[1] if index == wanted else None
+            yield capture.retrieve()[1] if index == wanted and frame in only else None
         for _ in range(max(first, footage.n_frames), last):
             yield None
     finally:
         capture.release()
 
 
-def _read_images(images: dict[int, Path], first: int, last: int) -> Iterator[np.ndarray | None]:
+def _read_images(images: dict[int, Path], first: int, last: int, only: Container[int]) -> Iterator[np.ndarray | None]:
     for index in range(first, last):
         try:
-            yield read_image(images[index]) if index in images else None
+            yield read_image(images[index]) if index in images and index in only else None
         except InputError:
             yield None  # told as a frame that cannot be read

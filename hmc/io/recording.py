@@ -8,7 +8,7 @@ Units are metres, Z is up and the floor is at z = 0.
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -271,7 +271,11 @@ def open_recording(
 
 
 def iterate_frames(
-    recording: Recording, first: int | None = None, last: int | None = None, on_problem: Callable[[str], None] | None = None
+    recording: Recording,
+    first: int | None = None,
+    last: int | None = None,
+    on_problem: Callable[[str], None] | None = None,
+    only: Container[int] | None = None,
 ) -> Iterator[Frame]:
     """Read the selected frames in order; memory does not grow with their number.
 
@@ -283,6 +287,8 @@ def iterate_frames(
     on_problem : callable, optional
         Called with one line for everything that was survived: an unreadable image, a camera that drops out. By default the line is
         logged as a warning of the logger "hmc".
+    only : container of int, optional
+        Frames that are wanted, of these; all by default. Others are passed over.
 
     Yields
     ------
@@ -295,12 +301,14 @@ def iterate_frames(
     readers: list[Iterator[np.ndarray | None]] = []
     for views, what in ((recording._footage, ""), (recording._silhouettes, " silhouettes")):
         for camera, view in zip(recording.rig, views, strict=True):
-            readers.append(iter([None] * 0) if view is None else read_footage(view, first, last, report, f"{camera.name}{what}"))
+            readers.append(iter([None] * 0) if view is None else read_footage(view, first, last, report, f"{camera.name}{what}", only))
     n, factors = len(recording.rig), recording.factors
     masks_of = recording._silhouettes
     try:
         for index in range(first, last):
             found = [next(reader, None) for reader in readers]
+            if only is not None and index not in only:
+                continue
             images = tuple(None if image is None else reduce_image(image, factor) for image, factor in zip(found[:n], factors, strict=True))
             masks = tuple(
                 None if image is None or view is None else reduce_mask(to_mask(image, view), factor)

@@ -16,6 +16,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -58,10 +60,10 @@ if TYPE_CHECKING:
 
 __all__ = ["ColorSettings", "Found", "OtherLimb", "limbs_by_color"]
 
-#: Of the random numbers of a frame (`hmc.pose.method.other_rng`): of the first limb; the others' follow.
+#: Of the random numbers of a frame (`hmc.pose.method.other_rng`); the limb's chain is added.
 PURPOSE = 3
-#: Frames so near to one another are read in one go; files are opened anew for others.
-READ_THROUGH = 15
+#: Frames whose colors are in memory at a time.
+LOT = 64
 
 
 @dataclass(frozen=True)
@@ -98,13 +100,13 @@ class ColorSettings:
 
     worst: float = 0.7
     learn_frames: int = 24
-    own_share: float = 0.8
+    own_share: float = 1.2
     least_nats: float = 0.2
     least_patches: int = 12
-    draws: int = 120
-    about: int = 50
+    draws: int = 200
+    about: int = 60
     best: int = 10
-    spreads: tuple[float, ...] = (0.4, 0.15, 0.06)
+    spreads: tuple[float, ...] = (0.4, 0.2, 0.1, 0.05)
     weight_m2: float = 5e-6
     hand_cap_m: float = 0.005
     margin_m2: float = 2e-5
@@ -178,8 +180,8 @@ def limbs_by_color(
         skins = {number: skin_of(subject.body) for number, subject in subjects.items()}
         sides = patch_sides(recording.rig, np.nanmedian(people.positions[:, 0], axis=0))
         asking = _Asking(replace(pass_, states=people.states), subjects, people, doubts, settings, skins, sides)
-        colors = asking.learn()
-        for frame, limbs in zip(frames, pass_.each(lambda some: asking.search(some, colors), frames), strict=True):
+        steps = asking.search_all(frames, asking.learn())
+        for frame, limbs in zip(frames, pass_.run.progress(steps, len(frames)) if pass_.run.progress else steps, strict=True):
             found[frame] = limbs
             keep(frame, limbs)
     return _along_paths(people, subjects, found, recording.fps, settings) if found else people
@@ -240,10 +242,12 @@ class _Asking:
         return self.pass_.recording.rig
 
     def colors_in(self, frames: Sequence[int]) -> Iterator[FrameColors]:
-        """The patches of some frames, rising."""
+        """The patches of some frames, rising; what cannot be read was told when silhouettes were made."""
         masks = kept_frames(self.pass_.run.masks or "", self.pass_.run.key, frames) or ()
-        for step, images in zip(masks, _images(self.pass_.recording, frames), strict=True):
-            yield frame_colors(self.rig, images, step.masks, self.sides)
+        # Read in one go: to open a video in the middle takes as long as to pass over what is before.
+        images = iterate_frames(self.pass_.recording, frames[0], frames[-1] + 1, on_problem=lambda _: None, only=set(frames))
+        for step, frame in zip(masks, images, strict=True):
+            yield frame_colors(self.rig, frame.images, step.masks, self.sides)
 
     def rows(self, frame: int) -> dict[int, int]:
         """The row of everybody with a pose in a frame."""
@@ -263,27 +267,29 @@ class _Asking:
 
     def learn(self) -> dict[int, PartColors]:
         """Everybody's colors, from frames of the whole run: of the trunk and of limbs that are not doubtful or less so than usually."""
+        counts = {person: no_counts(self.rig) for person in self.subjects}
+        frames = spread_frames(np.unique(self.people.frames), self.settings.learn_frames)
+        for frame, colors in zip(frames, self.colors_in(frames), strict=True):
+            for person, row in self.rows(frame).items():
+                sure = [0, *(1 + np.flatnonzero(self.doubts.sure[:, row])).tolist()]
+                for camera, seen in self.shown(frame, colors, person).items():
+                    count_colors(counts[person], camera, seen, colors.bins[camera], sure)
+        return {person: learn_part_colors(own) for person, own in counts.items()}
 
-        def count(some: Sequence[int]) -> Iterator[dict[int, np.ndarray]]:
-            for frame, colors in zip(some, self.colors_in(some), strict=True):
-                counts = {}
-                for person, row in self.rows(frame).items():
-                    counts[person] = no_counts(self.rig)
-                    sure = [0, *(1 + np.flatnonzero(self.doubts.sure[:, row])).tolist()]
-                    for camera, seen in self.shown(frame, colors, person).items():
-                        count_colors(counts[person], camera, seen, colors.bins[camera], sure)
-                yield counts
+    def search_all(self, frames: Sequence[int], colors: Mapping[int, PartColors]) -> Iterator[list[OtherLimb]]:
+        """Of each frame what `search` finds; images are read by this process alone, lot by lot."""
+        seen = self.colors_in(frames)
+        for start in range(0, len(frames), LOT):
+            some = frames[start : start + LOT]
+            own = dict(zip(some, islice(seen, len(some)), strict=True))
+            yield from self.pass_.each(partial(self.search, own, colors), some)
 
-        total = {person: no_counts(self.rig) for person in self.subjects}
-        for counts in self.pass_.each(count, spread_frames(np.unique(self.people.frames), self.settings.learn_frames)):
-            for person, own in counts.items():
-                total[person] += own
-        return {person: learn_part_colors(counts) for person, counts in total.items()}
-
-    def search(self, frames: Sequence[int], colors: Mapping[int, PartColors]) -> Iterator[list[OtherLimb]]:
-        """Of each frame the doubtful limbs that hardly have their own colors, with other poses of them."""
-        for seen, (frame, views) in zip(self.colors_in(frames), self.pass_.views_of(frames), strict=True):
-            found = []
+    def search(
+        self, in_frame: Mapping[int, FrameColors], colors: Mapping[int, PartColors], frames: Sequence[int]
+    ) -> Iterator[list[OtherLimb]]:
+        """Of each of some frames the doubtful limbs that have not their own colors, with other poses of them."""
+        for frame, views in self.pass_.views_of(frames):
+            found, seen = [], in_frame[frame]
             for person, row in self.rows(frame).items():
                 view, asked = views.get(person), [name for name in LIMBS if self.doubts.asked[_chain(name) - 1, row]]
                 if view is None or not asked or not shows_enough(view.target):
@@ -400,13 +406,3 @@ def _path(frames: np.ndarray, costs: Sequence[np.ndarray], places: Sequence[np.n
     for back in reversed(came_from):
         path.append(int(back[path[-1]]))
     return path[::-1]
-
-
-def _images(recording: Recording, frames: Sequence[int]) -> Iterator[tuple[np.ndarray | None, ...]]:
-    """All cameras' images of some frames, rising."""
-    together = np.split(np.array(frames, int), np.flatnonzero(np.diff(frames) > READ_THROUGH) + 1)
-    for some in together:
-        wanted = set(some.tolist())
-        for frame in iterate_frames(recording, int(some[0]), int(some[-1]) + 1):
-            if frame.index in wanted:
-                yield frame.images

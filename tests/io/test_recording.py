@@ -77,6 +77,19 @@ def test_seeking_is_exact_where_frames_depend_on_each_other(recording_folder, ri
             np.testing.assert_array_equal(image, expected)
 
 
+@pytest.mark.parametrize("kind", ["videos", "images"])
+def test_chosen_frames_are_those_of_reading_all_and_others_are_not_missed(recording_folder, ring, kind):
+    if kind == "images":
+        shutil.rmtree(recording_folder / "videos")
+        for camera in ring:
+            write_images(recording_folder / "images" / camera.name, range(12), camera.size)
+    problems = []
+    recording = open_recording(recording_folder)
+    chosen = list(iterate_frames(recording, 1, 8, problems.append, only={2, 3, 7, 11}))
+    assert [frame.index for frame in chosen] == [2, 3, 7] and not problems
+    assert [indices(frame) for frame in chosen] == [[k] * len(ring) for k in (2, 3, 7)]
+
+
 def test_settings_are_read(recording_folder):
     (recording_folder / "recording.toml").write_text(
         'name = "walk"\nfps = 50\nframes = 9\nunits = "m"\nup = "z"\npersons = 2\n'

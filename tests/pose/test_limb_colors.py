@@ -70,13 +70,13 @@ def test_an_arm_before_the_chest_is_put_where_its_colors_are(one_pass, no_sweep)
 def test_images_of_one_color_change_nothing(one_pass, no_sweep, monkeypatch):
     people, run = one_pass
     lost = with_the_arm_before_the_chest(people)
-    images = limb_colors._images
+    read = limb_colors.iterate_frames
 
-    def grey(recording, frames):
-        for one in images(recording, frames):
-            yield tuple(None if image is None else np.full_like(image, 120) for image in one)
+    def grey(*args, **options):
+        for frame in read(*args, **options):
+            yield replace(frame, images=tuple(None if image is None else np.full_like(image, 120) for image in frame.images))
 
-    monkeypatch.setattr(limb_colors, "_images", grey)
+    monkeypatch.setattr(limb_colors, "iterate_frames", grey)
     found = second(lost, run, ColorSettings(own_share=2.0, least_nats=-1.0))
     np.testing.assert_allclose(found.positions, lost.positions, atol=1e-9)
 
