@@ -34,6 +34,7 @@ from hmc.motion.smoothing import stretches
 from hmc.pose.clear_views import kept_borne_out
 from hmc.pose.method import Subject, other_rng
 from hmc.pose.part_colors import (
+    ColorSettings,
     FrameColors,
     PartColors,
     Shown,
@@ -58,61 +59,12 @@ if TYPE_CHECKING:
     from hmc.pose.follow import PosedPeople
     from hmc.pose.second_pass import SecondPass
 
-__all__ = ["ColorSettings", "Found", "OtherLimb", "limbs_by_color"]
+__all__ = ["Found", "OtherLimb", "limbs_by_color"]
 
 #: Of the random numbers of a frame (`hmc.pose.method.other_rng`); the limb's chain is added.
 PURPOSE = 3
 #: Frames whose colors are in memory at a time.
 LOT = 64
-
-
-@dataclass(frozen=True)
-class ColorSettings:
-    """When colors are asked where a limb is, and what they weigh.
-
-    Parameters
-    ----------
-    worst : float
-        A limb is asked for in stretches of doubt (`hmc.landmarks.TRUSTED`) in which one of its joints is trusted less than this.
-    learn_frames : int
-        Frames of the run from which colors are learnt, at most.
-    own_share, least_nats, least_patches : float, float, int
-        A doubtful limb is looked for where its patches say less for it than this share of what its colors usually say. Where that is less
-        than so many nats a patch, or so few patches are seen, colors tell nothing of it.
-    draws, about, best : int
-        Poses drawn of any kind; poses a round about the best; how many count as these.
-    spreads : tuple of float
-        How far about them, radians, round by round.
-    weight_m2 : float
-        Square metres of cost that one nat a camera outweighs.
-    hand_cap_m : float
-        How far outside the hull a hand counts at most, metres (`SymmetricSettings`): where colors tell where it is, silhouettes that lost
-        it are not asked.
-    margin_m2 : float
-        What a new pose of a limb has to be cheaper by, square metres: of many that are drawn one is always a little better.
-    step_weight : float
-        What the squared way of a limb's joints from one frame to the next costs, at 30 frames a second: square metres a square metre.
-    kept : int
-        Poses of a limb, beside the one that it had, through which a path is looked for.
-    apart_m : float
-        How far these are from one another.
-    """
-
-    worst: float = 0.7
-    learn_frames: int = 24
-    own_share: float = 1.2
-    least_nats: float = 0.2
-    least_patches: int = 12
-    draws: int = 200
-    about: int = 60
-    best: int = 10
-    spreads: tuple[float, ...] = (0.4, 0.2, 0.1, 0.05)
-    weight_m2: float = 5e-6
-    hand_cap_m: float = 0.005
-    margin_m2: float = 2e-5
-    step_weight: float = 2e-3
-    kept: int = 4
-    apart_m: float = 0.03
 
 
 @dataclass(frozen=True)

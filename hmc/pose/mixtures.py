@@ -17,7 +17,7 @@ from hmc.body.limbs import CHAIN_OF_DOF, LIMBS
 from hmc.body.model import BodyModel
 from hmc.pose.anew import AnewSettings
 from hmc.pose.legs import LegSettings, choose_legs, limb_points
-from hmc.pose.limb_colors import ColorSettings
+from hmc.pose.part_colors import ColorSettings
 from hmc.pose.steps.polish import PolishSettings
 from hmc.pose.turned import TurnedSettings
 

@@ -29,12 +29,12 @@ METHOD = OBJECTIVES | {"pose.method"}
 STEPS = METHOD | {"pose.steps"}
 STARTS = STEPS | {"pose.starts"}
 PERSON = STARTS | {"pose.legs", "pose.person"}
-MIXTURES = STEPS | {"pose.anew", "pose.legs", "pose.mixtures", "pose.turned"}
+MIXTURES = STEPS | {"pose.anew", "pose.legs", "pose.mixtures", "pose.part_colors", "pose.turned"}
 FINISHED = MOTION | {"view"}
 FOLLOWING = PERSON | FINISHED | {"pose.finished", "pose.records", "pose.follow", "pose.keypoint_cues", "pose.keypoint_sides"}
 METHODS = STARTS | MIXTURES | {"pose.recovery", "pose.methods"}
 POSE = METHODS | FOLLOWING | {"pose.backward", "pose.clear_views", "pose.keypoint_tracks", "pose.occluders", "pose.registry"}
-POSE |= {"pose.contacts", "pose.keypoint_views", "pose.trust", "pose.trust_model"}
+POSE |= {"pose.contacts", "pose.keypoint_views", "pose.limb_colors", "pose.second_pass", "pose.trust", "pose.trust_model"}
 METRICS = IO | {"metrics"}
 VIEW = VOXELS | {"body", "view"}
 EVERYTHING = POSE | METRICS | VIEW | {"motion", "check", "synthetic", "plugins"}
@@ -68,7 +68,10 @@ MAY_IMPORT = {
     "pose.turned": STARTS,
     "pose.mixtures": MIXTURES,
     "pose.occluders": VIEWS,
-    "pose.backward": FOLLOWING | MIXTURES | {"pose.backward", "pose.contacts", "pose.occluders"},
+    "pose.part_colors": VIEWS,
+    "pose.second_pass": FOLLOWING | MIXTURES | {"pose.occluders"},
+    "pose.limb_colors": FOLLOWING | MIXTURES | {"pose.clear_views", "pose.second_pass", "pose.trust"},
+    "pose.backward": FOLLOWING | MIXTURES | {"pose.backward", "pose.contacts", "pose.limb_colors", "pose.occluders", "pose.second_pass"},
     "pose.contacts": BODY | IO,
     "pose.clear_views": FOLLOWING,
     "pose.trust": FOLLOWING | {"pose.clear_views", "pose.trust_model"},

@@ -16,7 +16,7 @@ from hmc.landmarks import LANDMARKS
 from hmc.pose import limb_colors
 from hmc.pose.backward import backward
 from hmc.pose.follow import FollowOptions
-from hmc.pose.limb_colors import ColorSettings
+from hmc.pose.part_colors import ColorSettings
 from hmc.pose.registry import pose_method
 from hmc.voxels.run_options import RunOptions
 
