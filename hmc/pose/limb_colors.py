@@ -132,8 +132,7 @@ def limbs_by_color(
         skins = {number: skin_of(subject.body) for number, subject in subjects.items()}
         sides = patch_sides(recording.rig, np.nanmedian(people.positions[:, 0], axis=0))
         asking = _Asking(replace(pass_, states=people.states), subjects, people, doubts, settings, skins, sides)
-        steps = asking.search_all(frames, asking.learn())
-        for frame, limbs in zip(frames, pass_.run.progress(steps, len(frames)) if pass_.run.progress else steps, strict=True):
+        for frame, limbs in zip(frames, asking.search_all(frames, asking.learn()), strict=True):
             found[frame] = limbs
             keep(frame, limbs)
     return _along_paths(people, subjects, found, recording.fps, settings) if found else people

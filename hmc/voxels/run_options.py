@@ -38,7 +38,8 @@ class RunOptions:
     workers : int
         Processes over which the work is spread, where they may be forked (`hmc.processes`). The result does not depend on it.
     on_phase : callable, optional
-        Called with what is done from now on, where that takes longer than a frame: "first pose", "following", "fitting bodies".
+        Called with what is done from now on, where that takes longer than a frame: "first pose", "following", "fitting bodies",
+        "asking colors".
     on_fault : callable
         Called at the end with each time in which a camera did not fit the others.
     """
