@@ -131,11 +131,21 @@ def limbs_by_color(
     if frames:
         skins = {number: skin_of(subject.body) for number, subject in subjects.items()}
         sides = patch_sides(recording.rig, np.nanmedian(people.positions[:, 0], axis=0))
-        asking = _Asking(replace(pass_, states=people.states), subjects, people, doubts, settings, skins, sides)
+        rows = _rows_of(people, list(subjects))
+        asking = _Asking(replace(pass_, states=people.states), subjects, people, doubts, settings, rows, skins, sides)
         for frame, limbs in zip(frames, asking.search_all(frames, asking.learn()), strict=True):
             found[frame] = limbs
             keep(frame, limbs)
     return _along_paths(people, subjects, found, recording.fps, settings) if found else people
+
+
+def _rows_of(people: PosedPeople, persons: Sequence[int]) -> dict[int, dict[int, int]]:
+    """By frame, and by person, the row of everybody with a pose."""
+    rows: dict[int, dict[int, int]] = {frame: {} for frame in people.frames.tolist()}
+    known = np.isin(people.persons, persons) & np.isfinite(people.states.states).all(axis=1)
+    for row in np.flatnonzero(known).tolist():
+        rows[int(people.frames[row])][int(people.persons[row])] = row
+    return rows
 
 
 @dataclass(frozen=True)
@@ -173,6 +183,8 @@ class _Asking:
     people : PosedPeople
     doubts : _Doubts
     settings : ColorSettings
+    rows : mapping of int to mapping of int to int
+        By frame, and by person, the row of everybody with a pose.
     skins : mapping of int to Skin
         Everybody's.
     sides : tuple of int
@@ -184,6 +196,7 @@ class _Asking:
     people: PosedPeople
     doubts: _Doubts
     settings: ColorSettings
+    rows: Mapping[int, Mapping[int, int]]
     skins: Mapping[int, Skin]
     sides: tuple[int, ...]
 
@@ -200,16 +213,10 @@ class _Asking:
         for step, frame in zip(masks, images, strict=True):
             yield frame_colors(self.rig, frame.images, step.masks, self.sides)
 
-    def rows(self, frame: int) -> dict[int, int]:
-        """The row of everybody with a pose in a frame."""
-        people = self.people
-        known = (people.frames == frame) & np.isin(people.persons, list(self.subjects)) & np.isfinite(people.states.states).all(axis=1)
-        return {int(people.persons[row]): int(row) for row in np.flatnonzero(known)}
-
     def shown(self, frame: int, colors: FrameColors, person: int, without: int | None = None) -> dict[int, Shown]:
         """What each camera shows of one person, behind and before all others; without one of the chains."""
         everybody = []
-        for other, row in self.rows(frame).items():
+        for other, row in self.rows[frame].items():
             skin = self.skins[other] if other == person else self.skins[other].of_another()
             if other == person and without is not None:
                 skin = skin.where(skin.chain != without)
@@ -221,7 +228,7 @@ class _Asking:
         counts = {person: no_counts(self.rig) for person in self.subjects}
         frames = spread_frames(np.unique(self.people.frames), self.settings.learn_frames)
         for frame, colors in zip(frames, self.colors_in(frames), strict=True):
-            for person, row in self.rows(frame).items():
+            for person, row in self.rows[frame].items():
                 sure = [0, *(1 + np.flatnonzero(self.doubts.sure[:, row])).tolist()]
                 for camera, seen in self.shown(frame, colors, person).items():
                     count_colors(counts[person], camera, seen, colors.bins[camera], sure)
@@ -241,7 +248,7 @@ class _Asking:
         """Of each of some frames the doubtful limbs that have not their own colors, with other poses of them."""
         for frame, views in self.pass_.views_of(frames):
             found, seen = [], in_frame[frame]
-            for person, row in self.rows(frame).items():
+            for person, row in self.rows[frame].items():
                 view, asked = views.get(person), [name for name in LIMBS if self.doubts.asked[_chain(name) - 1, row]]
                 if view is None or not asked or not shows_enough(view.target):
                     continue
@@ -265,7 +272,7 @@ class _Asking:
 
     def _others(self, frame: int, seen: FrameColors, person: int, name: str, view: PersonView, colors: PartColors) -> OtherLimb:
         settings, limb, subject, chain = self.settings, LIMBS[name], self.subjects[person], _chain(name)
-        state = self.people.states.states[self.rows(frame)[person]]
+        state = self.people.states.states[self.rows[frame][person]]
         rng = other_rng(self.pass_.rng(person, frame), PURPOSE + chain)
         polish = self.pass_.settings.polish
         polish = replace(polish, symmetric=replace(polish.symmetric, hand_cap_m=settings.hand_cap_m))
