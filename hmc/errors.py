@@ -13,6 +13,15 @@ class InputError(ValueError):
     """
 
 
+def is_utf8(name: str) -> bool:
+    """Whether a name of the file system is text: others are of another system's encoding, neither OpenCV nor TOML takes them."""
+    try:
+        name.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
 def system_words(error: OSError) -> str:
     """What the system says of a file that it did not let be read or written; in the middle of writing it names none."""
     place = "" if error.filename is None else f"{error.filename}: "

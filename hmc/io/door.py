@@ -23,11 +23,11 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from hmc.errors import InputError
+from hmc.errors import InputError, is_utf8
 
 __all__ = [
-    "LIMITS", "MAX_DEPTH", "MAX_FRAME_NUMBER", "check_file", "check_image", "kept_arrays", "limit", "open_text", "read_arrays",
-    "read_bytes", "read_image", "read_json_file", "read_text_file", "read_toml_file", "read_xml_file",
+    "LIMITS", "MAX_DEPTH", "MAX_FRAME_NUMBER", "check_file", "check_folder", "check_image", "kept_arrays", "limit", "open_text",
+    "read_arrays", "read_bytes", "read_image", "read_json_file", "read_text_file", "read_toml_file", "read_xml_file",
 ]  # fmt: skip
 
 #: What each environment variable raises, and how much is read where it is not set.
@@ -77,8 +77,10 @@ def check_file(path: str | Path, most: str = "") -> int:
     Raises
     ------
     InputError
-        When there is none, it is something else (a folder, a pipe, a device) or larger than that.
+        When there is none, it is something else (a folder, a pipe, a device) or larger than that, or has a name that is no text.
     """
+    if not is_utf8(os.fspath(path)):
+        raise InputError(f"{os.fspath(path)!r}: its name is no text in UTF-8; rename it")
     try:
         found = os.stat(path)
     except (OSError, ValueError) as error:
@@ -92,6 +94,18 @@ def check_file(path: str | Path, most: str = "") -> int:
             f"set {most} higher"
         )
     return found.st_size
+
+
+def check_folder(path: str | Path) -> None:
+    """Refuse what bears a folder's name and is none: a file, or a link to a disk that is not there. No such name at all is fine.
+
+    Raises
+    ------
+    InputError
+    """
+    if os.path.lexists(path) and not os.path.isdir(path):
+        what = "a link that leads nowhere" if os.path.islink(path) and not os.path.exists(path) else "a file"
+        raise InputError(f"{path}: {what}, where a folder should be; put the folder there, or remove it")
 
 
 def read_bytes(path: str | Path, most: str = "HMC_MAX_TABLE_MB") -> bytes:

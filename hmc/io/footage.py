@@ -17,7 +17,7 @@ import numpy as np
 from hmc.errors import InputError
 from hmc.io.calibration import natural_key
 from hmc.io.door import MAX_FRAME_NUMBER, check_file, limit, read_image
-from hmc.io.naming import IMAGE_SUFFIXES, VIDEO_SUFFIXES
+from hmc.io.naming import IMAGE_SUFFIXES, VIDEO_SUFFIXES, footage_items, item_name, shown
 
 __all__ = [
     "IMAGE_SUFFIXES",
@@ -37,6 +37,10 @@ __all__ = [
 MAX_FAILURES = 25
 #: Frames a second of a video of which nothing tells them.
 DEFAULT_FPS = 30.0
+#: So much of a file tells text from a video.
+HEAD_BYTES = 64
+#: Letters, digits and signs of text, in ASCII.
+TEXT_BYTES = frozenset({*range(0x20, 0x7F), *b"\t\r\n"})
 #: After a video's last frame.
 END = 2**62
 
@@ -104,18 +108,15 @@ def find_footage(folder: Path, name: str, first_number: int | None = None, count
     Raises
     ------
     InputError
-        When it is there but cannot be read.
+        When it is there but cannot be read, or there are two.
     """
-    if not folder.is_dir():
-        return None
-    if (folder / name).is_dir():
-        return _open_folder(folder / name, first_number, count)
-    for path in sorted(folder.iterdir()):
-        if path.stem == name and path.suffix.lower() in VIDEO_SUFFIXES:
-            return open_video(path, count)
-        if path.stem == name and path.suffix.lower() in IMAGE_SUFFIXES:
-            return _footage_of_images(path, {0: path})
-    return None
+    own = [item for item in footage_items(folder) if item_name(item) == name]
+    if len(own) > 1:
+        raise InputError(
+            f"{folder}: both {own[0].name} and {own[1].name} are of camera '{name}'; leave one, or say which in recording.toml: "
+            f'{folder.name} = {{ "{name}" = "{folder.name}/{own[0].name}" }}'
+        )
+    return open_files(own, first_number, count)
 
 
 def open_files(files: Sequence[Path], first_number: int | None = None, count: bool = True) -> Footage | None:
@@ -129,12 +130,12 @@ def open_files(files: Sequence[Path], first_number: int | None = None, count: bo
         return open_video(path, count)
     if len(files) == 1:
         return _footage_of_images(path, {0: path})
-    return _footage_of_images(path.parent, number_files(files), first_number or 0)
+    return _footage_in_order(path.parent, files, first_number)
 
 
 def _open_folder(folder: Path, first_number: int | None, count: bool) -> Footage:
     """A camera's folder: its images, or the one video in it, as cameras that name files themselves leave it."""
-    videos = sorted(path for path in folder.iterdir() if path.suffix.lower() in VIDEO_SUFFIXES)
+    videos = [path for path in shown(folder) if path.suffix.lower() in VIDEO_SUFFIXES]
     if not videos or number_images(folder):
         return open_images(folder, first_number)
     if len(videos) > 1:
@@ -161,6 +162,8 @@ def open_video(path: Path, count: bool = True) -> Footage:
         When the file cannot be opened or holds no frame.
     """
     check_file(path)
+    if _is_text(path):
+        raise InputError(f"{path}: is text, no video (a list of other files?); put the video in its place")
     capture = cv2.VideoCapture(str(path))
     try:
         width, height = (capture.get(prop) for prop in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT))
@@ -180,6 +183,16 @@ def open_video(path: Path, count: bool = True) -> Footage:
     n_frames = stated if believed else _count(path)
     notes = (f"{path.name}: its header states {stated} frames, {n_frames} can be read (cut off?)",) if stated > n_frames else ()
     return Footage(path, n_frames, (image.shape[1], image.shape[0]), fps=fps if 0 < fps < 1e4 else None, notes=notes)
+
+
+def _is_text(path: Path) -> bool:
+    """Whether a file begins with letters alone, which no video does: decoders take lists of other files, which may lie anywhere."""
+    try:
+        with open(path, "rb") as file:
+            head = file.read(HEAD_BYTES)
+    except OSError:
+        return False  # the decoder tells that it cannot be read
+    return bool(head) and all(byte in TEXT_BYTES for byte in head)
 
 
 def _count(path: Path) -> int:
@@ -213,7 +226,8 @@ def _grab(capture: cv2.VideoCapture) -> Iterator[int]:
 
 
 def open_images(folder: Path, first_number: int | None = None) -> Footage:
-    """Look a folder of images over. The last number in a file's name is its frame; without numbers, the natural order counts.
+    """Look a folder of images over. The last number in a file's name is its frame; without numbers that tell all of them apart, the natural
+    order counts.
 
     Parameters
     ----------
@@ -224,22 +238,52 @@ def open_images(folder: Path, first_number: int | None = None) -> Footage:
     Raises
     ------
     InputError
-        When the folder has no image or the first one cannot be read.
+        When the folder has no image, none can be read, or two of one name.
     """
-    return _footage_of_images(folder, number_images(folder), first_number or 0)
+    return _footage_in_order(folder, _images_in(folder), first_number)
 
 
 def number_images(folder: Path) -> dict[int, Path]:
     """The images of a folder by the number in their names (or their place in the natural order), before any shift."""
-    return number_files(path for path in folder.iterdir() if path.suffix.lower() in IMAGE_SUFFIXES)
+    return number_files(_images_in(folder))
 
 
 def number_files(files: Iterable[Path]) -> dict[int, Path]:
     """As `number_images`, of the images given."""
     files = sorted(files, key=lambda path: natural_key(path.name))
-    numbers = [re.findall(r"\d+", path.stem) for path in files]
-    by_number = {int(found[-1]): path for found, path in zip(numbers, files, strict=True) if found}
+    by_number = {number: path for path in files if (number := _number(path)) is not None}
     return by_number if len(by_number) == len(files) else dict(enumerate(files))
+
+
+def _images_in(folder: Path) -> list[Path]:
+    return [path for path in shown(folder) if path.suffix.lower() in IMAGE_SUFFIXES]
+
+
+def _number(path: Path) -> int | None:
+    """The last number in a file's name."""
+    found = re.findall(r"\d+", path.stem)
+    return int(found[-1]) if found else None
+
+
+def _footage_in_order(path: Path, files: Sequence[Path], first_number: int | None) -> Footage:
+    """The footage of several images, with a note where some of their numbers tell frames apart and others do not: a copy, or a picture of
+    another kind among them, would move the frames after it."""
+    names, numbers = dict[Path, Path](), dict[int | None, Path]()
+    note = ""
+    for file in files:
+        other = names.setdefault(file.parent / file.stem.casefold(), file)
+        if other is not file:
+            raise InputError(f"{path}: both {other.name} and {file.name} are of one frame; leave one")
+        number = _number(file)
+        other = numbers.setdefault(number, file)
+        if number is None:
+            note = note or f"{file.name} has no number"
+        elif other is not file:
+            note = note or f"{other.name} and {file.name} have one number"
+    footage = _footage_of_images(path, number_files(files), first_number or 0)
+    if not note or len(numbers) == 1:
+        return footage
+    return replace(footage, notes=(*footage.notes, f"{path}: {note}; all are counted in the order of their names, a copy among them too"))
 
 
 def _footage_of_images(path: Path, images: dict[int, Path], first_number: int = 0) -> Footage:

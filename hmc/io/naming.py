@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from hmc.errors import InputError
+from hmc.io.door import check_folder
 
 __all__ = ["FILES", "PLACE", "Found", "find_files", "tokens_of"]
 
@@ -63,7 +64,7 @@ def find_files(recording: Path, kind: str, names: Sequence[str], settings: Mappi
     Raises
     ------
     InputError
-        When recording.toml names a camera or file that is not there, or it is not clear which file is meant.
+        When recording.toml names a camera or file that is not there, it is not clear which file is meant, or the folder is none.
     """
     said = settings.get(kind, {})
     if isinstance(said, Path):
@@ -79,6 +80,7 @@ def find_files(recording: Path, kind: str, names: Sequence[str], settings: Mappi
     for name, (file,) in files.items():
         if not file.exists():
             raise InputError(f"{recording / 'recording.toml'}: `{kind}` gives camera '{name}' the file {file}, which is not there")
+    check_folder(folder or recording / kind)
     given = {realpath(path) for paths in files.values() for path in paths}
     items = [item for item in footage_items(folder or recording / kind) if realpath(item) not in given]  # of links that go round too
     exact = {item_name(item) for item in items}
@@ -98,7 +100,13 @@ def footage_items(folder: Path) -> list[Path]:
     """Folders, videos and images in a folder, by name."""
     if not folder.is_dir():
         return []
-    return sorted(item for item in folder.iterdir() if item.is_dir() or item.suffix.lower() in VIDEO_SUFFIXES | IMAGE_SUFFIXES)
+    return [item for item in shown(folder) if item.is_dir() or item.suffix.lower() in VIDEO_SUFFIXES | IMAGE_SUFFIXES]
+
+
+def shown(folder: Path) -> list[Path]:
+    """What is in a folder, by name, but for names that begin with a dot: what a Mac or a network drive leaves beside files, under nearly
+    their names (``._cam_00.mp4``)."""
+    return sorted(item for item in folder.iterdir() if not item.name.startswith("."))
 
 
 def item_name(item: Path) -> str:

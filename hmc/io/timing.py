@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from hmc.errors import InputError
-from hmc.io.door import MAX_FRAME_NUMBER, read_text_file
+from hmc.io.door import MAX_FRAME_NUMBER, check_folder, read_text_file
 from hmc.io.files import atomic_write
 from hmc.io.footage import Footage, stamps
 
@@ -79,6 +79,7 @@ def read_times(file: Path) -> np.ndarray | None:
     InputError
         When it is not of that form, or time does not rise.
     """
+    check_folder(file.parent)
     if not os.path.lexists(file):
         return None
     lines = [line.strip() for line in read_text_file(file).splitlines() if line.strip()]
@@ -88,18 +89,21 @@ def read_times(file: Path) -> np.ndarray | None:
     for number, line in enumerate(lines[1:], 2):
         try:
             frame, time = line.split(",")
-            rows[int(frame)] = float(time)
+            index, seconds = int(frame), float(time)
         except ValueError:
             raise InputError(f"{file}: line {number} is no frame and time in seconds, as in 12,0.4: {line[:40]!r}") from None
+        if index in rows:
+            raise InputError(f"{file}: line {number} has frame {index} once more; leave one line of each frame")
+        rows[index] = seconds
     if not rows or min(rows) < 0 or max(rows) > MAX_FRAME_NUMBER or not np.isfinite(list(rows.values())).all():
         raise InputError(f"{file}: must hold the times of frames from 0 on, in seconds; mend or remove it")
     frames = sorted(rows)
-    seconds = np.array([rows[frame] for frame in frames])
-    if (np.diff(seconds) <= 0).any():
-        late = frames[int(np.argmax(np.diff(seconds) <= 0)) + 1]
+    found = np.array([rows[frame] for frame in frames])
+    if (np.diff(found) <= 0).any():
+        late = frames[int(np.argmax(np.diff(found) <= 0)) + 1]
         raise InputError(f"{file}: time must rise from frame to frame; that of frame {late} does not")
     times = np.full(frames[-1] + 1, np.nan)
-    times[frames] = seconds
+    times[frames] = found
     return times
 
 

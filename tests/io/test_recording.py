@@ -1,5 +1,6 @@
 """Recordings on disk: what is read, what is survived, what is refused and in which words."""
 
+import os
 import re
 import shutil
 from dataclasses import replace
@@ -509,3 +510,79 @@ def test_a_link_that_goes_round_is_a_file_that_is_not_there(tmp_path):
     loop.symlink_to(loop.name)
     recording = open_recording(tmp_path / "tiny")
     assert [name for name in recording.rig.names if name in " ".join(recording.problems)] == ["cam_00"]  # the others have their empty scene
+
+
+@pytest.mark.parametrize("other", ["cam_01.MP4", "cam_01.mov", "cam_01.png", "cam_01"])
+def test_two_files_of_one_camera_are_told(recording_folder, other):
+    """The first by name would be taken, whichever was meant."""
+    video = recording_folder / "videos" / "cam_01.avi"
+    if other == video.stem:
+        (video.parent / other).mkdir()
+    else:
+        shutil.copy(video, video.parent / other)
+    with pytest.raises(InputError, match=r"videos: both cam_01.* and cam_01.* are of camera 'cam_01'; leave one, or say which"):
+        open_recording(recording_folder)
+    (recording_folder / "recording.toml").write_text('videos = { cam_01 = "videos/cam_01.avi" }\n')
+    assert open_recording(recording_folder).n_frames == 12
+
+
+def test_what_a_system_leaves_beside_files_is_no_footage(recording_folder, ring):
+    write_images(recording_folder / "images" / "cam_00", range(12), ring[0].size, name="frame_{:03d}.png")
+    (recording_folder / "videos" / "cam_00.avi").unlink()
+    _, before, problems = read_all(recording_folder)
+    for file in [*recording_folder.glob("*/*.*"), *recording_folder.glob("images/*/*")]:
+        (file.parent / f"._{file.name}").write_bytes(b"\0\5\x16\7")
+    _, after, more = read_all(recording_folder)
+    assert [indices(frame) for frame in after] == [indices(frame) for frame in before] and problems == more
+
+
+@pytest.mark.parametrize(
+    "name, words",
+    [("f_001 (1).png", r"f_001 \(1\)\.png and f_001\.png have one number"), ("cover.png", "cover.png has no number")],
+)
+def test_numbers_that_do_not_tell_frames_apart_are_told(recording_folder, ring, name, words):
+    write_images(recording_folder / "images" / "cam_00", range(11), ring[0].size, name="f_{:03d}.png")
+    (recording_folder / "videos" / "cam_00.avi").unlink()
+    folder = recording_folder / "images" / "cam_00"
+    shutil.copy(folder / "f_001.png", folder / name)
+    (problem,) = [one for one in open_recording(recording_folder).problems if "number" in one]
+    assert re.search(words, problem) and "in the order of their names" in problem
+
+
+def test_two_images_of_one_frame_are_told(recording_folder, ring):
+    write_images(recording_folder / "images" / "cam_00", range(12), ring[0].size, name="f_{:03d}.png")
+    (recording_folder / "videos" / "cam_00.avi").unlink()
+    shutil.copy(recording_folder / "images/cam_00/f_001.png", recording_folder / "images/cam_00/f_001.bmp")
+    with pytest.raises(InputError, match=r"both f_001\.bmp and f_001\.png are of one frame; leave one"):
+        open_recording(recording_folder)
+
+
+@pytest.mark.parametrize("put", [lambda path: path.write_text("moved"), lambda path: path.symlink_to("/no/such/disk")])
+@pytest.mark.parametrize("kind", ["videos", "images", "silhouettes", "times", "background"])
+def test_what_is_no_folder_where_one_should_be_is_told(recording_folder, kind, put):
+    """Such as a link to a disk that is not mounted: else it counts as not there, and results are others."""
+    folder = recording_folder / kind
+    shutil.rmtree(folder, ignore_errors=True)
+    put(folder)
+    if kind == "background":
+        said = "\n".join(open_recording(recording_folder).problems)
+    else:
+        with pytest.raises(InputError) as error:
+            open_recording(recording_folder)
+        said = str(error.value)
+    assert f"{folder}: a " in said and "where a folder should be; put the folder there, or remove it" in said
+
+
+def test_a_list_of_other_files_is_no_video(recording_folder):
+    """Decoders would open what it names, wherever that lies."""
+    (recording_folder / "videos" / "cam_00.avi").write_text("ffconcat version 1.0\nfile cam_01.avi\n")
+    with pytest.raises(InputError, match=r"cam_00\.avi: is text, no video"):
+        open_recording(recording_folder)
+
+
+def test_names_that_are_no_text_are_told(recording_folder, ring):
+    """OpenCV ends the process on them."""
+    video = recording_folder / "videos" / "cam_00.avi"
+    video.rename(os.fsdecode(bytes(video.parent) + b"/cam_00\xff.avi"))
+    with pytest.raises(InputError, match=r"cam_00\\udcff\.avi': its name is no text in UTF-8; rename it"):
+        open_recording(recording_folder)

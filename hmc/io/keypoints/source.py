@@ -10,6 +10,7 @@ import numpy as np
 
 from hmc.camera.reduction import reduce_pixels
 from hmc.errors import InputError
+from hmc.io.door import check_folder
 from hmc.io.footage import Footage
 from hmc.io.keypoints.csv_forms import read_csv_table
 from hmc.io.keypoints.json_forms import last_number, read_json_frame, read_json_table
@@ -186,6 +187,8 @@ def open_keypoints(recording: Recording) -> KeypointSource | None:
 
 def _items(folder: Path, tables: bool) -> Iterator[Path]:
     """Folders with JSON files and, where they are meant, tables, by name."""
+    if tables:
+        check_folder(folder)
     if folder.is_dir():
         for item in sorted(folder.iterdir()):
             if not item.name.startswith("."):
