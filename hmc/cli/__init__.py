@@ -9,12 +9,13 @@ from __future__ import annotations
 import argparse
 import importlib
 import importlib.util
+import io
 import os
 import sys
 from collections.abc import Sequence
 
 from hmc import __version__
-from hmc.errors import InputError, system_words
+from hmc.errors import InputError, is_utf8, system_words
 
 __all__ = ["command_parser", "main", "make_parser", "repeated"]
 
@@ -64,7 +65,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     # Matrices are small here: threads of linear algebra would wait for one another, and results would depend on how many there are.
     for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")  # a name may hold signs that the terminal's encoding has not
     argv = list(sys.argv[1:] if argv is None else argv)
+    for word in (*argv, _here()):
+        if not is_utf8(word):
+            print(f"hmc: {word!r} is no text in UTF-8; rename that file or folder", file=sys.stderr)
+            return EXIT_INPUT
     if argv[:1] == ["experiments"]:
         from hmc.cli.experiments import hand_over
 
@@ -98,6 +106,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print(f"hmc {args.command}: interrupted", file=sys.stderr)
         return EXIT_INTERRUPTED
+
+
+def _here() -> str:
+    try:
+        return os.getcwd()
+    except OSError:
+        return ""  # it was removed, which is told by what looks for a file in it
 
 
 def repeated(parser: argparse.ArgumentParser, args: argparse.Namespace, argv: Sequence[str]) -> argparse.Namespace:

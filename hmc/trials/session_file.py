@@ -191,8 +191,11 @@ class _Reading:
         videos: str | None,
     ) -> Trial:
         where, root = f"[[trial]] {name}", self.path.parent
-        if name.startswith(".") or set(name) & set("/\\,*?["):
-            self.faults.append(f"{where}: a trial's name must begin with no dot and have none of / \\ , * ? [ in it; rename it")
+        if name.startswith(".") or set(name) & set("/\\,*?[") or not name.isprintable():
+            self.faults.append(
+                f"[[trial]] {name!r}: a trial's name must begin with no dot and have none of / \\ , * ? [ in it, nor what cannot be "
+                "printed; rename it"
+            )
         pattern = self.pattern(table.get("videos"), f"{where} `videos`") or videos
         folder = root / self.text(table, "folder", "", where) if "folder" in table else found or root / name
         if "folder" in table and not folder.is_dir():

@@ -2,8 +2,10 @@
 
 import argparse
 import errno
+import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -193,3 +195,21 @@ def test_what_several_cameras_have_in_common_is_one_line():
         "one remark: of its own",
         "and another",
     ]
+
+
+def test_names_that_are_no_text_are_told(tmp_path, monkeypatch, capsys):
+    """Neither what decodes videos nor run.toml takes them."""
+    assert main(["check", "r\udcff"]) == 2
+    assert capsys.readouterr().err == r"hmc: 'r\udcff' is no text in UTF-8; rename that file or folder" + "\n"
+    folder = Path(os.fsdecode(bytes(tmp_path) + b"/\xff"))
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    assert main(["check", "r"]) == 2
+    assert "is no text in UTF-8" in capsys.readouterr().err
+
+
+def test_signs_that_the_terminal_has_not_are_written_otherwise(tmp_path):
+    folder = tmp_path / "Läufer"
+    folder.mkdir()
+    done = run("check", str(folder), "--out", str(tmp_path / "a.png"), env={**os.environ, "PYTHONIOENCODING": "ascii:strict"})
+    assert done.returncode == 2 and r"L\xe4ufer" in done.stdout and "Traceback" not in done.stderr

@@ -126,6 +126,7 @@ def test_trials_are_chosen_by_names_and_patterns(lab):
         ("frames = 3", 'folder = "elsewhere"', "elsewhere is no folder"),
         ('name = "three"', 'name = "one"', "[[trial]] one: there are two trials of this name; rename one"),
         ('name = "three"', 'name = "a/b"', "a trial's name must begin with no dot and have none of"),
+        ('name = "three"', 'name = "a\\nb"', "a trial's name must begin with no dot and have none of"),
         ('name = "three"\n', "", "[[trial]] 2: `name` must be a text"),
         ('videos = "raw/{trial}_{camera}.avi"', "", "three is no folder; give `folder`, or `videos` with {camera} in it"),
         ('videos = "raw/{trial}_{camera}.avi"', 'videos = "raw/{trial}.avi"', "must be a path with {camera} in it"),
