@@ -20,6 +20,8 @@ __all__ = ["Camera", "Rig", "backproject", "look_at", "project", "undistort"]
 NEAR_M = 1e-6
 #: No image is larger than this on a side.
 MAX_SIDE_PX = 100_000
+#: Radians: no vector of a rotation is longer, one in degrees nearly always.
+LONGEST_TURN = 2 * np.pi + 1e-3
 #: Pixels, coefficients and places (of any unit) are no larger.
 MAX_NUMBER = 1e12
 
@@ -94,6 +96,11 @@ class Camera:
         distortions = np.pad(distortions[:5], (0, max(0, 5 - distortions.size)))
         rotation = array("rotation")
         if rotation.size == 3:
+            if LONGEST_TURN < np.linalg.norm(rotation) < np.inf:
+                raise say(
+                    f"`rotation` is a vector of length {np.linalg.norm(rotation):.4g}, more than a full turn; give it in radians (is it in "
+                    "degrees?)"
+                )
             rotation = _rotation_from_vector(rotation.ravel())
         if rotation.shape != (3, 3):
             raise say(f"`rotation` must be a rotation vector (3) or a matrix (3 x 3); got shape {rotation.shape}")

@@ -28,6 +28,8 @@ UNEVEN = 0.5
 #: Rates that cameras are set to, a second; one that is another, or a 1000/1001 of these, may be the mean of one that varies.
 USUAL_RATES = np.array([10, 12, 12.5, 15, 20, 24, 25, 30, 48, 50, 60, 75, 90, 100, 120, 150, 180, 200, 240, 250, 300, 500, 1000], float)
 HEAD = "frame,time_s"
+#: Frames that are so many times further apart than the recording's, or nearer, are timed in no seconds.
+OTHER_UNIT = 100.0
 
 
 def nearest_frames(times: np.ndarray) -> np.ndarray:
@@ -149,6 +151,7 @@ def go_by_time(path: Path, views: Mapping[str, Footage], fps: float, by_stamps: 
                     f"{file}: tells when frames were taken, and so does `first_frame` of recording.toml for '{name}'; leave one"
                 )
             _refuse_far(file, times[: view.n_frames], fps)
+            _refuse_other_unit(file, times[: view.n_frames], fps)
             in_frames = times * fps
             if not (nearest_frames(in_frames[: view.n_frames]) >= 0).any():
                 low, high = np.nanmin(times), np.nanmax(times)
@@ -174,6 +177,17 @@ def _refuse_far(file: Path, times: np.ndarray, fps: float) -> None:
         raise InputError(
             f"{file}: has a frame at {last:.6g} s, frames go to {MAX_FRAME_NUMBER}, {fps:g} a second; give seconds from the recording's "
             "first frame on"
+        )
+
+
+def _refuse_other_unit(file: Path, times: np.ndarray, fps: float) -> None:
+    """Times of another unit than seconds: of a thousand frames in milliseconds one would be used, without a gap that is told."""
+    steps = np.diff(times[np.isfinite(times)])
+    step = float(np.median(steps)) if len(steps) else 1 / fps
+    if not 1 / OTHER_UNIT < step * fps < OTHER_UNIT:
+        raise InputError(
+            f"{file}: its frames are {step:.3g} s apart, the recording's {1 / fps:.3g} s ({fps:g} a second); give seconds, or correct "
+            "`fps` in recording.toml"
         )
 
 

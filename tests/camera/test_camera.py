@@ -157,6 +157,7 @@ GOOD = {
         ("size", (640, 0), "`size` must be"),
         ("size", (640,), "`size` must be"),
         ("matrix", np.eye(2), "`matrix` must be 3 x 3"),
+        ("rotation", [0.0, 90.0, 0.0], "more than a full turn; give it in radians"),
         ("matrix", np.diag([-500.0, 500, 1]), "no intrinsic matrix"),
         ("matrix", np.diag([np.nan, 500, 1]), "`matrix` holds a number that is not finite"),
         ("size", "wide", "`size` must be numbers"),

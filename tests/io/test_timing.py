@@ -183,6 +183,8 @@ def test_dropped_frames_are_none_by_a_file_of_times(recording_folder, as_images)
         ("frame,time_s\n0,0\n1,0.2\n2,0.1\n", "that of frame 2 does not"),
         ("frame,time_s\n0,0\n1,0.1\n1,0.2\n", "line 4 has frame 1 once more"),
         ("frame,time_s\n0,-5\n1,-4\n", "no frame was taken from 0 s on"),
+        ("frame,time_s\n0,0\n1,40\n2,80\n3,120\n", "its frames are 40 s apart, the recording's 0.04 s (25 a second); give seconds"),
+        ("frame,time_s\n0,0\n1,0.00004\n2,0.00008\n", "its frames are 4e-05 s apart"),
         ("frame,time_s\n0,0\n1,99999999\n", "has a frame at 1e+08 s"),
         ("frame,time_s\n0,0\n1,1e308\n", "frames go to 10000000"),
     ],
