@@ -9,10 +9,10 @@ from __future__ import annotations
 import argparse
 import importlib
 import importlib.util
-import io
 import os
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 
 from hmc import __version__
 from hmc.errors import InputError, is_utf8, system_words
@@ -66,7 +66,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
     for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
+        with suppress(AttributeError, OSError, ValueError):  # of another kind, or closed
             stream.reconfigure(errors="backslashreplace")  # a name may hold signs that the terminal's encoding has not
     argv = list(sys.argv[1:] if argv is None else argv)
     for word in (*argv, _here()):
