@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import difflib
 import fnmatch
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -230,7 +231,12 @@ class _Reading:
             self.faults.append(f'`trials` must be a pattern of folders from here, as "trials/*"; got {pattern!r}')
             return {}
         found: dict[str, Path] = {}
-        for folder in sorted(self.path.parent.glob(pattern)):
+        try:
+            folders = sorted(self.path.parent.glob(pattern))
+        except (ValueError, NotImplementedError, IndexError, re.error) as error:
+            self.faults.append(f"`trials`: {pattern!r} is no pattern of folders from here ({error})")
+            return {}
+        for folder in folders:
             if folder.is_dir() and not folder.name.startswith("."):
                 if folder.name in found:
                     self.faults.append(f"`trials`: {found[folder.name]} and {folder} have one name; rename one")

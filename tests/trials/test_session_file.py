@@ -112,6 +112,7 @@ def test_trials_are_chosen_by_names_and_patterns(lab):
         ('background = "empty"', 'background = "full"', "full is no folder; give one with a video or a subfolder of images a camera"),
         ('name = "a day"', "name = 7", "`name` must be a text; got 7"),
         ('trials = "trials/*"', 'trials = "tests/*"', "`trials`: no folder is like 'tests/*'"),
+        ('trials = "trials/*"', 'trials = "."', "`trials`: '.' is no pattern of folders from here"),
         ('trials = "trials/*"', "trials = 3", "`trials` must be a pattern of folders from here"),
         ("fps = 50", "fsp = 50", "[recording]: unknown key `fsp`; did you mean `fps`?"),
         ("fps = 50", "fps = -1", "[recording]: `fps` must be a number above 0; got -1"),
