@@ -25,6 +25,8 @@ AROUND_M = 0.3
 COARSE_M, FINE_M, MOST_POINTS = 0.06, 0.015, 400_000
 #: Fine voxels are no smaller than half of what a pixel spans, and so many are looked at in one go.
 AT_ONCE = 200_000
+#: No more of them are looked at, larger ones where it would be more: 13 m^3 of the smallest.
+MOST_FINE = 4_000_000
 #: Half the diagonal of a cube against its side: what a voxel's centre stands for.
 HALF_DIAGONAL = 0.87
 #: Silhouettes are moved this far in search of a better fit, and a camera is off from that many pixels on; both for a width of 640.
@@ -132,7 +134,8 @@ def fine_hull(rig: Rig, masks: Masks, grid: CoarseGrid) -> Hull:
     wide = [None if mask is None else _dilate(mask, _reach(pixel_m, coarse_m)) for pixel_m, mask in zip(grid.pixel_m, masks, strict=True)]
     seen, missed = _look(wide, grid.places)
     kept = coarse[(seen.sum(axis=0) >= 3) & (missed.sum(axis=0) <= 1)]
-    n = max(1, round(coarse_m / max(FINE_M, min(grid.pixel_m) / 2)))
+    most = int((MOST_FINE / max(1, len(kept))) ** (1 / 3))  # silhouettes that are white everywhere leave the whole room
+    n = max(1, min(most, round(coarse_m / max(FINE_M, min(grid.pixel_m) / 2))))
     steps = ((np.indices((n, n, n)).reshape(3, -1).T + 0.5) / n - 0.5) * coarse_m
     parts = [_near(rig, masks, (some[:, None] + steps).reshape(-1, 3)) for some in np.array_split(kept, len(kept) * n**3 // AT_ONCE + 1)]
     points, looks = np.concatenate([points for points, _ in parts]), np.concatenate([looks for _, looks in parts], axis=-1)

@@ -12,6 +12,7 @@ from hmc.camera.coverage import inside_image
 from hmc.camera.model import Camera, project
 from hmc.check.cures import sync_command
 from hmc.check.hull import Hull, best_move, beyond_room, coarse_grid, fine_hull, floor_height, misfit, odd_camera
+from hmc.check.moments import Masks
 from hmc.io.recording import Recording
 
 __all__ = ["covered_shares", "disagreements", "hull_findings", "silhouette_agreement"]
@@ -34,6 +35,8 @@ GOOD_AGREEMENT = 0.9
 LEAST_AGREEMENT = 0.6
 #: A camera is to blame if leaving it out lifts the others' mean share by this much.
 GAIN = 0.07
+#: No silhouettes of people fill as much of an image in most moments.
+FILLED = 0.7
 #: Cells of silhouette below which nothing is said.
 LEAST_CELLS = 10
 
@@ -102,6 +105,7 @@ def hull_findings(recording: Recording, masks: Sequence[Sequence[np.ndarray | No
     list of str
     """
     rig, room = recording.rig, recording.room
+    filled, masks = _filled(recording, masks)
     moments = [frame for frame in masks if sum(mask is not None and mask.any() for mask in frame) >= LEAST_VIEWS]
     grid = coarse_grid(rig, room) if moments else None
     hulls = [hull for frame in moments if grid and len((hull := fine_hull(rig, frame, grid)).strict)]
@@ -116,7 +120,19 @@ def hull_findings(recording: Recording, masks: Sequence[Sequence[np.ndarray | No
             f"people's feet are {depth * 100:.0f} cm below the floor, where they are cut off; the floor must be at z = 0 in the "
             "calibration, and the room's lower limit at the floor"
         )
-    return cut or disagreements(recording, masks) or _odd_camera(recording, hulls)
+    return [*filled, *(cut or disagreements(recording, masks) or _odd_camera(recording, hulls))]
+
+
+def _filled(recording: Recording, masks: Sequence[Masks]) -> tuple[list[str], list[Masks]]:
+    """A sentence for each camera whose silhouettes are no people's, as they fill its image; and the silhouettes of the others."""
+    shares = [np.median([1.0 * mask.mean() for mask in own if mask is not None] or [0.0]) for own in zip(*masks, strict=True)]
+    sentences = [
+        f"camera '{name}': its silhouettes fill {share:.0%} of its image; people must be white and all else black, without grey "
+        "or an alpha channel that says so: invert or convert them, or remove them and they are made of the images"
+        for name, share in zip(recording.rig.names, shares, strict=True)
+        if share > FILLED
+    ]
+    return sentences, [tuple(None if share > FILLED else mask for mask, share in zip(frame, shares, strict=True)) for frame in masks]
 
 
 def _odd_camera(recording: Recording, hulls: Sequence[Hull]) -> list[str]:

@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 from hmc.camera.model import Camera, Rig, look_at, project
 from hmc.camera.rig_picture import _free_offset, draw_rig, draw_view, rig_figure, view_cone
 from hmc.check import check_recording, inspect_recording
+from hmc.check.hull import coarse_grid, fine_hull
 from hmc.cli import main
 from hmc.io.calibration import write_calibration
 from hmc.io.files import write_figure
@@ -43,6 +44,26 @@ def body_folder(tmp_path, ring):
 def test_a_good_recording_has_only_notes(recording_folder, body_folder):
     assert {finding.severity for finding in check_recording(recording_folder)} <= {"note"}
     assert sentences(check_recording(body_folder), "warning") == []
+
+
+@pytest.mark.parametrize(
+    "spoil", [lambda mask: 255 - mask, lambda mask: np.dstack([np.full_like(mask, 255)] * 3 + [mask]), lambda mask: np.maximum(mask, 16)]
+)
+@pytest.mark.parametrize("cameras", [["cam_02"], [f"cam_0{k}" for k in range(5)]])
+def test_silhouettes_that_fill_images_are_told(body_folder, cameras, spoil):
+    """Inverted, with people in the alpha channel, or grey where nobody is."""
+    for camera in cameras:
+        file = body_folder / "silhouettes" / camera / "000000.png"
+        cv2.imwrite(str(file), spoil(cv2.imread(str(file), cv2.IMREAD_GRAYSCALE)))
+    found = sentences(check_recording(body_folder), "warning")
+    assert [sentence.split(": its silhouettes fill ")[0] for sentence in found] == [f"camera '{camera}'" for camera in cameras]
+
+
+def test_a_hull_of_the_whole_room_is_made_of_fewer_voxels(ring, monkeypatch):
+    grid = coarse_grid(ring, np.array([[-1.0, -1, 0], [1, 1, 2]]))
+    masks = [np.ones((120, 160), bool)] * len(ring)
+    monkeypatch.setattr("hmc.check.hull.MOST_FINE", len(grid.points))
+    assert len(fine_hull(ring, masks, grid).points) <= len(grid.points)
 
 
 def turned(camera: Camera, degrees: float) -> Camera:
