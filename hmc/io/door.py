@@ -297,7 +297,7 @@ def _refuse_bomb(archive: zipfile.ZipFile, most: float) -> None:
             version = np.lib.format.read_magic(file)
             read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
             shape, _, dtype = read(file)
-        if dtype.hasobject or any(side < 0 for side in shape):
+        if dtype.hasobject or dtype.kind == "c" or any(side < 0 for side in shape):
             raise ValueError(f"{entry.filename} holds no plain numbers")
         stated = float(math.prod(shape)) * dtype.itemsize
         if stated > entry.file_size:

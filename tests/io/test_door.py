@@ -220,3 +220,9 @@ def test_numbers_beyond_64_bits_are_refused(tmp_path):
     (tmp_path / "a.toml").write_text("[parameters]\nstart = 99999999999999999999\n")
     with pytest.raises(InputError, match=r"`parameters.start` is a number beyond 64 bits"):
         read_toml_file(tmp_path / "a.toml")
+
+
+def test_complex_numbers_are_no_plain_ones(tmp_path):
+    np.savez(tmp_path / "a.npz", a=np.ones(2, complex))
+    with pytest.raises(InputError, match="a.npy holds no plain numbers"):
+        read_arrays(tmp_path / "a.npz")
