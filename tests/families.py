@@ -251,6 +251,29 @@ def other_name(rng, path):
     path.rename(path.parent / names[int(rng.integers(len(names)))])
 
 
+def twin(rng, path):
+    """A copy of it, or of a neighbor's content, beside it under nearly its name: of a copy, a conversion, another system."""
+    names = (f"{path.stem} (1){path.suffix}", f"{path.stem}{path.suffix.upper()}", f"{path.stem}.avi", f"{path.stem}.bmp", f"._{path.name}",
+             f"{path.stem} - Copy{path.suffix}", f"{path.name}.bak", f"~${path.name}")  # fmt: skip
+    others = [path, *(one for one in sorted(path.parent.iterdir()) if one.is_file() and one.suffix == path.suffix)]
+    other = path.parent / names[int(rng.integers(len(names)))]
+    if not other.exists():
+        shutil.copyfile(others[int(rng.integers(len(others)))], other)
+
+
+def no_text_as_name(rng, path):
+    """A name of another system's encoding, which is no text here."""
+    path.rename(os.fsdecode(bytes(path.parent / path.stem) + (b"\xff", b"\xe9")[int(rng.integers(2))] + os.fsencode(path.suffix)))
+
+
+def list_of_files(rng, path):
+    """Text that a decoder of videos takes for the names of others."""
+    others = sorted(one.name for one in path.parent.iterdir() if one.is_file() and one != path) or ["x.mp4"]
+    other = others[int(rng.integers(len(others)))]
+    texts = (f"ffconcat version 1.0\nfile '{other}'\n", f"#EXTM3U\n#EXT-X-TARGETDURATION:9\n#EXTINF:9,\n{other}\n#EXT-X-ENDLIST\n")
+    path.write_text(texts[int(rng.integers(len(texts)))])
+
+
 def neighbor_in_place(rng, path):
     """The content of another file of the same tree."""
     others = [one for one in sorted(path.parent.parent.rglob("*")) if one.is_file() and one != path and one.stat().st_size < 10**7]
@@ -272,5 +295,5 @@ FAMILIES = {
     "no number": removed_value, "text for a number": text_for_number, "empty": empty, "another encoding": other_encoding, "another type": other_type,
     "a folder": directory, "missing": missing, "no permission": no_permission, "a pipe or socket": fifo, "a link to itself": link_loop, "a device": device,
     "deep nesting": deep_nesting, "huge": huge_count, "strange neighbors": strange_neighbors, "another name": other_name, "a neighbor's content": neighbor_in_place,
-    "entities": entities,
+    "entities": entities, "a twin": twin, "a name that is no text": no_text_as_name, "a list of files": list_of_files,
 }  # fmt: skip
