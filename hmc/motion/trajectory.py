@@ -19,6 +19,9 @@ from hmc.landmarks import ENOUGH_VIEWS, FOOT_POINTS, LANDMARKS, landmark_index
 
 __all__ = ["Trajectory", "read_trajectories", "trajectories"]
 
+#: No person is away for so many frames for each of a pose.
+MOST_GAPS = 10_000
+
 
 @dataclass(frozen=True)
 class Trajectory:
@@ -95,6 +98,11 @@ def trajectories(poses: PoseTable, states: PoseStates | None, fps: float) -> lis
         None: of a result without angles.
     fps : float
         Frames a second.
+
+    Raises
+    ------
+    InputError
+        When a frame is so far from the others that what lies between would take the memory.
     """
     found = []
     for person in np.unique(poses.persons).tolist():
@@ -104,6 +112,11 @@ def trajectories(poses: PoseTable, states: PoseStates | None, fps: float) -> lis
             continue
         first, last = int(own.frames[fitted].min()), int(own.frames[fitted].max())
         own = own.where(fitted)
+        if last - first > MOST_GAPS * len(own.frames):
+            raise InputError(
+                f"joints.csv: person {person} has a pose in {len(own.frames)} of the frames {first} to {last}; remove the line of "
+                "the one that is far from the others"
+            )
         frames, rows = np.arange(first, last + 1), own.frames - first
         positions = _spread(own.positions, rows, len(frames))
         views, trust = (None if values is None else _spread(values, rows, len(frames)) for values in (own.views, own.trust))
