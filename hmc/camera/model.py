@@ -96,9 +96,9 @@ class Camera:
         distortions = np.pad(distortions[:5], (0, max(0, 5 - distortions.size)))
         rotation = array("rotation")
         if rotation.size == 3:
-            if LONGEST_TURN < np.linalg.norm(rotation) < np.inf:
+            if LONGEST_TURN < np.abs(rotation).max() < np.inf:
                 raise say(
-                    f"`rotation` is a vector of length {np.linalg.norm(rotation):.4g}, more than a full turn; give it in radians (is it in "
+                    f"`rotation` is a vector with {np.abs(rotation).max():.4g} in it, more than a full turn; give it in radians (is it in "
                     "degrees?)"
                 )
             rotation = _rotation_from_vector(rotation.ravel())
