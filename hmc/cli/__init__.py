@@ -67,7 +67,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         os.environ.setdefault(name, "1")
     for stream in (sys.stdout, sys.stderr):
         with suppress(AttributeError, OSError, ValueError):  # of another kind, or closed
-            stream.reconfigure(errors="backslashreplace")  # a name may hold signs that the terminal's encoding has not
+            # A name may hold signs that the terminal's encoding has not.
+            stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
     argv = list(sys.argv[1:] if argv is None else argv)
     for word in (*argv, _here()):
         if not is_utf8(word):
