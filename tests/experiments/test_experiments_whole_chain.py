@@ -29,6 +29,7 @@ SECOND = (
     "second pass", "own body of the whole run", "what furniture hides", "others' rays", "best way through both passes",
     "fresh starts for who is lost",
     "turning about who faces backwards",
+    "colors of a person's parts",
     "feet that stand",
 )  # fmt: skip
 

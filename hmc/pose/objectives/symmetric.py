@@ -48,8 +48,6 @@ class SymmetricSettings:
     ----------
     cap_m : float
         Distances beyond this count as this (metres), so that furniture in the hull or a cut-off limb cannot pull without end.
-    hand_cap_m : float or None
-        The same of a hand outside the hull; None: as of all else. Silhouettes lose hands, skin before wood.
     uncovered_weight : float
         Weight of what the body does not cover against body outside the hull.
     ray_share : float
@@ -65,16 +63,18 @@ class SymmetricSettings:
         Weight of hanging in the air or being sunk in the floor (`hmc.body.floor`).
     standing_weight : float
         Weight of the heights over the floor, or under it, of heel and ball of a foot that is known to stand.
+    hand_cap_m : float or None
+        As `cap_m`, of a hand outside the hull; None: as of all else. Silhouettes lose hands, skin before wood.
     """
 
     cap_m: float = 0.06
-    hand_cap_m: float | None = None
     uncovered_weight: float = 0.4
     ray_share: float = 0.9
     overlap_weight: float = 2.0
     posture_weight: float = 3e-6
     floor_weight: float = 0.015
     standing_weight: float = 0.02
+    hand_cap_m: float | None = None
 
     def __post_init__(self) -> None:
         if not 0 < self.cap_m <= MOST_CAP_M:
