@@ -180,7 +180,8 @@ def _toml_value(value: Any) -> str:
     if isinstance(value, int | float):
         return repr(value)  # Python writes nan, inf and exponents as TOML does
     if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+        text = value.encode(errors="backslashreplace").decode()  # a file's name may be no text, and a note holds it
+        return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, list):
         return "[" + ", ".join(_toml_value(item) for item in value) + "]"
     return "{ " + ", ".join(f"{_toml_key(key)} = {_toml_value(item)}" for key, item in value.items()) + " }"

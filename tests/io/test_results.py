@@ -229,6 +229,10 @@ def test_toml_text_is_read_back_by_the_standard_library(values):
     assert tomllib.loads(to_toml(values)) == values
 
 
+def test_a_name_that_is_no_text_is_written_by_its_numbers():
+    assert tomllib.loads(to_toml({"notes": ["cam_\udce9.mp4"], "b\udce9": 1})) == {"notes": ["cam_\\udce9.mp4"], "b\\udce9": 1}
+
+
 def test_toml_refuses_what_it_cannot_write(tmp_path):
     with pytest.raises(TypeError, match="object has no form in TOML"):
         to_toml({"x": object()})
