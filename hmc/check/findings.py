@@ -24,6 +24,7 @@ from hmc.check.silhouettes import hull_findings
 from hmc.check.world_findings import world_findings
 from hmc.errors import InputError
 from hmc.io.calibration import CalibrationEntry, build_camera
+from hmc.io.door import read_text_file
 from hmc.io.footage import Footage, read_footage
 from hmc.io.keypoints import open_keypoints
 from hmc.io.naming import FILES, find_files, footage_items, item_name
@@ -222,7 +223,7 @@ def _usable_rig(
 def empty_settings(path: Path) -> list[str]:
     """A sentence on a ``recording.toml`` without a letter in it, which is as good as none: was it saved?"""
     file = path / "recording.toml"
-    if not file.is_file() or file.read_text().strip():
+    if not file.is_file() or read_text_file(file).strip():
         return []
     return [f"{file} is empty: frames a second, the room and all else are taken from the videos or estimated; was it saved?"]
 

@@ -118,7 +118,7 @@ def limbs_by_color(
     Returns
     -------
     PosedPeople
-        As they were where there are no images, or where no limb is doubtful.
+        As they were where there are no images, or where no limb is doubtful. Costs stay those that the poses had before.
     """
     recording: Recording = pass_.recording
     borne_out = kept_borne_out(people, recording, replace(pass_.run, progress=None)) if recording.has_images else None
