@@ -2,13 +2,14 @@
 
 One frame tells which cameras are the other way round than the rest (`hmc.pose.views.exchanged_sides`), not which of both is right. Over
 time two things tell it: a person's left and right do not exchange places from one frame to the next, and few detections are exchanged.
-Of all sequences of a frame's pattern or its complement the cheapest is taken (Viterbi, IEEE Transactions on Information Theory 13, 1967).
+Of all sequences of a frame's pattern or its complement the cheapest is taken (`hmc.search.paths`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -19,8 +20,9 @@ from hmc.io.results import TrackTable
 from hmc.pose.views.exchanged_sides import FrameSides, sides_of_frame
 from hmc.pose.views.keypoints import body_detections, lines_of_people
 from hmc.processes import each_ahead
+from hmc.search.paths import cheapest_path
 
-__all__ = ["Turned", "cheapest_states", "exchanged_sides", "kept_or_exchanged", "people_at"]
+__all__ = ["Turned", "exchanged_sides", "kept_or_exchanged", "people_at"]
 
 #: By frame and person, cameras that have exchanged left and right, bool (n_cameras,).
 Turned = Mapping[int, Mapping[int, np.ndarray]]
@@ -79,10 +81,16 @@ def exchanged_sides(rig: Rig, tracks: TrackTable, source: KeypointSource, fps: f
     found: dict[int, dict[int, np.ndarray]] = {}
     for person, chain in chains.items():
         both = np.array([chain.turned, chain.other])
-        states = cheapest_states(both.sum(axis=-1).T * TURNED_COST / fps, np.array(chain.breaks))
+        states = cheapest_path(both.sum(axis=-1).T * TURNED_COST / fps, partial(_breaks, chain))
         for k in np.flatnonzero(both[states, np.arange(len(states))].any(axis=-1)).tolist():
             found.setdefault(chain.frames[k], {})[person] = both[states[k], k]
     return found
+
+
+def _breaks(chain: _Chain, k: int) -> np.ndarray:
+    """What it costs to be in the same state as in the frame before, and in the other, shape (2, 2)."""
+    same, other = chain.breaks[k]
+    return np.array([[same, other], [other, same]])
 
 
 def people_at(tracks: TrackTable, frame: int) -> dict[int, np.ndarray]:
@@ -120,30 +128,3 @@ def kept_or_exchanged(before: np.ndarray, after: np.ndarray, seconds: float) -> 
     deviation = np.hypot(WAY_M, WAY_M_S * seconds)
     kept, exchanged = (float(np.nansum(np.minimum(((after - sign * before) ** 2).sum(axis=-1) / deviation**2, MOST))) for sign in (1, -1))
     return kept, exchanged
-
-
-def cheapest_states(own: np.ndarray, breaks: np.ndarray) -> np.ndarray:
-    """The cheapest sequence of two states.
-
-    Parameters
-    ----------
-    own : ndarray, shape (n, 2)
-        What each state costs in each frame.
-    breaks : ndarray, shape (n, 2)
-        What it costs to be in the same state as in the frame before, and in the other; that of the first is not used.
-
-    Returns
-    -------
-    ndarray of int, shape (n,)
-        0 or 1; of two that cost the same, that which begins, or stays longer, with 0.
-    """
-    cost, came_from = own[0], []
-    for k in range(1, len(own)):
-        # From each state (rows) to each state (columns).
-        step = cost[:, None] + np.array([breaks[k], breaks[k][::-1]])
-        came_from.append(step.argmin(axis=0))
-        cost = own[k] + step.min(axis=0)
-    states = [int(cost.argmin())]
-    for before in reversed(came_from):
-        states.append(int(before[states[-1]]))
-    return np.array(states[::-1])

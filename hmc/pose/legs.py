@@ -20,6 +20,7 @@ from hmc.pose.objectives.objective import cost_at
 from hmc.pose.steps.polish import PolishSettings, fine_objective
 from hmc.pose.steps.refine import refine
 from hmc.pose.views.person_view import PersonView
+from hmc.search.paths import cheapest_path
 
 __all__ = ["LegSettings", "TellLegs", "choose_legs", "leg_alternatives", "limb_points", "no_alternatives"]
 
@@ -137,17 +138,11 @@ def choose_legs(frames: np.ndarray, costs: np.ndarray, legs: np.ndarray, fps: fl
     """
     reach = settings.reach(fps)
     costs = costs * np.where(np.arange(costs.shape[1]) == 0, 1.0, 1.0 + settings.doubt)
-    best = costs[0]
-    came_from = []
-    for k in range(1, len(frames)):
-        jumps = _jumps(frames, legs, k, reach, fps)
-        steps = best[:, None] + settings.jump_weight * np.minimum(jumps, settings.largest_jump_m_s**2)
-        came_from.append(steps.argmin(0))
-        best = steps.min(0) + costs[k]
-    path = [int(best.argmin())]
-    for choice in reversed(came_from):
-        path.append(int(choice[path[-1]]))
-    return np.array(path[::-1])
+
+    def between(k: int) -> np.ndarray:
+        return settings.jump_weight * np.minimum(_jumps(frames, legs, k, reach, fps), settings.largest_jump_m_s**2)
+
+    return cheapest_path(costs, between)
 
 
 def _jumps(frames: np.ndarray, legs: np.ndarray, k: int, reach: int, fps: float) -> np.ndarray:

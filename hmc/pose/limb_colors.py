@@ -53,6 +53,7 @@ from hmc.pose.steps.proposal import shows_enough
 from hmc.pose.trust import trust_features, trust_of
 from hmc.pose.views.color_patches import OUTSIDE
 from hmc.pose.views.person_view import PersonView
+from hmc.search.paths import cheapest_path
 from hmc.search.truncated import truncated_normal
 
 if TYPE_CHECKING:
@@ -340,7 +341,7 @@ def _along_paths(people: PosedPeople, subjects: Mapping[int, Subject], found: Fo
             angles = [states[row, limb.dofs][None] if one is None else one.angles for row, one in zip(rows, choices, strict=True)]
             costs = [np.zeros(1) if one is None else one.costs for one in choices]
             posed = [_with_angles(states[row], name, some) for row, some in zip(rows, angles, strict=True)]
-            picks = _path(frames, costs, _limb_places(subject.body, posed, name), fps, settings)
+            picks = cheapest_path(costs, partial(_ways, frames, _limb_places(subject.body, posed, name), fps, settings))
             states[rows] = [some[pick] for some, pick in zip(posed, picks, strict=True)]
         positions[rows] = landmarks(subject.body, states[rows])
     return replace(people, poses=replace(people.poses, positions=positions), states=replace(people.states, states=states))
@@ -352,15 +353,7 @@ def _limb_places(body: BodyModel, posed: Sequence[np.ndarray], name: str) -> lis
     return np.split(places, np.cumsum([len(some) for some in posed])[:-1])
 
 
-def _path(frames: np.ndarray, costs: Sequence[np.ndarray], places: Sequence[np.ndarray], fps: float, settings: ColorSettings) -> list[int]:
-    """The cheapest way through some poses of a limb a frame."""
-    best, came_from = costs[0], []
-    for k in range(1, len(frames)):
-        way = ((places[k][None] - places[k - 1][:, None]) ** 2).sum(axis=-1).mean(axis=-1)
-        steps = best[:, None] + settings.step_weight * fps / (30.0 * (frames[k] - frames[k - 1])) * way
-        came_from.append(steps.argmin(axis=0))
-        best = steps.min(axis=0) + costs[k]
-    path = [int(best.argmin())]
-    for back in reversed(came_from):
-        path.append(int(back[path[-1]]))
-    return path[::-1]
+def _ways(frames: np.ndarray, places: Sequence[np.ndarray], fps: float, settings: ColorSettings, k: int) -> np.ndarray:
+    """What the ways of a limb cost, from each of its poses before frame k to each in it."""
+    way = ((places[k][None] - places[k - 1][:, None]) ** 2).sum(axis=-1).mean(axis=-1)
+    return settings.step_weight * fps / (30.0 * (frames[k] - frames[k - 1])) * way

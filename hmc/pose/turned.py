@@ -26,6 +26,7 @@ from hmc.pose.starts.candidates import StartSettings, search_all, walk_factor
 from hmc.pose.steps.polish import PolishSettings, fine_objective
 from hmc.pose.steps.refine import refine
 from hmc.pose.views.person_view import PersonView
+from hmc.search.paths import cheapest_path
 
 __all__ = ["Stretch", "TurnedAbout", "TurnedSettings", "followed_wrongly", "stretches", "turn_about"]
 
@@ -183,14 +184,6 @@ def followed_wrongly(
 
 def _wrong_ones(evidence: Sequence[float], about: Sequence[bool], against: float) -> list[bool]:
     """Which of the stretches were followed the wrong way round: the most evidence in sum, less `against` for each two neighbors that are
-    alike though the second begins by turning about (Viterbi, 1967)."""
-    best = [(0.0, [False]), (evidence[0], [True])] if evidence else [(0.0, [])]
-    for told, jumped in zip(evidence[1:], about[1:], strict=True):
-        best = [
-            max(
-                ((score + told * wrong - against * (jumped and way[-1] == wrong), [*way, wrong]) for score, way in best),
-                key=itemgetter(0),
-            )
-            for wrong in (False, True)
-        ]
-    return max(best, key=itemgetter(0))[1]
+    alike though the second begins by turning about."""
+    own = [np.array([0.0, -told]) for told in evidence]
+    return [bool(wrong) for wrong in cheapest_path(own, lambda k: against * about[k] * np.eye(2))]

@@ -30,6 +30,7 @@ from hmc.search.filters import (
     truncated_drift,
 )
 from hmc.search.fitness import combined_cost, log_fitness, log_joint_fitness
+from hmc.search.paths import cheapest_path
 from hmc.search.truncated import truncated_normal
 from hmc.search.weights import effective_sample_size, normalise, survival_rate, systematic
 
@@ -40,6 +41,7 @@ __all__ = [
     "LayerInfo",
     "ParticleState",
     "annealed_step",
+    "cheapest_path",
     "combined_cost",
     "effective_sample_size",
     "filter_layer",

@@ -1,6 +1,6 @@
 """Left and right exchanged in some cameras: the best pattern of a frame, and which of it and its complement is right over time."""
 
-from itertools import combinations, product
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ from hmc.io.keypoints.layouts import KEYPOINTS
 from hmc.io.results import TrackTable
 from hmc.pose import keypoint_sides
 from hmc.pose.keypoint_cues import learn_scatter, with_keypoints
-from hmc.pose.keypoint_sides import cheapest_states, exchanged_sides, kept_or_exchanged
+from hmc.pose.keypoint_sides import exchanged_sides, kept_or_exchanged
 from hmc.pose.views import exchanged_sides as one_frame
 from hmc.pose.views.exchanged_sides import pattern_scores, patterns_of, sides_of_frame
 from hmc.pose.views.keypoints import lines_of_people
@@ -220,18 +220,6 @@ def test_one_way_that_is_wrong_does_not_outweigh_the_others():
     after[6] = np.nan
     kept, exchanged = kept_or_exchanged(ways, after, 1 / FPS)
     assert kept == pytest.approx(9) and exchanged == pytest.approx(6 * 9)
-
-
-@settings(max_examples=40, deadline=None)
-@given(st.integers(0, 10**6), st.integers(1, 8))
-def test_the_states_are_the_cheapest_of_all_sequences(seed, n):
-    rng = np.random.default_rng(seed)
-    own, breaks = rng.uniform(0, 5, (n, 2)), rng.uniform(0, 5, (n, 2))
-
-    def cost(states):
-        return sum(own[k, s] for k, s in enumerate(states)) + sum(breaks[k, states[k] ^ states[k - 1]] for k in range(1, n))
-
-    assert tuple(cheapest_states(own, breaks)) == min(product((0, 1), repeat=n), key=cost)
 
 
 def test_views_have_what_was_decided():
