@@ -45,8 +45,10 @@ def run(args: argparse.Namespace) -> int:
     from tqdm import tqdm
 
     from hmc.io.calibration import read_calibration
+    from hmc.io.results import read_joints
     from hmc.synthetic.recipe import check_recipe, load_recipe
     from hmc.synthetic.render import render_recording
+    from hmc.synthetic.truth import through_one_another
 
     recipe = load_recipe(args.recipe)
     changes = {"fps": args.fps, "silhouette_every": args.silhouette_every}
@@ -57,6 +59,8 @@ def run(args: argparse.Namespace) -> int:
         render_recording(
             recipe, args.out, args.seed, args.workers or os.cpu_count() or 1, on_progress=lambda done, _: bar.update(done - bar.n)
         )
+    for line in through_one_another(read_joints(args.out / "truth" / "joints.csv")):
+        print(f"note: {line}")
     print(f"{args.out}: a recording of {len(read_calibration(args.out))} cameras, {recipe.n_frames} frames each, with truth")
     print(f"next: hmc check {quote(str(args.out))}")
     return 0

@@ -1,13 +1,54 @@
-"""What is true of a rendered scene beyond joints and centroids: which part of an actor's body is at a place, and how it is painted."""
+"""What is true of a rendered scene beyond joints and centroids: which part of an actor's body is at a place, how it is painted, and whether
+people walk through one another."""
 
 from __future__ import annotations
+
+from itertools import combinations
 
 import numpy as np
 from scipy.spatial import cKDTree
 
+from hmc.io.results import PoseTable
+from hmc.landmarks import landmark_index
 from hmc.synthetic.scene import Crowd, Scene, crowd_at
 
-__all__ = ["true_colors", "true_parts"]
+__all__ = ["through_one_another", "true_colors", "true_parts"]
+
+#: Pelvises that are nearer than this, seen from above, metres, are of bodies in one another: people are about as deep as that.
+THROUGH_M = 0.2
+
+
+def through_one_another(poses: PoseTable) -> list[str]:
+    """Which people pass through each other, as no real ones do: recipes are not kept from it.
+
+    Parameters
+    ----------
+    poses : PoseTable
+        True ones.
+
+    Returns
+    -------
+    list of str
+        A line a pair.
+    """
+    pelvis = poses.positions[:, landmark_index("pelvis"), :2]
+    places = {person: dict(zip(*_of(poses, pelvis, person), strict=True)) for person in np.unique(poses.persons).tolist()}
+    lines = []
+    for one, other in combinations(places, 2):
+        apart = {frame: float(np.hypot(*(at - places[other][frame]))) for frame, at in places[one].items() if frame in places[other]}
+        near = [frame for frame, metres in apart.items() if metres < THROUGH_M]
+        if near:
+            nearest = min(near, key=lambda frame: apart[frame])
+            lines.append(
+                f"persons {one} and {other} are in one another in {len(near)} {'frames' if len(near) > 1 else 'frame'} "
+                f"({100 * apart[nearest]:.0f} cm from pelvis to pelvis in frame {nearest}), as no real people are"
+            )
+    return lines
+
+
+def _of(poses: PoseTable, points: np.ndarray, person: int) -> tuple[list[int], np.ndarray]:
+    rows = np.flatnonzero(poses.persons == person)
+    return poses.frames[rows].tolist(), points[rows]
 
 
 def true_parts(scene: Scene, frame: int, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -8,8 +8,11 @@ import pytest
 
 from hmc.cli import main
 from hmc.errors import InputError
+from hmc.io.results import PoseTable
+from hmc.landmarks import LANDMARKS
 from hmc.synthetic.recipe import load_recipe
 from hmc.synthetic.scene import build_scene
+from hmc.synthetic.truth import through_one_another
 
 
 def test_every_seed_gives_a_whole_recipe_of_its_own():
@@ -64,3 +67,18 @@ def test_it_is_rendered_as_the_command_asks(tmp_path):
 def test_rates_that_no_recipe_may_have_are_refused(tmp_path, capsys):
     assert main(["synth", "tiny", "--fps", "0.1", "--out", str(tmp_path / "room")]) == 2
     assert "fps must lie between 1 and 240" in capsys.readouterr().err
+
+
+def test_people_who_pass_through_each_other_are_told():
+    """Nobody keeps a recipe from it; what comes of such frames says nothing of a method."""
+    frames, along = np.arange(9), np.linspace(-1, 1, 9)
+    positions = np.zeros((2, 9, len(LANDMARKS), 3))
+    positions[0, :, :, 0], positions[1, :, :, 0] = along[:, None], -along[:, None]
+    positions[1, :, :, 1] = 0.15
+    table = PoseTable(np.tile(frames, 2), np.repeat([0, 3], 9), positions.reshape(18, -1, 3))
+    (line,) = through_one_another(table)
+    assert line.startswith("persons 0 and 3 are in one another in 1 frame (15 cm from pelvis to pelvis in frame 4)")
+    positions[1, :, :, 1] = 0.25
+    assert not through_one_another(PoseTable(table.frames, table.persons, positions.reshape(18, -1, 3)))
+    alone = np.tile(frames, 2)[:9]
+    assert not through_one_another(PoseTable(np.r_[alone, alone + 9], table.persons, 0 * table.positions))
