@@ -3,8 +3,8 @@
     hmc pose balancing --out out --height auto --cues silhouettes --frames 90
     python docs/trunk_turn.py balancing out --truth balancing/reference/joints.csv
 
-Where joints are another system's result, a turn of all of a trunk may be that system's own. The headings of the lines from right to left hip
-and shoulder are compared, frame by frame; keypoints are lines of sight met robustly and low-passed (`hmc.experiments.cue_runs`).
+Where joints are another system's result, a turn of all of a trunk may be that system's own. The headings of the lines from right to left
+hip and shoulder are compared, frame by frame; keypoints are lines of sight met robustly and low-passed (`hmc.experiments.cue_runs`).
 """
 
 from __future__ import annotations
