@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Mapping
 from itertools import cycle
 from typing import Any
 
@@ -83,14 +84,16 @@ def curves_svg(result: TrialResult) -> str:
             poses, tracks, rows = result.poses.of(person), result.tracks.of(person), result.states.persons == person
             doubtful = np.zeros(poses.positions.shape[:2], bool) if poses.doubtful is None else poses.doubtful
             whose = f"person {person}" if several else ""
-            _curve(axes[0], tracks.frames, speed(tracks.positions, tracks.frames, result.fps), result.fps, "#333333", dash, whose)
+            own = {"color": "#333333", "linestyle": dash, "label": whose}
+            _curve(axes[0], tracks.frames, speed(tracks.positions, tracks.frames, result.fps), result.fps, own)
             for axis, sides in zip(axes[1:3], JOINTS.values(), strict=True):
                 for joint, color, side in zip(sides, (LEFT, RIGHT), ("left", "right"), strict=True):
                     label = f"{side}, {whose}" if several else side
                     pale = np.asarray(doubtful[:, [landmark_index(name) for name in joint]].any(axis=1))
-                    _curve(axis, poses.frames, flexion(poses.positions, joint), result.fps, color, dash, label, pale)
+                    bent, style = flexion(poses.positions, joint), {"color": color, "linestyle": dash, "label": label}
+                    _curve(axis, poses.frames, bent, result.fps, style, pale)
             if result.states.costs is not None:
-                _curve(axes[3], result.states.frames[rows], result.states.costs[rows], result.fps, "#333333", dash, whose)
+                _curve(axes[3], result.states.frames[rows], result.states.costs[rows], result.fps, own)
         names = ("centroid, m/s", "knees bent, deg", "elbows bent, deg", "cost")
         for axis, name in zip(axes, names, strict=True):
             axis.set_ylabel(name)
@@ -106,9 +109,7 @@ def curves_svg(result: TrialResult) -> str:
     return text.getvalue()
 
 
-def _curve(
-    axis, frames: np.ndarray, values: np.ndarray, fps: float, color: str, dash: str, label: str, pale: np.ndarray | None = None
-) -> None:
+def _curve(axis, frames: np.ndarray, values: np.ndarray, fps: float, style: Mapping[str, str], pale: np.ndarray | None = None) -> None:
     """A curve with gaps where frames are missing."""
     if not len(frames):
         return
@@ -117,4 +118,4 @@ def _curve(
     if pale is not None:
         doubtful[frames - frames.min()] = pale
     at = np.arange(0, len(whole), max(1, -(-len(whole) // MOST_POINTS)))
-    draw_curve(axis, (at + frames.min()) / fps, whole[at], np.logical_or.reduceat(doubtful, at), label=label, color=color, linestyle=dash)
+    draw_curve(axis, (at + frames.min()) / fps, whole[at], np.logical_or.reduceat(doubtful, at), **style)

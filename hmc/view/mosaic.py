@@ -179,7 +179,6 @@ def render(
     frame: Frame | HullStep,
     people: list[Person],
     panel: np.ndarray,
-    panel_camera: Camera,
     outlines: bool = True,
     keypoints: Sequence[np.ndarray] | None = None,
 ) -> np.ndarray:
@@ -193,9 +192,7 @@ def render(
         Its images.
     people : list of Person
     panel : ndarray, shape (h, w, 3), uint8
-        The 3-D panel without people; they are drawn into a copy.
-    panel_camera : Camera
-        The panel's viewpoint.
+        The 3-D panel, people and all.
     outlines : bool
         Draw the flesh too, where it is known.
     keypoints : sequence of ndarray, shape (n_people, 26, 3), optional
@@ -227,12 +224,6 @@ def render(
         draw_label(picture, camera.name if known else f"{camera.name}: no image", (8, 18))
         y, x = row * cell_height + (cell_height - small.size[1]) // 2, column * cell_width + (cell_width - small.size[0]) // 2
         out[y : y + small.size[1], x : x + small.size[0]] = picture[: height - y, : width - x]
-    panel = panel.copy()
-    draw_people(panel, panel_camera, people, outlines)
-    draw_label(panel, f"{recording.name}, frame {frame.index}, {frame.index / recording.fps:.2f} s", (8, 18))
-    if any(person.landmarks is not None for person in people):
-        draw_label(panel, "left", (8, panel.shape[0] - 10), LEFT)
-        draw_label(panel, "right", (44, panel.shape[0] - 10), RIGHT)
     left, top = layout.panel[:2]
     out[top : top + panel.shape[0], left : left + panel.shape[1]] = panel
     return out
@@ -310,8 +301,14 @@ def stream_mosaics(
         draw_trails(panel, camera, result, frame.index)
         if grid is not None and isinstance(frame, HullStep):
             draw_voxels(panel, camera, grid, frame.strict)
+        people = people_in(result, frame.index)
+        draw_people(panel, camera, people, outlines)
+        draw_label(panel, f"{recording.name}, frame {frame.index}, {frame.index / recording.fps:.2f} s", (8, 18))
+        if any(person.landmarks is not None for person in people):
+            draw_label(panel, "left", (8, panel.shape[0] - 10), LEFT)
+            draw_label(panel, "right", (44, panel.shape[0] - 10), RIGHT)
         found = None if keypoints is None else keypoints.frame(frame.index)
-        yield frame.index, render(layout, recording, frame, people_in(result, frame.index), panel, camera, outlines, found)
+        yield frame.index, render(layout, recording, frame, people, panel, outlines, found)
 
 
 def run_silhouettes(
