@@ -244,6 +244,10 @@ OWN_REASONS = {
         "The silhouettes of the quick mode are clean: what only those with holes need, as the tolerant hull, costs there. "
         "docs/accuracy.md has recordings that need it."
     ),
+    "trust": (
+        "The coefficients are those of a fit to older poses, of a body without feet; poses have become nearer since, so that low numbers are "
+        "too low. A fit of today rests on an ankle that one camera alone sees and that nothing speaks against (pick_up with four cameras)."
+    ),
     "repairs": (
         "Completion is for people of the walls' color, who are in one of the three recordings; there shadows are not cut, and on tiles "
         "most are told by a single camera. docs/accuracy.md has seven more recordings."
