@@ -245,7 +245,7 @@ OWN_REASONS = {
         "docs/accuracy.md has recordings that need it."
     ),
     "trust": (
-        "The coefficients are those of a fit to older poses, of a body without feet; poses have become nearer since, so that low numbers are "
+        "The coefficients are those of a fit to older poses, of a body without feet; poses have become nearer, so that low numbers are "
         "too low. A fit of today rests on an ankle that one camera alone sees and that nothing speaks against (pick_up with four cameras)."
     ),
     "repairs": (
