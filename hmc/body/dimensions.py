@@ -26,7 +26,8 @@ class FitBodySettings:
     iterations : int
         Gauss-Newton steps.
     scale_deviation : float
-        Prior deviation of the common scale's logarithm: how far the stature may be off.
+        Prior deviation of the common scale's logarithm: how far the stature may be off. Of who is first seen crouching, with hidden feet, a
+        tenth.
     length_deviation, girth_deviation : float
         Prior deviations of the logarithms of single lengths and girths, from what they are at the common scale.
     prior_weight : float
@@ -34,7 +35,7 @@ class FitBodySettings:
     """
 
     iterations: int = 8
-    scale_deviation: float = 0.04
+    scale_deviation: float = 0.10
     length_deviation: float = 0.07
     girth_deviation: float = 0.20
     prior_weight: float = 4e-6
