@@ -55,6 +55,8 @@ figure { margin: 0; } figcaption { font-size: .8rem; color: #566072; }
 img { max-width: 100%; height: auto; display: block; } .curves { width: 100%; max-width: 820px; margin: .4rem 0; }
 a { color: #1f4f9c; }
 @media screen and (max-width: 640px) {
+  .wide { overflow-x: auto; } .wide .rig { max-width: none; width: 1200px; } .wide .curves { max-width: none; width: 640px; }
+  .wide::before { content: "wider than this screen: slide it sideways"; position: sticky; left: 0; font-size: .8rem; color: #566072; }
   .moments { grid-template-columns: repeat(3, 1fr); }
   .trials thead { display: none; } .trials, .trials tbody, .trials tr, .trials td { display: block; }
   .trials tr { border: 1px solid #d4dae4; border-radius: .5rem; margin: .6rem 0; padding: .3rem .2rem; }
@@ -81,6 +83,12 @@ class _Row:
     @property
     def anchor(self) -> str:
         return f"trial-{self.trial.name}".replace(" ", "-")
+
+    @property
+    def names(self) -> dict[int, str]:
+        """Who is who, by number: known where one person is in the trial, and one was found."""
+        found = [] if self.result is None else np.unique(self.result.poses.persons).tolist()
+        return {found[0]: self.trial.persons[0].name} if len(found) == len(self.trial.persons) == 1 else {}
 
     @property
     def problems(self) -> list[str]:
@@ -167,7 +175,7 @@ def _rig(rows: Sequence[_Row]) -> Iterator[str]:
             factor = min(1.0, RIG_PX / image.shape[1])
             image = cv2.resize(image, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
             data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, RIG_QUALITY])[1].tobytes()
-            yield f"<h2>The rig</h2>\n{_image(data, 'jpeg', 'the room from above, and what each camera sees')}"
+            yield f"<h2>The rig</h2>\n{_wide(_image(data, 'jpeg', 'the room from above, and what each camera sees', 'rig'))}"
             yield f'<p class="small">As <code>hmc check</code> has it for {escape(row.trial.name)}.</p>'
             return
 
@@ -180,7 +188,7 @@ def _trial(row: _Row) -> Iterator[str]:
     if result is not None:
         known = np.isfinite(result.poses.positions).all(axis=(1, 2))
         fitted = [f"a pose in {100 * known.mean():.0f} % of their frames"] if len(known) else []
-        lines = "; ".join([*result.lines, *fitted, *trust_line(result.poses)])
+        lines = "; ".join([*result.lines(row.names), *fitted, *trust_line(result.poses, row.names)])
         yield f"<p>{result.n_frames} frames, {result.fps:g} a second: {escape(lines)}.</p>"
     if row.problems:
         yield "<ul>"
@@ -204,13 +212,18 @@ def _pictures(row: _Row, result: TrialResult) -> Iterator[str]:
         yield f'</div><p class="small">{_MOMENTS_LEGEND}</p>'
     if result.n_persons:
         words = "speed of the centroid, how far knees and elbows are bent, and cost over time"
-        yield _image(curves_svg(result).encode(), "svg+xml", words, "curves")
+        yield _wide(_image(curves_svg(result).encode(), "svg+xml", words, "curves"))
         yield f'<p class="small">{_CURVES_LEGEND}</p>'
 
 
 def _image(data: bytes, kind: str, words: str, style: str = "") -> str:
     text = base64.b64encode(data).decode("ascii")
     return f'<img{f" class={style!r}" if style else ""} alt="{escape(words, quote=True)}" src="data:image/{kind};base64,{text}">'
+
+
+def _wide(image: str) -> str:
+    """A picture whose letters would be too small to read at the width of a phone: there it is slid sideways, by a finger or by keys."""
+    return f'<div class="wide" tabindex="0">{image}</div>'
 
 
 def _chip(status: str) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,8 @@ __all__ = ["TrialResult", "person_lines", "read_trial_result", "trust_line", "tr
 
 #: Landmarks that are named as doubtful, at most.
 MOST_NAMED = 3
+#: Of persons who are told by their numbers alone.
+NOBODY: Mapping[int, str] = MappingProxyType({})
 #: What `hmc pose` leaves; the last is written last.
 FILES = ("joints.csv", "tracks.csv", "pose.npz", "run.toml")
 
@@ -71,10 +74,9 @@ class TrialResult:
         summary = trust_summary(self.poses)
         return 1 - float(summary["doubtful"]) / float(summary["landmarks"]) if summary else float("nan")
 
-    @property
-    def lines(self) -> list[str]:
-        """What `hmc pose` says of the persons."""
-        return person_lines(self.poses, self.states, self.n_frames)
+    def lines(self, names: Mapping[int, str] = NOBODY) -> list[str]:
+        """What `hmc pose` says of the persons, who may have names."""
+        return person_lines(self.poses, self.states, self.n_frames, names)
 
 
 def read_trial_result(folder: str | Path) -> TrialResult | None:
@@ -91,14 +93,15 @@ def read_trial_result(folder: str | Path) -> TrialResult | None:
     return TrialResult(read_joints(joints), read_tracks(tracks), read_pose(states), read_run(run))
 
 
-def person_lines(poses: PoseTable, states: PoseStates, n_frames: int) -> list[str]:
-    """A line for every person: frames and stature; or that there is none."""
+def person_lines(poses: PoseTable, states: PoseStates, n_frames: int, names: Mapping[int, str] = NOBODY) -> list[str]:
+    """A line for every person, some of whom may have a name: frames and stature; or that there is none."""
     lines = []
     for person in np.unique(poses.persons):
         rows = poses.persons == person
         frames, body = poses.frames[rows], states.bodies.get(int(person))
         tall = "no pose" if body is None else f"stature about {stature({name: float(value) for name, value in body.items()}):.2f} m"
-        lines.append(f"person {person}: {rows.sum()} frames, from {frames.min()} to {frames.max()}, {tall}")
+        who = f"{names[int(person)]} (person {person})" if int(person) in names else f"person {person}"
+        lines.append(f"{who}: {rows.sum()} frames, from {frames.min()} to {frames.max()}, {tall}")
     return lines or [f"no person in {n_frames} frames"]
 
 
@@ -112,7 +115,7 @@ def trust_summary(poses: PoseTable) -> dict[str, Any]:
     return {"landmarks": int(there.sum()), "doubtful": int(doubtful.sum()), "persons": by_person}
 
 
-def trust_line(poses: PoseTable) -> list[str]:
+def trust_line(poses: PoseTable, names: Mapping[int, str] = NOBODY) -> list[str]:
     """A line on how many landmarks are doubtful, and which most of all; none where it is not known of any."""
     summary = trust_summary(poses)
     if not summary:
@@ -120,5 +123,5 @@ def trust_line(poses: PoseTable) -> list[str]:
     sums = {(person, name): n for person, own in summary["persons"].items() for name, n in own.items()}
     worst = sorted(sums, key=lambda one: -sums[one])[:MOST_NAMED]
     share = summary["doubtful"] / summary["landmarks"]
-    named = ", ".join(f"{name} of person {person} in {sums[person, name]} frames" for person, name in worst)
+    named = ", ".join(f"{name} of {names.get(int(person), f'person {person}')} in {sums[person, name]} frames" for person, name in worst)
     return [f"of {summary['landmarks']} landmarks {summary['doubtful']} are doubtful ({share:.1%}){': ' if named else ''}{named}"]

@@ -90,7 +90,9 @@ def test_a_page_is_whole_in_itself(tmp_path):
         "50 %",
         "0.50 s, frame 5",
         "Curves of knees and elbows are pale where",
-        "; of 120 landmarks 60 are doubtful (50.0%): pelvis of person 0 in 4 frames, ",
+        "; of 120 landmarks 60 are doubtful (50.0%): pelvis of Ana & Co in 4 frames, ",
+        "8 frames, 10 a second: Ana & Co (person 0): 8 frames, from 0 to 7",
+        "8 frames, 10 a second: person 0: 8 frames, from 0 to 7, no pose; person 1: ",  # who is who of two is not told
     ):
         assert said in page.text, said
     assert "<time>3 s</time>" in text and text == session_page(session_of(tmp_path, "one", "two people", "bad", "later"), tmp_path)
