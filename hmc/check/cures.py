@@ -2,17 +2,34 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from shlex import quote
 
-__all__ = ["sync_command", "world_command"]
+from hmc.io.places import AnyPlaces, to_places
+
+__all__ = ["check_command", "pose_command", "sync_command", "world_command"]
 
 
-def sync_command(recording: Path) -> str:
+def check_command(recording: AnyPlaces) -> str:
+    """Looks the recording over."""
+    return _command("check", recording)
+
+
+def pose_command(recording: AnyPlaces, result: str, *more: str) -> str:
+    """Finds all poses."""
+    return _command("pose", recording, "--out", result, *more)
+
+
+def sync_command(recording: AnyPlaces) -> str:
     """Finds when each camera took its frames."""
-    return f"hmc sync {quote(str(recording))}"
+    return _command("sync", recording)
 
 
-def world_command(recording: Path) -> str:
+def world_command(recording: AnyPlaces) -> str:
     """Finds up, the floor and the scale."""
-    return f"hmc world {quote(str(recording))}"
+    return _command("world", recording)
+
+
+def _command(name: str, recording: AnyPlaces, *more: str) -> str:
+    places = to_places(recording)
+    session = [] if places.session is None else ["--session", str(places.session)]
+    return " ".join(["hmc", name, *map(quote, [str(places.path), *session, *more])])

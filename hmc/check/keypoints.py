@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from hmc.camera.epipolar import epipolar_lines, fundamental_matrices, undistorte
 from hmc.camera.model import Rig
 from hmc.check.cures import sync_command
 from hmc.io.keypoints import KEYPOINTS, KeypointSource
+from hmc.io.places import AnyPlaces
 from hmc.io.recording import Recording
 
 __all__ = ["KeypointAgreement", "agreement_lines", "keypoint_agreement", "keypoint_findings"]
@@ -138,14 +138,14 @@ def keypoint_agreement(recording: Recording, keypoints: KeypointSource) -> Keypo
     )
 
 
-def keypoint_findings(agreement: KeypointAgreement, recording: Path) -> list[str]:
+def keypoint_findings(agreement: KeypointAgreement, recording: AnyPlaces) -> list[str]:
     """Name the cameras that are off in time or in place.
 
     Parameters
     ----------
     agreement : KeypointAgreement
-    recording : Path
-        Its folder, for the command that finds more.
+    recording : str, Path or RecordingPlaces
+        Its folder, or where its parts lie, for the command that finds more.
 
     Returns
     -------

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from hmc.cli.common import output_path, positive_float, whole_number
+from hmc.cli.common import add_session_option, given_places, output_path, positive_float, whole_number
 from hmc.io.files import real_path
 
 __all__ = ["add_parser", "run"]
@@ -26,6 +26,7 @@ def add_parser(subparsers) -> None:
         "where it is right already, or where there is too little to go by.",
     )
     parser.add_argument("recording", type=Path, help="folder of the recording")
+    add_session_option(parser)
     parser.add_argument(
         "--search", type=positive_float, default=10.0, metavar="S", help="cameras are apart by this at most, seconds (default: %(default)g)"
     )
@@ -38,13 +39,15 @@ def add_parser(subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print what was found, write the picture and, where cameras are out of time, into the recording."""
+    from hmc.check.cures import check_command, pose_command
     from hmc.check.sync import inspect_synchrony, sync_lines
     from hmc.check.sync.picture import save_sync_picture
     from hmc.check.sync.timing import new_timing
     from hmc.io.new_timing import write_new_timing
     from hmc.io.recording import open_recording
 
-    recording = open_recording(args.recording, frames=args.frames, any_world=True)
+    places = given_places(args)
+    recording = open_recording(places, frames=args.frames, any_world=True)
     found, shares = inspect_synchrony(recording, args.search, MOMENTS)
     name = real_path(args.recording).name
     first_frames, times = new_timing(recording, [one.course for one in found.cameras])
@@ -57,11 +60,13 @@ def run(args: argparse.Namespace) -> int:
         print(f"{name}: too little to go by (do people move, and do two cameras or more see them?); nothing is written")
     elif found.in_time:
         print(f"{name}: {'its cameras are' if found.all_sure else 'those that can be told are'} in time already; nothing is written")
+        print(f"next: {pose_command(places, f'{name}-result')}")
     elif args.dry_run:
         print(f"{name}: nothing is written (--dry-run)")
     else:
-        for line in write_new_timing(args.recording, first_frames, times):
+        for line in write_new_timing(args.recording, first_frames, times, "first_frame" in places.settings):
             print(line)
         if (args.recording / "truth").is_dir():
             print(f"{args.recording / 'truth'} still counts frames as before")
+        print(f"next: {check_command(places)}")
     return 0

@@ -6,7 +6,6 @@ import argparse
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from shlex import quote
 from typing import TYPE_CHECKING
 
 from hmc.cli.common import add_session_option, given_places, output_path, positive_float
@@ -93,6 +92,7 @@ def run(args: argparse.Namespace) -> int:
     """Print what was found, write the picture and, where it is another world, the calibration."""
     from hmc.camera.coverage import estimate_room
     from hmc.camera.world import in_world
+    from hmc.check.cures import check_command
     from hmc.check.find_world import Known, find_world
     from hmc.check.given_points import board_points, read_points
     from hmc.check.moments import knows_the_floor, moment_frames
@@ -146,6 +146,5 @@ def run(args: argparse.Namespace) -> int:
             print(line)
         if (args.recording / "truth").is_dir():
             print(f"{args.recording / 'truth'} is still in the old world")
-        if args.session is None:
-            print(f"next: hmc check {quote(str(args.recording))}")
+        print(f"next: {check_command(places)}")
     return 0

@@ -16,7 +16,7 @@ from hmc.io.timing import times_file, write_times
 __all__ = ["with_first_frames", "write_new_timing"]
 
 
-def write_new_timing(path: Path, first_frames: Mapping[str, int], times: Mapping[str, np.ndarray]) -> list[str]:
+def write_new_timing(path: Path, first_frames: Mapping[str, int], times: Mapping[str, np.ndarray], zeros: bool = False) -> list[str]:
     """Write ``first_frame`` of ``recording.toml`` and, of cameras for which that is not enough, ``times/CAMERA.csv``.
 
     Parameters
@@ -27,6 +27,8 @@ def write_new_timing(path: Path, first_frames: Mapping[str, int], times: Mapping
         Of the cameras that count frames; those with 0 need not be named.
     times : mapping of str to ndarray, shape (n,)
         Seconds, of the others' frames.
+    zeros : bool
+        Write a ``first_frame`` where all are 0 too: without one of its own a trial has its session's.
 
     Returns
     -------
@@ -34,9 +36,10 @@ def write_new_timing(path: Path, first_frames: Mapping[str, int], times: Mapping
         What was written and kept.
     """
     lines = []
+    path.mkdir(parents=True, exist_ok=True)  # a trial whose videos lie elsewhere has no folder of its own yet
     file = path / "recording.toml"
     text = read_text_file(file) if file.is_file() else ""
-    new = with_first_frames(text, first_frames)
+    new = with_first_frames(text, first_frames, zeros)
     if new != text:
         kept = f"; kept what was there: {keep_before(file)}" if file.is_file() else ""
         with atomic_write(file) as target:
@@ -50,8 +53,8 @@ def write_new_timing(path: Path, first_frames: Mapping[str, int], times: Mapping
     return lines
 
 
-def with_first_frames(text: str, first_frames: Mapping[str, int]) -> str:
-    """``recording.toml`` with another ``first_frame``, or without where all are 0; all else as it was."""
+def with_first_frames(text: str, first_frames: Mapping[str, int], zeros: bool = False) -> str:
+    """``recording.toml`` with another ``first_frame``, or, unless `zeros` are asked for, without where all are 0; all else as it was."""
     kept: list[str] = []
     place = None
     depth, inside, table = 0, False, False
@@ -71,7 +74,7 @@ def with_first_frames(text: str, first_frames: Mapping[str, int]) -> str:
         else:
             kept.append(line)
     named = ", ".join(f"{_key(name)} = {first}" for name, first in first_frames.items())
-    if any(first_frames.values()):
+    if zeros or any(first_frames.values()):
         place = len(kept) if place is None or (table and place > len(kept)) else place
         if place and not kept[place - 1].endswith("\n"):
             kept[place - 1] += "\n"

@@ -36,6 +36,7 @@ SOURCES = (
     "background/*/*",
     "keypoints/*",
     "keypoints/*/*",
+    "times/*",
     "pose/*/*",
 )
 
@@ -56,6 +57,8 @@ class RecordingPlaces:
         Path of the cameras' videos with ``{camera}`` in it, where its own folder has no videos/.
     settings : mapping
         Keys of ``recording.toml``, checked, where its own does not say.
+    session : Path or None
+        File of the session that gives all this, for commands that are proposed.
     """
 
     path: Path
@@ -63,6 +66,7 @@ class RecordingPlaces:
     background: Path | None = None
     videos: str | None = None
     settings: Mapping[str, Any] = field(default_factory=dict)
+    session: Path | None = None
 
     @property
     def there(self) -> bool:

@@ -9,7 +9,7 @@ import difflib
 import fnmatch
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -132,7 +132,7 @@ def places_in_session(session: Session, recording: str | Path) -> RecordingPlace
         if real_path(trial.places.path) == real_path(recording):
             return trial.places
     base = session.base
-    return RecordingPlaces(recording, base.calibration, base.background, None, base.settings)
+    return replace(base, path=recording)
 
 
 @dataclass(frozen=True)
@@ -155,7 +155,7 @@ class _Reading:
                 self.faults.append(f"`calibration`: {error}")
         if background is not None and not background.is_dir():
             self.faults.append(f"`background`: {background} is no folder; give one with a video or a subfolder of images a camera")
-        base = RecordingPlaces(folder, calibration, background, None, settings)
+        base = RecordingPlaces(folder, calibration, background, None, settings, self.path)
         pose = self.table(table.get("pose", {}), "[pose]")
         videos = self.pattern(table.get("videos"), "`videos`")
         folders = self.by_pattern(table)
@@ -220,7 +220,7 @@ class _Reading:
         selection = {key: table[key] for key in ("start", "frames") if key in table}
         options = {**pose, **self.table(table.get("pose", {}), f"{where} pose"), **selection}
         filled = None if pattern is None else str(root / pattern.replace(TRIAL, name))
-        return Trial(name, RecordingPlaces(folder, base.calibration, base.background, filled, settings), who, options)
+        return Trial(name, replace(base, path=folder, videos=filled, settings=settings), who, options)
 
     def by_pattern(self, table: Mapping[str, Any]) -> dict[str, Path]:
         """Folders by their names."""

@@ -259,8 +259,26 @@ def test_the_command_mends_a_recording(proper, tmp_path, capsys):
     lost = [frame.index for frame in iterate_frames(recording) if frame.images[3] is None]
     assert len(lost) == 1 and abs(lost[0] - 34) <= 1
     assert recording._own_views[3].in_file(60) == 65
+    assert said.endswith(f"next: hmc check {folder}\n")
     assert main(words) == 0
-    assert "in time already" in capsys.readouterr().out
+    assert capsys.readouterr().out.endswith(f"in time already; nothing is written\nnext: hmc pose {folder} --out late-result\n")
+
+
+def test_a_trial_of_a_session_is_mended_in_its_own_folder(proper, tmp_path, capsys):
+    lab = tmp_path / "lab"
+    trial, session = out_of_time(proper, lab / "trials" / "walk", {"cam_01": range(6, 70)}), lab / "session.toml"
+    (trial / "calibration.toml").rename(lab / "calibration.toml")
+    (trial / "recording.toml").unlink()
+    text = 'calibration = "calibration.toml"\ntrials = "trials/*"\n[recording]\nfps = 25\nfirst_frame = { cam_01 = 1 }\n'
+    session.write_text(text)
+    words = ["sync", str(trial), "--session", str(session), "--out", str(tmp_path / "a.png")]
+    assert main(words) == 0
+    assert capsys.readouterr().out.endswith(f"next: hmc check {trial} --session {session}\n")
+    assert session.read_text() == text
+    others = {"cam_00": 6, "cam_02": 6, "cam_03": 6, "cam_04": 6}
+    assert tomllib.loads((trial / "recording.toml").read_text()) == {"first_frame": {**others, "cam_01": 0}}
+    assert main(words) == 0
+    assert capsys.readouterr().out.endswith(f"next: hmc pose {trial} --session {session} --out walk-result\n")
 
 
 def test_the_command_says_where_there_is_too_little_to_go_by(ring, tmp_path, capsys):

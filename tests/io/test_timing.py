@@ -233,6 +233,7 @@ def test_only_the_first_frames_change(text):
     ] or "# first_frame" in text
     assert tomllib.loads(with_first_frames(text, {"cam_00": 0})) == before
     assert with_first_frames(new, {"cam_00": 0, "cam 1": 7}) == new
+    assert tomllib.loads(with_first_frames(new, {"cam_00": 0}, zeros=True)) == {**before, "first_frame": {"cam_00": 0}}
 
 
 def test_what_was_there_is_kept(tmp_path):

@@ -88,11 +88,23 @@ def test_changes_are_noticed_wherever_they_are(lab):
         before += 10
 
 
+def test_times_that_were_found_are_noticed(lab):
+    """What `hmc sync` writes makes a run that was finished another."""
+    import os
+
+    places = read_session(lab).trials[0].places
+    before, times = places.changed_s(), lab / "trials" / "one" / "times"
+    times.mkdir()
+    (times / "cam_01.csv").write_text("frame,time_s\n0,0\n")
+    os.utime(times / "cam_01.csv", (before + 10, before + 10))
+    assert places.changed_s() == before + 10
+
+
 def test_a_recording_by_its_folder_in_a_session(lab):
     session = read_session(lab / "session.toml")
     assert places_in_session(session, lab / "trials" / "one") is session.trials[0].places
     other = places_in_session(session, lab / "elsewhere")
-    assert other == RecordingPlaces(lab / "elsewhere", lab / "rig", lab / "empty", None, {"fps": 50.0})
+    assert other == RecordingPlaces(lab / "elsewhere", lab / "rig", lab / "empty", None, {"fps": 50.0}, lab / "session.toml")
 
 
 def test_trials_are_chosen_by_names_and_patterns(lab):
