@@ -17,8 +17,10 @@ __all__ = ["draw_rig", "draw_view", "rig_figure"]
 
 #: Points along a drawn line; enough that a distorted one looks curved.
 LINE_POINTS = 60
-#: Below the title of a picture stand so many lines of so many letters, at most.
-MOST_LINES, MOST_LETTERS = 5, 150
+#: Below the title of a picture stand so many lines of so many letters, at most; of one sentence so many.
+MOST_LINES, MOST_LETTERS, LINES_EACH = 6, 150, 3
+#: Color of a floor that people stand on and that is not the room's.
+FLOOR_COLOR = "lime"
 #: Width of a bold letter, and where a camera's name may stand above its place, first choice first; points.
 LETTER_POINTS, OFFSETS_POINTS = 7.0, (7.0, -19.0, 22.0, -34.0, 37.0)
 
@@ -127,7 +129,7 @@ def _free_offset(name: str, place: np.ndarray, side: int, point_m: float, taken:
     return above
 
 
-def draw_view(camera: Camera, room: np.ndarray, image: np.ndarray | None, ax=None):
+def draw_view(camera: Camera, room: np.ndarray, image: np.ndarray | None, ax=None, floor: np.ndarray | None = None):
     """Draw one image with the room's floor (a line a metre) and its upright edges.
 
     Parameters
@@ -136,6 +138,8 @@ def draw_view(camera: Camera, room: np.ndarray, image: np.ndarray | None, ax=Non
     room : ndarray, shape (2, 3)
     image : ndarray, shape (h, w, 3), uint8 BGR, or None
     ax : matplotlib Axes, optional
+    floor : ndarray, shape (n, 2, 3), optional
+        Lines of another floor, both ends of each.
 
     Returns
     -------
@@ -159,6 +163,8 @@ def draw_view(camera: Camera, room: np.ndarray, image: np.ndarray | None, ax=Non
     for x in (low[0], high[0]):
         for y in (low[1], high[1]):
             _draw_line(ax, camera, np.array([x, y, low[2]]), np.array([x, y, high[2]]), "tab:red", 0.6)
+    for start, stop in () if floor is None else floor:
+        _draw_line(ax, camera, start, stop, FLOOR_COLOR, 0.9)
     ax.set(xlim=(-0.5, width - 0.5), ylim=(height - 0.5, -0.5), xticks=[], yticks=[], aspect="equal")
     ax.set_title(f"{camera.name}, {width} x {height}", fontsize=9)
     return ax
@@ -169,7 +175,7 @@ def _draw_line(ax, camera: Camera, start: np.ndarray, stop: np.ndarray, color: s
     ax.plot(*np.where(valid[:, None], uv, np.nan).T, color=color, linewidth=width)
 
 
-def rig_figure(rig: Rig, room: np.ndarray, images: Sequence[np.ndarray | None], title: str = ""):
+def rig_figure(rig: Rig, room: np.ndarray, images: Sequence[np.ndarray | None], title: str = "", floor: np.ndarray | None = None):
     """The picture of a rig: `draw_rig` on the left, `draw_view` of each camera on the right.
 
     Parameters
@@ -179,7 +185,9 @@ def rig_figure(rig: Rig, room: np.ndarray, images: Sequence[np.ndarray | None], 
     images : sequence of ndarray or None
         One a camera.
     title : str
-        Its first line is the title; what follows, one line each, stands below it, cut short where it is too long or too much.
+        Its first line is the title; what follows stands below it, cut short where it is too long or too much.
+    floor : ndarray, shape (n, 2, 3), optional
+        As of `draw_view`; a legend says what it is.
 
     Returns
     -------
@@ -196,7 +204,12 @@ def rig_figure(rig: Rig, room: np.ndarray, images: Sequence[np.ndarray | None], 
     left, right = figure.subfigures(1, 2, width_ratios=(8, 3.4 * columns), squeeze=False)[0]
     draw_rig(rig, room, left.add_subplot())
     for index, (camera, image) in enumerate(zip(rig, images, strict=True)):
-        draw_view(camera, room, image, right.add_subplot(rows, columns, index + 1))
+        draw_view(camera, room, image, right.add_subplot(rows, columns, index + 1), floor)
+    if floor is not None:
+        from matplotlib.lines import Line2D
+
+        right.legend(handles=[Line2D([], [], color=FLOOR_COLOR, label="the floor on which people stand")], loc="outside lower right")
     first, *others = title.split("\n")
-    figure.suptitle("\n".join([first, *(textwrap.shorten(line, MOST_LETTERS, placeholder=" ...") for line in others[:MOST_LINES])]))
+    below = [part for line in others for part in textwrap.wrap(line, MOST_LETTERS, max_lines=LINES_EACH, placeholder=" ...")]
+    figure.suptitle("\n".join([first, *below[:MOST_LINES]]))
     return figure

@@ -21,14 +21,14 @@ from hmc.check.cures import sync_command
 from hmc.check.keypoints import KeypointAgreement, keypoint_agreement, keypoint_findings
 from hmc.check.moments import probe_masks
 from hmc.check.silhouettes import hull_findings
-from hmc.check.world_findings import world_findings
+from hmc.check.world_findings import floor_lines, world_findings
 from hmc.errors import InputError
 from hmc.io.calibration import CalibrationEntry, build_camera
 from hmc.io.door import read_text_file
 from hmc.io.footage import Footage, read_footage
 from hmc.io.keypoints import open_keypoints
 from hmc.io.naming import FILES, find_files, footage_items, item_name
-from hmc.io.places import AnyPlaces, to_places
+from hmc.io.places import AnyPlaces, places_of, to_places
 from hmc.io.recording import Frame, Recording, fitted, iterate_frames, open_recording, wrong_sizes, wrong_units
 from hmc.io.timing import rates_differ
 from hmc.io.views import find_views, gaps, missing_views
@@ -63,7 +63,8 @@ class Finding:
 class Inspection:
     """All findings, and as much of the recording as could be had for a picture: rig, room and one image a camera (or None).
 
-    ``keypoints`` says how far the cameras' keypoints agree, where a 2-D detector left some.
+    ``keypoints`` says how far the cameras' keypoints agree, where a 2-D detector left some; ``floor`` are lines of the floor on which
+    people stand (`hmc.check.world_findings.floor_lines`), where it is not the calibration's.
     """
 
     findings: tuple[Finding, ...]
@@ -72,6 +73,7 @@ class Inspection:
     images: tuple[np.ndarray | None, ...] = ()
     recording: Recording | None = None
     keypoints: KeypointAgreement | None = None
+    floor: np.ndarray | None = None
 
     @property
     def usable(self) -> bool:
@@ -81,7 +83,7 @@ class Inspection:
     @property
     def out_of_time(self) -> bool:
         """Whether a finding asks for `hmc.check.cures.sync_command`."""
-        return self.recording is not None and any(sync_command(self.recording.path) in finding.sentence for finding in self.findings)
+        return self.recording is not None and any(sync_command(places_of(self.recording)) in finding.sentence for finding in self.findings)
 
 
 def check_recording(path: AnyPlaces, cameras: Sequence[str] | None = None, read_all: bool = False) -> list[Finding]:
@@ -152,7 +154,7 @@ def inspect_recording(path: AnyPlaces, cameras: Sequence[str] | None = None, rea
         room = estimate_room(rig) if room is None else room
         say(*coverage(rig, room))
 
-    recording = keypoints = None
+    recording = keypoints = floor = None
     images = tuple(None if view is None else next(read_footage(view, 0, 1, lambda line: None, ""), None) for view in own)
     if not any(finding.severity == "error" for finding in found):
         try:
@@ -166,15 +168,15 @@ def inspect_recording(path: AnyPlaces, cameras: Sequence[str] | None = None, rea
             low, high = recording.room.round(1).tolist()
             say("note", [f"recording.toml gives no `room`; estimated from the rig: {low} to {high} m"])
         say("note", background(recording))
-        warnings, errors = _read(recording, read_all)
+        warnings, errors, floor = _read(recording, read_all)
         say("error", errors)
         say("warning", warnings)
         try:
             keypoints = _compare_keypoints(recording)
-            say("warning", [] if keypoints is None else keypoint_findings(keypoints, path))
+            say("warning", [] if keypoints is None else keypoint_findings(keypoints, places))
         except InputError as error:
             say("warning", [str(error)])
-    return Inspection(_sorted(found), rig, room, images, recording, keypoints)
+    return Inspection(_sorted(found), rig, room, images, recording, keypoints, floor)
 
 
 def _compare_keypoints(recording: Recording) -> KeypointAgreement | None:
@@ -347,8 +349,8 @@ def background(recording: Recording) -> list[str]:
     return sentences
 
 
-def _read(recording: Recording, read_all: bool) -> tuple[list[str], list[str]]:
-    """Warnings of what turns up while reading, and why the calibration's world is not the recording's room."""
+def _read(recording: Recording, read_all: bool) -> tuple[list[str], list[str], np.ndarray | None]:
+    """Warnings of what turns up while reading, why the calibration's world is not the recording's room, and lines of the floor then."""
     sentences: list[str] = []
     n = min(recording.n_frames, PROBE_FRAMES)
     wanted = {recording.start + round(i) for i in np.linspace(0, n - 1, COMPARED_FRAMES)}
@@ -362,7 +364,7 @@ def _read(recording: Recording, read_all: bool) -> tuple[list[str], list[str]]:
             dark.add(camera.name)
     sentences.extend(f"camera '{name}': its first image is black" for name in sorted(dark))
     masks = probe_masks(recording, probes)
-    wrong_world = world_findings(recording, masks)
+    wrong_world, ground = world_findings(recording, masks)
     if not wrong_world:
         sentences.extend(hull_findings(recording, masks))
-    return sentences, wrong_world
+    return sentences, wrong_world, None if ground is None else floor_lines(ground)

@@ -13,9 +13,10 @@ from hmc.camera.model import Camera, project
 from hmc.check.cures import sync_command
 from hmc.check.hull import Hull, best_move, beyond_room, coarse_grid, fine_hull, floor_height, misfit, odd_camera
 from hmc.check.moments import Masks
+from hmc.io.places import places_of
 from hmc.io.recording import Recording
 
-__all__ = ["covered_shares", "disagreements", "hull_findings", "silhouette_agreement"]
+__all__ = ["at_odds", "covered_shares", "filled_images", "hull_findings", "silhouette_agreement"]
 
 #: Spacing of the points that the hull is made of (metres; wider in a room that would need more than MAX_POINTS).
 SPACING_M = 0.06
@@ -49,8 +50,8 @@ class _View(NamedTuple):
     shape: tuple[int, int]
 
 
-def disagreements(recording: Recording, masks: Sequence[Sequence[np.ndarray | None]]) -> list[str]:
-    """Name the cameras whose silhouettes do not fit the others'.
+def at_odds(recording: Recording, masks: Sequence[Sequence[np.ndarray | None]]) -> tuple[str, str] | None:
+    """The camera whose silhouettes do not fit the others'.
 
     Parameters
     ----------
@@ -60,36 +61,34 @@ def disagreements(recording: Recording, masks: Sequence[Sequence[np.ndarray | No
 
     Returns
     -------
-    list of str
-        Empty when all fit; else one sentence, for the camera without which all others fit, or for all of them.
+    (name, sentence) or None
+        The camera without which all others fit, or "" where it is not one alone; None where all fit.
     """
     if all(len([mask for mask in frame if mask is not None]) < 3 for frame in masks):
-        return []
+        return None
     views = _views(recording)
     all_views = list(range(len(views)))
     shares = silhouette_agreement(views, masks, all_views)
     known = shares[~np.isnan(shares)]
     if not known.size or known.min() >= GOOD_AGREEMENT:
-        return []
-    names = recording.rig.names
+        return None
+    names, sync = recording.rig.names, sync_command(places_of(recording))
     for index in all_views:
         others = [other for other in all_views if other != index]
         rest = silhouette_agreement(views, masks, others)
         better = ~np.isnan(rest) & ~np.isnan(shares[others])
         if better.any() and rest[better].mean() >= max(GOOD_AGREEMENT, shares[others][better].mean() + GAIN):
-            return [
+            return names[index], (
                 f"camera '{names[index]}': its silhouettes do not fit the calibration and the other cameras', which fit each other; "
-                "is this its video, and has it moved since it was calibrated? If it is early or late, by how much finds: "
-                f"{sync_command(recording.path)}"
-            ]
+                f"is this its video, and has it moved since it was calibrated? If it is early or late, by how much finds: {sync}"
+            )
     if known.min() >= LEAST_AGREEMENT:
-        return []
+        return None
     listed = ", ".join(f"{name} {share:.0%}" for name, share in zip(names, shares, strict=True) if not np.isnan(share))
-    return [
+    return "", (
         f"silhouettes and calibration disagree (share of each that fits the others': {listed}); "
-        f"is each video that of its camera, and are they synchronised? That finds: "
-        f"{sync_command(recording.path)}"
-    ]
+        f"is each video that of its camera, and are they synchronised? That finds: {sync}"
+    )
 
 
 def hull_findings(recording: Recording, masks: Sequence[Sequence[np.ndarray | None]]) -> list[str]:
@@ -98,14 +97,14 @@ def hull_findings(recording: Recording, masks: Sequence[Sequence[np.ndarray | No
     Parameters
     ----------
     recording, masks
-        As for `disagreements`, to which it is left to say that cameras do not fit at all.
+        As for `at_odds`, to which it is left to say that cameras do not fit at all.
 
     Returns
     -------
     list of str
     """
     rig, room = recording.rig, recording.room
-    filled, masks = _filled(recording, masks)
+    filled, masks = filled_images(recording, masks)
     moments = [frame for frame in masks if sum(mask is not None and mask.any() for mask in frame) >= LEAST_VIEWS]
     grid = coarse_grid(rig, room) if moments else None
     hulls = [hull for frame in moments if grid and len((hull := fine_hull(rig, frame, grid)).strict)]
@@ -120,10 +119,11 @@ def hull_findings(recording: Recording, masks: Sequence[Sequence[np.ndarray | No
             f"people's feet are {depth * 100:.0f} cm below the floor, where they are cut off; the floor must be at z = 0 in the "
             "calibration, and the room's lower limit at the floor"
         )
-    return [*filled, *(cut or disagreements(recording, masks) or _odd_camera(recording, hulls))]
+    apart = at_odds(recording, masks)
+    return [*filled, *(cut or ([apart[1]] if apart else _odd_camera(recording, hulls)))]
 
 
-def _filled(recording: Recording, masks: Sequence[Masks]) -> tuple[list[str], list[Masks]]:
+def filled_images(recording: Recording, masks: Sequence[Masks]) -> tuple[list[str], list[Masks]]:
     """A sentence for each camera whose silhouettes are no people's, as they fill its image; and the silhouettes of the others."""
     shares = [np.median([1.0 * mask.mean() for mask in own if mask is not None] or [0.0]) for own in zip(*masks, strict=True)]
     sentences = [
@@ -155,7 +155,7 @@ def _odd_camera(recording: Recording, hulls: Sequence[Hull]) -> list[str]:
         sentence += f"; {then:.1%} of its own would if they were moved {way}"
     return [
         f"{sentence}; has it moved since it was calibrated, or is its video early or late? When each camera's frames were taken, finds: "
-        f"{sync_command(recording.path)}"
+        f"{sync_command(places_of(recording))}"
     ]
 
 

@@ -7,12 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from hmc.check.cures import sync_command, world_command
+from hmc.check.hidden import find_legs
 from hmc.check.moments import Masks
-from hmc.check.silhouettes import covered_shares
-from hmc.check.upright import Figure, find_figures, find_ground, level_share
+from hmc.check.silhouettes import at_odds, covered_shares, filled_images
+from hmc.check.upright import Figure, Ground, find_figures, find_ground, level_share
+from hmc.io.places import places_of
 from hmc.io.recording import Recording
 
-__all__ = ["world_findings"]
+__all__ = ["floor_lines", "world_findings"]
 
 #: People may stand this far from z, degrees, before the calibration's z is not up: hulls of a few moments tell it to some degrees.
 TILTED_DEG = 25.0
@@ -20,11 +22,13 @@ TILTED_DEG = 25.0
 STATURES_M = (0.6, 2.4)
 #: Share of a figure that must be within the room, a little widened, metres.
 INSIDE, AROUND_M = 0.3, 0.3
+#: How tall people mostly are, metres, and how many of these metres a floor that they tell is drawn to each side.
+USUAL_STATURE_M, DRAWN_M = 1.72, 2
 #: Cameras of one moment have this much of their silhouettes explained by the others' hull, at least, on the median.
 IN_TIME = 0.6
 
 
-def world_findings(recording: Recording, masks: Sequence[Masks]) -> list[str]:
+def world_findings(recording: Recording, masks: Sequence[Masks]) -> tuple[list[str], Ground | None]:
     """Why the calibration's world cannot be the recording's room; a sentence each, with the command to run.
 
     Parameters
@@ -34,17 +38,30 @@ def world_findings(recording: Recording, masks: Sequence[Masks]) -> list[str]:
 
     Returns
     -------
-    list of str
+    sentences : list of str
+    ground : Ground or None
+        The floor on which people stand, where the world is wrong and it can be told.
     """
-    rig, room = recording.rig, recording.room
+    rig = recording.rig
     shown = [frame for frame in masks if sum(mask is not None and bool(mask.any()) for mask in frame) >= max(3, len(rig) / 2)]
     if len(rig) < 3 or not shown:
-        return []
+        return [], None
     figures = find_figures(rig, shown)
-    cure = f"find up, the floor and the scale by: {world_command(recording.path)}"
+    ground = find_ground(rig, figures) if figures else None
+    sentences = _wrong_world(recording, shown, figures, ground)
+    if sentences and ground is not None:
+        ground = find_legs(rig, figures, shown, ground)[1]
+    return sentences, ground if sentences else None
+
+
+def _wrong_world(recording: Recording, shown: Sequence[Masks], figures: Sequence[Figure], ground: Ground | None) -> list[str]:
+    """The sentences of `world_findings`, of figures in the moments that are `shown`."""
+    rig, room = recording.rig, recording.room
+    cure = f"find up, the floor and the scale by: {world_command(places_of(recording))}"
     if not figures:
-        return []  # that silhouettes do not meet is told by how far they agree
-    ground = find_ground(rig, figures)
+        # Without one camera that is to blame poses may well be found; `hmc.check.silhouettes.hull_findings` tells of it.
+        apart = None if filled_images(recording, shown)[0] else at_odds(recording, shown)
+        return [apart[1]] if apart is not None and not apart[0] else []
     if ground is not None:
         tilt_deg = float(np.rad2deg(np.arccos(np.clip(ground.up[2], -1, 1))))
         # Who lies on the floor is no sign that the floor stands upright, where cameras are level by the calibration.
@@ -54,7 +71,7 @@ def world_findings(recording: Recording, masks: Sequence[Masks]) -> list[str]:
             said = f"people come out {ground.stature:.3g} m tall"
             covered = covered_shares(recording, shown)
             if np.isfinite(covered).any() and np.nanmedian(covered) < IN_TIME:
-                sync = sync_command(recording.path)
+                sync = sync_command(places_of(recording))
                 return [f"{said}, and little of what cameras see fits together: are they out of time ({sync})? Else {cure}"]
             return [f"{said}; the calibration is in other units than metres; {cure}"]
     if not any(_inside(one, room) >= INSIDE for one in figures):
@@ -62,6 +79,25 @@ def world_findings(recording: Recording, masks: Sequence[Masks]) -> list[str]:
         limits = " to ".join(f"({', '.join(f'{value:.1f}' for value in end)})" for end in room)
         return [f"people are not in the room: they are about ({where}), and it is {limits} m; correct `room` in recording.toml, or {cure}"]
     return []
+
+
+def floor_lines(ground: Ground) -> np.ndarray:
+    """The floor on which people stand as lines that lie about a metre apart, in the calibration's coordinates.
+
+    Parameters
+    ----------
+    ground : Ground
+
+    Returns
+    -------
+    ndarray, shape (n, 2, 3)
+        Both ends of each.
+    """
+    metre = ground.stature / USUAL_STATURE_M
+    across = np.linalg.svd(ground.up[None])[2][1:] * metre * DRAWN_M
+    places = np.linspace(-1, 1, 2 * DRAWN_M + 1)[:, None]
+    lines = [[place * one - other, place * one + other] for one, other in (across, across[::-1]) for place in places]
+    return ground.middle + np.array(lines)
 
 
 def _inside(figure: Figure, room: np.ndarray) -> float:

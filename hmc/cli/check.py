@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from shlex import quote
 
 from hmc.cli.common import add_session_option, camera_names, given_places, output_path
 from hmc.io.files import real_path
@@ -31,9 +30,10 @@ def add_parser(subparsers) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print one line a finding, a table of keypoints where there are some, and a last line that sums up; write the picture."""
     from hmc.check import inspect_recording
-    from hmc.check.cures import sync_command
+    from hmc.check.cures import pose_command, sync_command
 
-    inspection = inspect_recording(given_places(args), args.cameras, args.all)
+    places = given_places(args)
+    inspection = inspect_recording(places, args.cameras, args.all)
     for finding in inspection.findings:
         print(finding)
     if inspection.keypoints is not None:
@@ -47,13 +47,12 @@ def run(args: argparse.Namespace) -> int:
         from hmc.io.files import write_figure
 
         out = args.out or Path(f"{name}_check.png")
-        wrong = [str(finding) for finding in inspection.findings if finding.severity != "note"]
-        write_figure(out, rig_figure(inspection.rig, inspection.room, inspection.images, "\n".join([verdict, *wrong])), dpi=90)
+        title = "\n".join([verdict, *(str(finding) for finding in inspection.findings if finding.severity != "note")])
+        write_figure(out, rig_figure(inspection.rig, inspection.room, inspection.images, title, inspection.floor), dpi=90)
         print(f"picture: {out}")
-    if inspection.usable and args.session is None:
-        chosen = f" --cameras {quote(','.join(args.cameras))}" if args.cameras else ""
-        pose = f"hmc pose {quote(str(args.recording))} --out {quote(f'{name}-result')}{chosen}"
-        print(*([f"next: {sync_command(args.recording)}", f"then: {pose}"] if inspection.out_of_time else [f"next: {pose}"]), sep="\n")
+    if inspection.usable:
+        pose = pose_command(places, f"{name}-result", *(["--cameras", ",".join(args.cameras)] if args.cameras else []))
+        print(*([f"next: {sync_command(places)}", f"then: {pose}"] if inspection.out_of_time else [f"next: {pose}"]), sep="\n")
     print(verdict)
     return 0 if inspection.usable else 2
 

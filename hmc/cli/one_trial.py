@@ -116,7 +116,7 @@ def _check(session, trial, options: TrialOptions, state):
         found.extend(inspection.findings)
         picture.unlink(missing_ok=True)
         if inspection.rig is not None and inspection.room is not None:
-            write_figure(picture, rig_figure(inspection.rig, inspection.room, inspection.images, trial.name), dpi=90)
+            write_figure(picture, rig_figure(inspection.rig, inspection.room, inspection.images, trial.name, inspection.floor), dpi=90)
 
     state = replace(_timed(state, "check", check), findings=tuple(map(str, found)), checked=source)
     for finding in found:

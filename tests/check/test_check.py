@@ -143,8 +143,8 @@ def test_swapped_cameras_are_noticed(body_folder):
     (body_folder / "silhouettes" / "cam_00").rename(body_folder / "x")
     (body_folder / "silhouettes" / "cam_01").rename(body_folder / "silhouettes" / "cam_00")
     (body_folder / "x").rename(body_folder / "silhouettes" / "cam_01")
-    (warning,) = sentences(check_recording(body_folder), "warning")
-    assert warning.startswith("silhouettes and calibration disagree")
+    (error,) = sentences(check_recording(body_folder), "error")  # of such hulls nothing is left, and nobody would be found
+    assert error.startswith("silhouettes and calibration disagree") and error.endswith(f"That finds: hmc sync {body_folder}")
 
 
 def test_many_faults_at_once(recording_folder):
@@ -290,7 +290,10 @@ def test_view_cone_of_a_camera_that_looks_down():
 def test_picture(tmp_path, ring):
     room = np.array([[-1.5, -1.5, 0], [1.5, 1.5, 2.4]])
     image = np.full((120, 160, 3), 90, np.uint8)
-    figure = rig_figure(ring, room, [image, None, image, image, image], "ring: a verdict\n" + "error: long " * 40)
+    figure = rig_figure(ring, room, [image, None, image, image, image], "ring: a verdict\n" + "error: long " * 20 + "hmc world it")
+    assert figure.get_suptitle().startswith("ring: a verdict\nerror: long ") and figure.get_suptitle().endswith(" hmc world it")
+    endless = rig_figure(ring, room, [None] * 5, "ring: a verdict\n" + "error: long " * 90).get_suptitle().split("\n")
+    assert len(endless) == 4 and endless[-1].endswith(" ...")
     write_figure(tmp_path / "rig.png", figure, dpi=90)
     picture = cv2.imread(str(tmp_path / "rig.png"))
     assert picture is not None and picture.shape[1] > 900

@@ -13,11 +13,12 @@ from scipy.spatial.transform import Rotation
 
 from hmc.camera.model import Rig, look_at, project
 from hmc.camera.world import World, in_world
-from hmc.check import check_recording
+from hmc.check import check_recording, inspect_recording
 from hmc.check.find_world import Known, find_world
 from hmc.check.given_points import board_points, read_points
 from hmc.check.hidden import find_legs, hidden_below, shown_below
 from hmc.check.upright import Figure, find_figures, find_ground
+from hmc.check.world_findings import floor_lines
 from hmc.cli import main
 from hmc.errors import InputError
 from hmc.io.calibration import read_calibration, write_calibration
@@ -51,6 +52,9 @@ def test_up_floor_and_stature_are_found_in_any_world(ring, moments, name):
     assert abs(world.old_points(ground.middle)[2]) < 0.06
     assert ground.stature / world.scale == pytest.approx(HEIGHT_M, abs=0.08)
     assert (ground.standing, ground.figures) == (8, 8)
+    lines = world.old_points(floor_lines(ground).reshape(-1, 3)).reshape(-1, 2, 3)
+    assert lines.shape == (10, 2, 3) and np.abs(lines[..., 2]).max() < 0.12
+    assert_allclose([np.linalg.norm(a[0] - b[0]) for a, b in pairwise(lines[:5])], HEIGHT_M / 1.72, atol=0.06)
 
 
 def standing_still(world, rng, n_moments=12):
@@ -152,6 +156,7 @@ def test_a_session_gets_a_calibration_beside_its_file(ring, moments, tmp_path, c
     assert main(words) == 0
     said = capsys.readouterr().out
     assert 'calibration = "calibration_world.toml"' in said and "`units`" in said
+    assert said.endswith(f"next: hmc check {lab / 'trials' / 'walk'} --session {lab / 'session.toml'}\n")
     assert (lab / "session.toml").read_text() == text and not (lab / "trials" / "walk" / "calibration.toml").exists()
     found = read_calibration(lab / "calibration_world.toml")
     apart = [np.linalg.norm(rig[0].centre - rig[2].centre) for rig in (found, ring)]
@@ -259,6 +264,8 @@ def test_the_command_writes_a_calibration_that_check_finds_right(ring, tmp_path,
     errors = [one.sentence for one in check_recording(folder) if one.severity == "error"]
     assert len(errors) == 1 and re.search(r"people stand .* degrees.*hmc world", errors[0])
     assert main(["check", str(folder), "--out", str(tmp_path / "check.png")]) == 2
+    picture = cv2.imread(str(tmp_path / "check.png")).astype(int)
+    assert ((picture[..., 1] > 200) & (picture[..., [0, 2]].max(axis=-1) < 60)).sum() > 1000  # the floor on which people stand, in green
     assert main(["world", str(folder), "--out", str(tmp_path / "world.png"), "--dry-run"]) == 0
     assert not list(folder.glob("*_before*"))
     assert main(["world", str(folder), "--out", str(tmp_path / "world.png")]) == 0
@@ -270,7 +277,8 @@ def test_the_command_writes_a_calibration_that_check_finds_right(ring, tmp_path,
     assert_allclose([np.linalg.norm(a.centre - b.centre) for a, b in pairwise(rig)], 2 * 3.5 * np.sin(np.pi / 5), rtol=1e-6)
     assert_allclose(rig.centres[:, 2], 2.0, atol=0.15)
     assert "room" not in tomllib.loads((folder / "recording.toml").read_text())
-    assert not [one for one in check_recording(folder) if one.severity == "error"]
+    inspection = inspect_recording(folder)
+    assert inspection.usable and inspection.floor is None
     assert main(["world", str(folder), "--out", str(tmp_path / "world.png")]) == 0
 
 
