@@ -163,8 +163,9 @@ def fish(commands: Sequence[CompletedCommand]) -> str:
         for option in one.options:
             named = " ".join(f"-l {name[2:]}" if name.startswith("--") else f"-s {name[1:]}" for name in option.names)
             value = f" -r{'' if option.files else 'f'}" if option.takes_value else ""
-            value += f" -a {_fish_quoted(' '.join(option.values))}" if option.values else ""
             value += " -F" if option.files else ""
+            if option.values:  # a line of their own, as the description would be told of each value too; of two lines the last describes
+                lines.append(f"{start} {named}{value} -a {_fish_quoted(' '.join(option.values))}")
             lines.append(f"{start} {named}{value} -d {_fish_quoted(option.help)}")
     return "\n".join(lines) + "\n"
 

@@ -65,9 +65,9 @@ def zsh(folder):
 def fish(folder):
     path = script_of("fish", folder)
 
-    def ask(*words):
+    def ask(*words, described=False):
         line = f"source {path}; complete -C {shlex.quote(shlex.join(words[:-1]) + ' ' + words[-1])}"
-        return [row.split("\t")[0] for row in run(["fish", "--no-config", "-c", line], folder)]
+        return [row.rstrip() if described else row.split("\t")[0] for row in run(["fish", "--no-config", "-c", line], folder)]
 
     return ask
 
@@ -102,3 +102,5 @@ def test_fish_completes_the_same(fish):
     assert fish("hmc", "pose", "--method", "shbm") == sorted(name for name in METHODS if name.startswith("shbm"))
     assert "my session.toml" in " ".join(fish("hmc", "run", "my")).replace("\\ ", " ")
     assert fish("hmc", "experiments", "sta") == ["status"]
+    assert fish("hmc", "pose", "--method", "smd", described=True) == ["smd"]  # what the option is says nothing of one value
+    assert fish("hmc", "pose", "--pass", described=True)[0].startswith("--passes\t")
