@@ -4,7 +4,8 @@
 
 Makes four recordings of one with truth, which differ in their calibration's world alone (the first camera's; squares of a board; Y up
 in millimetres; Z down), and runs `hmc check`, which must refuse each, `hmc world` and `hmc pose` on them, and `hmc pose` on the recording
-as it is. Poses are brought back into the recording's world by the cameras' places, and compared with the truth.
+as it is, and on its rig without room and number of people, of which the four are told nothing. Poses are brought back into the
+recording's world by the cameras' places, and compared with the truth.
 
     python docs/any_rig.py RECORDING... --up
 
@@ -113,7 +114,13 @@ def main() -> int:
     proper = open_recording(source)
     options = ["--height", "auto", "--cues", "silhouettes", "--frames", given.frames, "--quiet"]
     hmc("pose", str(source), "--out", str(given.out / "proper"), *options)
-    lines = [f"proper: {error_mm(given.out / 'proper', source, World()):.1f} mm"]
+    # The others are told neither room nor number of people; how much that alone changes shows the proper rig without them.
+    make(source, given.out / "untold", proper.rig, proper.fps)
+    hmc("pose", str(given.out / "untold"), "--out", str(given.out / "untold-pose"), *options)
+    lines = [
+        f"proper: {error_mm(given.out / 'proper', source, World()):.1f} mm",
+        f"proper, told no more than the others: {error_mm(given.out / 'untold-pose', source, World()):.1f} mm",
+    ]
     for name, (world, words) in worlds(proper.rig).items():
         folder, result = given.out / name, given.out / f"{name}-pose"
         make(source, folder, in_world(proper.rig, world), proper.fps)
