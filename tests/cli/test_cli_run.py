@@ -114,6 +114,7 @@ def test_a_trials_result_is_that_of_hmc_pose_and_can_be_drawn(lab, finished, tmp
     assert (tmp_path / "out" / "joints.csv").read_bytes() == (finished / "one" / "joints.csv").read_bytes()
     assert main(["view", str(finished / "one"), trial, *session, "--no-voxels", "--out", str(tmp_path / "a.png")]) == 0
     assert main(["check", trial, "--session", str(lab / "session.toml"), "--out", str(tmp_path / "check.png")]) == 0
+    assert f"\nnext: hmc pose {trial} --session {lab / 'session.toml'} --out one-result\n" in capsys.readouterr().out
 
 
 def test_a_fault_of_one_trial_does_not_stop_the_others(tmp_path, capsys):
