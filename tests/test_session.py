@@ -305,7 +305,7 @@ def test_of_frames_that_came_meanwhile_the_newest_is_taken(caplog):
     session, told = Slow(fps=1e9), []
     done = live(session, counting(session, 10), lambda found, images: told.append(images))
     assert session.seen == told == [0, 9] and (done.steps, done.dropped, done.between) == (2, 8, 0)
-    assert "8 of 10 frames were dropped" in caplog.text
+    assert "8 of 10 frames were dropped" in caplog.text and "fewer frames a second (`fps`)" in caplog.text
 
 
 def test_frames_may_wait():

@@ -85,7 +85,10 @@ def live(session: Session, source: Iterable[Images], on_frame: Callable[[LiveFra
     finally:
         waiting.close()
     if waiting.dropped:
-        logger.warning(f"{waiting.dropped} of {steps + waiting.dropped} frames were dropped: they came while others were worked on")
+        logger.warning(
+            f"{waiting.dropped} of {steps + waiting.dropped} frames were dropped: they came while others were worked on; give the session "
+            "fewer frames a second (`fps`), larger voxels or fewer cameras, or let more frames wait (`wait_s`)"
+        )
     return Played(steps, waiting.dropped, waiting.between)
 
 
