@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
 
+from hmc.camera.model import Rig
 from hmc.check.cures import sync_command, world_command
 from hmc.check.hidden import find_legs
 from hmc.check.moments import Masks
@@ -24,6 +26,8 @@ STATURES_M = (0.6, 2.4)
 INSIDE, AROUND_M = 0.3, 0.3
 #: How tall people mostly are, metres, and how many of these metres a floor that they tell is drawn to each side.
 USUAL_STATURE_M, DRAWN_M = 1.72, 2
+#: Cameras that agree with each other and tell a run of others that they do not fit (docs/reliability.md).
+LEFT_TO_JUDGE = 4
 #: Cameras of one moment have this much of their silhouettes explained by the others' hull, at least, on the median.
 IN_TIME = 0.6
 
@@ -59,9 +63,9 @@ def _wrong_world(recording: Recording, shown: Sequence[Masks], figures: Sequence
     rig, room = recording.rig, recording.room
     cure = f"find up, the floor and the scale by: {world_command(places_of(recording))}"
     if not figures:
-        # Without one camera that is to blame poses may well be found; `hmc.check.silhouettes.hull_findings` tells of it.
+        # Without one or two cameras that are to blame poses may well be found; `hmc.check.silhouettes.hull_findings` tells of them.
         apart = None if filled_images(recording, shown)[0] else at_odds(recording, shown)
-        return [apart[1]] if apart is not None and not apart[0] else []
+        return [apart[1]] if apart is not None and not apart[0] and not _meet_without_two(rig, shown[len(shown) // 2]) else []
     if ground is not None:
         tilt_deg = float(np.rad2deg(np.arccos(np.clip(ground.up[2], -1, 1))))
         # Who lies on the floor is no sign that the floor stands upright, where cameras are level by the calibration.
@@ -79,6 +83,12 @@ def _wrong_world(recording: Recording, shown: Sequence[Masks], figures: Sequence
         limits = " to ".join(f"({', '.join(f'{value:.1f}' for value in end)})" for end in room)
         return [f"people are not in the room: they are about ({where}), and it is {limits} m; correct `room` in recording.toml, or {cure}"]
     return []
+
+
+def _meet_without_two(rig: Rig, masks: Masks) -> bool:
+    """Whether silhouettes of one moment meet without some two cameras, and there are as many others as a run needs to leave them out."""
+    pairs = itertools.combinations(range(len(rig)), 2) if len(rig) >= LEFT_TO_JUDGE + 2 else ()
+    return any(find_figures(rig, [[None if c in pair else mask for c, mask in enumerate(masks)]]) for pair in pairs)
 
 
 def floor_lines(ground: Ground) -> np.ndarray:

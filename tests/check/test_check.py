@@ -147,6 +147,18 @@ def test_swapped_cameras_are_noticed(body_folder):
     assert error.startswith("silhouettes and calibration disagree") and error.endswith(f"That finds: hmc sync {body_folder}")
 
 
+def test_of_seven_cameras_two_may_fail(tmp_path):
+    """A run leaves them out, so that the recording can be used."""
+    angles = np.linspace(0, 2 * np.pi, 7, endpoint=False)
+    rig = [look_at(f"cam_{k:02d}", (160, 120), [3.5 * np.cos(a), 3.5 * np.sin(a), 2.0], [0, 0, 0.9], 60) for k, a in enumerate(angles)]
+    folder = draw_recording(tmp_path / "walk", Rig(tuple(rig)), walk(3), silhouettes=True)
+    names = [folder / "silhouettes" / name for name in ("cam_01", "cam_03", "x")]
+    for one, other in ((names[0], names[2]), (names[1], names[0]), (names[2], names[1])):
+        one.rename(other)
+    findings = check_recording(folder)
+    assert not sentences(findings, "error") and any("silhouettes" in one for one in sentences(findings, "warning"))
+
+
 def test_many_faults_at_once(recording_folder):
     """The first fault does not hide the others."""
     (recording_folder / "recording.toml").write_text("fsp = 25\n")
