@@ -167,12 +167,13 @@ def _tell(session, trials: Sequence, out: Path) -> None:
     """A line for every trial of this call, and how many of the session failed."""
     from hmc.trials.page import problems_of
     from hmc.trials.quality import read_trial_result
-    from hmc.trials.state import FAILED, read_state
+    from hmc.trials.state import DONE, FAILED, read_state
 
-    failed = []
+    failed, done = [], 0
     for trial in trials:
         state = read_state(out / trial.name)
         failed += [trial.name] if state.status == FAILED else []
+        done += state.status == DONE
         result = None if state.status == FAILED else read_trial_result(out / trial.name)
         if result is None:
             print(f"{trial.name}: {state.status}{': ' * bool(state.fault)}{state.fault}")
@@ -182,7 +183,7 @@ def _tell(session, trials: Sequence, out: Path) -> None:
             f"{trial.name}: {state.status}, {result.n_frames} frames, {people} person{'s' * (people != 1)}, "
             f"{problems} problem{'s' * (problems != 1)}, {sum(state.seconds.values()):.0f} s"
         )
-    print(f"{len(trials) - len(failed)} of {len(trials)} trials done" + f"; failed: {', '.join(failed)}" * bool(failed))
+    print(f"{done} of {len(trials)} trials done" + f"; failed: {', '.join(failed)}" * bool(failed))
 
 
 def _report(session, out: Path) -> None:

@@ -13,8 +13,10 @@ from methods import TINY, lean_method
 
 from hmc.cli import main
 from hmc.cli import pose as command
+from hmc.cli.run import _tell
 from hmc.io.results import read_run
-from hmc.trials.state import DONE, FAILED, read_state
+from hmc.trials.session_file import read_session
+from hmc.trials.state import BEGUN, DONE, FAILED, read_state, write_state
 
 ROOT = Path(__file__).resolve().parents[2]
 SESSION = """
@@ -105,6 +107,14 @@ def test_what_is_finished_is_not_repeated(lab, finished, capsys):
     assert (finished / "report.html").read_bytes() == page
     said = capsys.readouterr().out
     assert "was finished before" in said and "one: done, 4 frames, 1 person, " in said and "2 of 2 trials done" in said
+
+
+def test_what_another_run_is_at_work_on_is_not_done(lab, finished, capsys):
+    state, session = read_state(finished / "one"), read_session(lab)
+    write_state(finished / "one", replace(state, status=BEGUN))
+    _tell(session, session.trials, finished)
+    assert "one: not finished, 4 frames" in (said := capsys.readouterr().out) and "1 of 2 trials done" in said
+    write_state(finished / "one", state)
 
 
 def test_a_trials_result_is_that_of_hmc_pose_and_can_be_drawn(lab, finished, tmp_path, capsys):
