@@ -53,6 +53,7 @@ def draw(path, camera, image, found):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("recording", type=Path)
+    parser.add_argument("--cameras", type=lambda text: text.split(","), metavar="A,B,...", help="those of the recording (default: all)")
     parser.add_argument("--fps", type=float, help="steps a second; fewer than can be kept up with (default: the cameras')")
     parser.add_argument("--wait", type=float, default=4.0, help="seconds that frames may wait while a first pose is found")
     parser.add_argument("--speed", type=float, default=1.0, help="of playing; 1 is real")
@@ -66,14 +67,18 @@ def main():
         rig, source, fps, room, persons = read_calibration(args.recording), filmed(args.webcams), 30.0, None, None
         background = [[image for image in images if image is not None] for images in zip(*islice(source, EMPTY_FRAMES), strict=True)]
     else:
-        recording = hmc.open_recording(args.recording)
+        recording = hmc.open_recording(args.recording, cameras=args.cameras)
         rig, fps, room, persons = recording.rig, recording.fps, recording.room, recording.persons
         background = [background_frames(recording, camera) for camera in range(len(rig))]
         source = chain.from_iterable(played(recording, args.speed) for _ in range(args.repeat))
     session = hmc.Session(rig, background, args.fps or fps, room, persons=persons, voxel_size_m=args.voxel)
     print(f"first pose {session.first_delay_s:.1f} s after a person is there; from then on poses are {session.delay_s:.1f} s old at most")
 
+    delays, worked = [], [time.process_time()]
+
     def show(found, images):
+        worked.append(time.process_time())
+        delays.extend(found.index - person.decided_frame for person in found.people.values() if person.decided_frame is not None)
         for number, person in found.people.items():
             x, y, _ = person.position
             head = "" if person.latest is None else f", head at {person.latest[HEAD, 2]:.2f} m"
@@ -84,8 +89,12 @@ def main():
 
     begun = time.monotonic()
     done = hmc.live(session, source, show, args.wait)
-    rate = done.steps / (time.monotonic() - begun)
-    print(f"{done.steps} steps, {rate:.1f} a second; {done.dropped} frames dropped, {done.between} left out between steps")
+    print(f"{done.steps} steps, {done.steps / (time.monotonic() - begun):.1f} a second")
+    if done.steps:
+        each = np.diff(worked)
+        print(f"a step takes {np.median(each):.2f} s of one processor on the median, {each.max():.1f} s at most")
+    decided = f"poses {max(delays) / session.fps:.1f} s old at most" if delays else "no pose was decided"
+    print(f"{done.dropped} frames dropped, {done.between} left out between steps; {decided}")
 
 
 if __name__ == "__main__":
