@@ -371,6 +371,7 @@ def check_recipe(recipe: Recipe, where: str) -> None:
         if not low <= value <= high:
             raise InputError(f"{where}: {what} must lie between {low} and {high}; got {value}")
 
+    within(recipe.seed, 0, 2**63 - 1, "seed")
     within(recipe.fps, 1, 240, "fps")
     within(recipe.seconds, 0, 3600, "seconds")
     within(recipe.background_frames, 0, 10000, "background_frames")

@@ -8,6 +8,7 @@ centre is ``origin + size * (i + 0.5, j + 0.5, k + 0.5)``. A rounded coordinate 
 from __future__ import annotations
 
 import os
+import sys
 from dataclasses import dataclass
 
 import numpy as np
@@ -124,7 +125,24 @@ class VoxelGrid:
 
 
 def available_memory() -> int:
-    """Bytes of memory free for a new process, as the system tells; a stated guess of 2 GiB where it does not."""
+    """Bytes of memory free for this process: what the system tells (a stated guess of 2 GiB where it does not), and no more than its own
+    limit leaves (`ulimit -v`)."""
+    return min(_free_memory(), _left_of_limit())
+
+
+def _left_of_limit() -> int:
+    try:
+        import resource
+
+        limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+        with open("/proc/self/statm", encoding="ascii") as file:
+            used = int(file.read().split()[0]) * resource.getpagesize()
+    except (ImportError, OSError, ValueError, IndexError):
+        return sys.maxsize
+    return sys.maxsize if limit == resource.RLIM_INFINITY else max(0, limit - used)
+
+
+def _free_memory() -> int:
     try:
         with open("/proc/meminfo", encoding="ascii") as file:
             for line in file:

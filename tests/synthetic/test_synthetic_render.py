@@ -231,6 +231,7 @@ def test_the_shipped_recipes_cover_the_motions():
         ({"room": {"wall_colors": [[0.1, 0.2]]}}, "'wall_colors' has a value of the wrong kind"),
         ({"furniture": [{"kind": "table"}]}, "'at_m' is missing"),
         ({"actor": [{"height_m": 17}]}, "height_m must lie between"),
+        ({"seed": -3}, "seed must lie between 0 and"),
         ({"room": {"size_m": [2147483648, 4, 3]}}, r"each side of the room, size_m, must lie between 1 and 60\.0; got 2147483648"),
         ({"room": {"size_m": [5, float("nan"), 3]}}, "each side of the room, size_m, must lie between"),
         ({"room": {"posters": 10**9}}, "posters must lie between"),

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hmc.errors import InputError
-from hmc.voxels.grid import BYTES_PER_CAMERA, BYTES_PER_VOXEL, MEMORY_SHARE, VoxelGrid, check_memory
+from hmc.voxels.grid import BYTES_PER_CAMERA, BYTES_PER_VOXEL, MEMORY_SHARE, VoxelGrid, available_memory, check_memory
 
 
 def test_first_centre_lies_half_a_voxel_inside_the_room():
@@ -56,6 +56,16 @@ def test_too_fine_a_grid_says_what_it_needs_and_what_would_fit():
     check_memory(extent, fits, 7, available)
     needed = np.prod(np.ceil(extent / fits)) * (BYTES_PER_VOXEL + 7 * BYTES_PER_CAMERA)
     assert 0.8 * MEMORY_SHARE * available < needed <= MEMORY_SHARE * available
+
+
+def test_memory_is_no_more_than_the_process_s_own_limit_leaves(monkeypatch):
+    """As `ulimit -v` sets it: else a large room ends in a traceback, however much the machine has."""
+    resource = pytest.importorskip("resource")
+    free = available_memory()
+    monkeypatch.setattr(resource, "getrlimit", lambda kind: (2**60, resource.RLIM_INFINITY))
+    assert abs(available_memory() - free) < 2**30
+    monkeypatch.setattr(resource, "getrlimit", lambda kind: (1, resource.RLIM_INFINITY))
+    assert available_memory() == 0
 
 
 @pytest.mark.parametrize(
