@@ -158,6 +158,22 @@ def test_a_detector_that_saw_another_size(recording_folder):
     assert_allclose(own[NOSE, :2], [(50.5) / 2 - 0.5, (40.5) / 2 - 0.5])
 
 
+@pytest.mark.parametrize("table", [True, False])
+def test_points_of_a_larger_image_are_told(recording_folder, table):
+    """Most of them lie far outside of the recording's images, and are left out."""
+    for k in range(12):
+        points = [[4 * x, 4 * y, c] for x, y, c in person(at=(10.0 + 2 * k, 30.0))]
+        if not table:
+            put(recording_folder / "keypoints" / "cam_01" / f"{k}.json", openpose(points))
+        put(recording_folder / "keypoints" / "cam_00" / f"{k}.json", openpose(person()))
+    rows = [f"{k},{name},{4 * (10 + k)},{4 * (30 + k)}" for k in range(12) for name in ("nose", "l_hip", "r_hip")]
+    if table:
+        put(recording_folder / "keypoints" / "cam_01.csv", "\n".join(["frame,keypoint,x,y", *rows]))
+    missing, outside = open_keypoints(hmc.open_recording(recording_folder)).notes
+    assert missing.endswith("no keypoints of cam_02, cam_03, cam_04; those of the other cameras are used")
+    assert "cam_01" in outside and "% of its points are far outside of the images of 'cam_01' (160 x 120) and left out" in outside
+
+
 def test_points_that_are_not_given(recording_folder):
     points = person()
     points[0] = [0, 0, 0]

@@ -8,7 +8,7 @@ import numpy as np
 
 from hmc.io.keypoints.layouts import KEYPOINTS
 
-__all__ = ["NOBODY", "RawPeople", "as_people", "is_normalised", "to_pixels"]
+__all__ = ["NOBODY", "RawPeople", "as_people", "confidence_outside", "is_normalised", "to_pixels"]
 
 #: Confidences may lie this far outside of 0 to 1, as heat maps and bins give them; they are clipped.
 LEAST_CONFIDENCE, MOST_CONFIDENCE = -0.1, 1.5
@@ -94,6 +94,20 @@ def to_pixels(raw: RawPeople, size: tuple[int, int], normalised: bool) -> np.nda
     ndarray, shape (n, 26, 3)
         Without points far outside of the image, and without people of whom no point is left.
     """
+    people = _in_pixels(raw, size, normalised)
+    inside = _inside(people, size)
+    people[~inside] = (np.nan, np.nan, 0.0)
+    return people[inside.any(axis=1)]
+
+
+def confidence_outside(raw: RawPeople, size: tuple[int, int], normalised: bool) -> tuple[float, float]:
+    """Confidence of the points that `to_pixels` leaves out as far outside of the image, and of all that are given; sums. Arguments as
+    there."""
+    people = _in_pixels(raw, size, normalised)
+    return float(people[..., 2][~_inside(people, size)].sum()), float(people[..., 2].sum())
+
+
+def _in_pixels(raw: RawPeople, size: tuple[int, int], normalised: bool) -> np.ndarray:
     people = raw.points.copy()
     xy = np.clip(people[..., :2], -FAR_PX, FAR_PX)
     if normalised:
@@ -102,7 +116,10 @@ def to_pixels(raw: RawPeople, size: tuple[int, int], normalised: bool) -> np.nda
         # The border stays the border: the first pixel's centre is half a pixel inside.
         xy = (xy + 0.5) * (np.array(size) / raw.size) - 0.5
     people[..., :2] = xy
+    return people
+
+
+def _inside(people: np.ndarray, size: tuple[int, int]) -> np.ndarray:
     with np.errstate(invalid="ignore"):
-        inside = ((xy >= -MARGIN * np.array(size)) & (xy <= (1 + MARGIN) * np.array(size))).all(axis=-1)
-    people[~inside] = (np.nan, np.nan, 0.0)
-    return people[inside.any(axis=1)]
+        within = (people[..., :2] >= -MARGIN * np.array(size)) & (people[..., :2] <= (1 + MARGIN) * np.array(size))
+    return np.all(within, axis=-1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -14,7 +14,7 @@ from hmc.io.door import check_folder
 from hmc.io.footage import Footage
 from hmc.io.keypoints.csv_forms import read_csv_table
 from hmc.io.keypoints.json_forms import last_number, read_json_frame, read_json_table
-from hmc.io.keypoints.people import NOBODY, RawPeople, is_normalised, to_pixels
+from hmc.io.keypoints.people import NOBODY, RawPeople, confidence_outside, is_normalised, to_pixels
 from hmc.io.places import places_of
 from hmc.io.recording import Recording
 
@@ -24,6 +24,11 @@ __all__ = ["KeypointSource", "open_keypoints"]
 #: bear that name too.
 FOLDERS = (("keypoints", True), ("pose", False))
 TABLE_SUFFIXES = frozenset({".csv", ".json"})
+
+#: Where more of a camera's points lie far outside of its images, by their confidence, they are of images of another size.
+MOST_OUTSIDE = 0.2
+#: Files of frames that are looked at for it.
+LOOKED_AT = 20
 
 #: People of a frame, by the number that the files give it.
 Reader = Callable[[int], np.ndarray]
@@ -55,12 +60,15 @@ class KeypointSource:
     _offsets: tuple[int, ...] = field(repr=False)
     _views: tuple[Footage | None, ...] = field(repr=False)
     _change: Change | None = field(default=None, repr=False)
+    _outside: tuple[str, ...] = field(default=(), repr=False)
 
     @property
     def notes(self) -> list[str]:
-        """A line where some cameras have no keypoints: their files may bear other names."""
+        """A line where some cameras have no keypoints: their files may bear other names; and one for each whose points are mostly outside
+        of its images."""
         without = [name for name, present in zip(self.cameras, self.present, strict=True) if not present]
-        return [f"{self.path}: no keypoints of {', '.join(without)}; those of the other cameras are used"] if without else []
+        missing = [f"{self.path}: no keypoints of {', '.join(without)}; those of the other cameras are used"] if without else []
+        return [*missing, *self._outside]
 
     def changed(self, change: Change) -> KeypointSource:
         """The same keypoints with every frame's people, in pixels as recorded, passed through ``change(index, people)``, which returns as
@@ -114,6 +122,19 @@ class _Folder:
     names: np.ndarray
     size: tuple[int, int]
 
+    @property
+    def outside(self) -> float:
+        """The share of points, by their confidence, that some of the files have far outside of the image."""
+        return _share_outside(self._some(), self.size)
+
+    def _some(self) -> Iterator[tuple[RawPeople, bool]]:
+        for place in np.unique(np.linspace(0, len(self.names) - 1, LOOKED_AT).round().astype(int)):
+            try:
+                raw = read_json_frame(self.path / str(self.names[place]))
+            except InputError:
+                continue  # told when its frame is read
+            yield raw, is_normalised(raw.points)
+
     def __call__(self, number: int) -> np.ndarray:
         place = int(np.searchsorted(self.numbers, number))
         if place == len(self.numbers) or self.numbers[place] != number:
@@ -129,6 +150,7 @@ class _Table:
     numbers: np.ndarray
     starts: np.ndarray
     people: np.ndarray
+    outside: float
 
     def __call__(self, number: int) -> np.ndarray:
         place = int(np.searchsorted(self.numbers, number))
@@ -169,13 +191,17 @@ def open_keypoints(recording: Recording) -> KeypointSource | None:
             if items:
                 strangers.append((folder, [item.name for item in items]))
             continue
-        offsets, readers = [], []
+        offsets, readers, outside = [], [], []
         for camera, item, view in zip(rig, found, recording._own_views, strict=True):
-            reader, first = (None, 0) if item is None else _reader(item, camera.size if view is None else view.size)
+            size = camera.size if view is None else view.size
+            reader, first = (None, 0) if item is None else _reader(item, size)
+            if item is not None and reader is not None and (share := reader.outside) > MOST_OUTSIDE:
+                outside.append(_line_outside(item, camera.name, share, size))
             readers.append(reader)
             offsets.append(first + _offset(view))
         present = tuple(item is not None for item in found)
-        return KeypointSource(folder, rig.names, present, recording.factors, tuple(readers), tuple(offsets), recording._own_views)
+        own = recording._own_views
+        return KeypointSource(folder, rig.names, present, recording.factors, tuple(readers), tuple(offsets), own, _outside=tuple(outside))
     all_names = [entry.name for entry in places_of(recording).read_entries()] if strangers else []
     for folder, names in strangers:
         if not any(_item_of(name, [folder / one for one in names]) for name in all_names):
@@ -228,7 +254,7 @@ def _offset(footage: Footage | None) -> int:
     return 0
 
 
-def _reader(item: Path, size: tuple[int, int]) -> tuple[Reader, int]:
+def _reader(item: Path, size: tuple[int, int]) -> tuple[_Folder | _Table, int]:
     """The reader of a camera's folder or file, and the number that it gives the first frame of a video."""
     if item.is_dir():
         return _open_folder(item, size), 0
@@ -257,7 +283,21 @@ def _open_table(frames: dict[int, RawPeople], size: tuple[int, int]) -> _Table:
     normalised = is_normalised(np.concatenate([frames[number].points for number in numbers])) if numbers else False
     people = [to_pixels(frames[number], size, normalised) for number in numbers]
     starts = np.concatenate([[0], np.cumsum([len(own) for own in people], dtype=int)]).astype(int)
-    return _Table(np.array(numbers, np.int64), starts, np.concatenate([NOBODY, *people]))
+    outside = _share_outside(((frames[number], normalised) for number in numbers), size)
+    return _Table(np.array(numbers, np.int64), starts, np.concatenate([NOBODY, *people]), outside)
+
+
+def _share_outside(people: Iterable[tuple[RawPeople, bool]], size: tuple[int, int]) -> float:
+    """Of people and whether their coordinates are shares: which share of their points, by their confidence, is far outside of the image."""
+    out, given = np.sum([(0.0, 0.0), *(confidence_outside(raw, size, normalised) for raw, normalised in people)], axis=0).tolist()
+    return out / given if given else 0.0
+
+
+def _line_outside(item: Path, camera: str, share: float, size: tuple[int, int]) -> str:
+    return (
+        f"{item}: {share:.0%} of its points are far outside of the images of '{camera}' ({size[0]} x {size[1]}) and left out; if they were "
+        'found in images of another size, say it in the files ("image_size": [1920, 1080], or columns image_width, image_height)'
+    )
 
 
 def _listed(names: Sequence[str]) -> str:
