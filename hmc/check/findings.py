@@ -6,7 +6,6 @@ merely odd is told too.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from os.path import realpath
@@ -16,7 +15,8 @@ from typing import Any
 import numpy as np
 
 from hmc.camera.coverage import estimate_room, in_view
-from hmc.camera.model import Camera, Rig, undistort
+from hmc.camera.model import Camera, Rig
+from hmc.camera.odd import odd_cameras
 from hmc.check.cures import sync_command
 from hmc.check.keypoints import KeypointAgreement, keypoint_agreement, keypoint_findings
 from hmc.check.moments import probe_masks
@@ -29,9 +29,18 @@ from hmc.io.footage import Footage, read_footage
 from hmc.io.keypoints import open_keypoints
 from hmc.io.naming import FILES, find_files, footage_items, item_name
 from hmc.io.places import AnyPlaces, places_of, to_places
-from hmc.io.recording import Frame, Recording, fitted, iterate_frames, open_recording, wrong_sizes, wrong_units
+from hmc.io.recording import (
+    Frame,
+    Recording,
+    fitted,
+    iterate_frames,
+    open_recording,
+    wrong_focal_lengths,
+    wrong_sizes,
+    wrong_units,
+)
 from hmc.io.timing import rates_differ
-from hmc.io.views import find_views, gaps, missing_views
+from hmc.io.views import find_views, gaps, missing_views, shared_videos
 from hmc.io.world import world_of
 
 __all__ = ["Finding", "Inspection", "check_recording", "inspect_recording"]
@@ -144,12 +153,12 @@ def inspect_recording(path: AnyPlaces, cameras: Sequence[str] | None = None, rea
         return Inspection(_sorted(found))
     own = [views.get(camera.name) for camera in rig]
     say("error", wrong_sizes(rig, own))
+    say("error", wrong_focal_lengths(rig))
     say("error", wrong_units(rig, path))
     say("warning", gaps(own))
     say("note", rates([view.fps for view in own if view is not None]))
-    say("warning", itertools.chain.from_iterable(odd_camera(camera) for camera in rig))
+    say("warning", odd_cameras(rig))
     say("note", [sentence for camera in rig for sentence in orientation(camera)])
-    say("warning", same_place(rig))
     if not wrong_units(rig):
         room = estimate_room(rig) if room is None else room
         say(*coverage(rig, room))
@@ -172,16 +181,13 @@ def inspect_recording(path: AnyPlaces, cameras: Sequence[str] | None = None, rea
         say("error", errors)
         say("warning", warnings)
         try:
-            keypoints = _compare_keypoints(recording)
+            source = open_keypoints(recording)
+            keypoints = None if source is None else keypoint_agreement(recording, source)
+            say("warning", [] if source is None else source.notes)
             say("warning", [] if keypoints is None else keypoint_findings(keypoints, places))
         except InputError as error:
             say("warning", [str(error)])
     return Inspection(_sorted(found), rig, room, images, recording, keypoints, floor)
-
-
-def _compare_keypoints(recording: Recording) -> KeypointAgreement | None:
-    source = open_keypoints(recording)
-    return None if source is None else keypoint_agreement(recording, source)
 
 
 def _sorted(found: Sequence[Finding]) -> tuple[Finding, ...]:
@@ -202,6 +208,7 @@ def _views_by_camera(
     footage, silhouettes = find_views(path, names, all_names, count=False, on_error=on_error, settings=settings)
     views = {name: image or mask for name, image, mask in zip(names, footage, silhouettes, strict=True)}
     say("error", missing_views(path, names, [views[name] for name in names], unreadable))
+    say("error", shared_videos(path, names, footage))
     return {name: view for name, view in views.items() if view is not None}
 
 
@@ -270,27 +277,6 @@ def rates(fps: Sequence[float | None]) -> list[str]:
     return []
 
 
-def odd_camera(camera: Camera) -> list[str]:
-    """Sentences about numbers that no ordinary camera has."""
-    sentences = []
-    width, height = camera.size
-    fx, fy = camera.matrix[0, 0], camera.matrix[1, 1]
-    if not 0.8 < fx / fy < 1.25:
-        sentences.append(f"camera '{camera.name}': focal lengths {fx:.0f} and {fy:.0f} differ by more than a quarter")
-    if not 0.15 < fx / max(width, height) < 20:
-        sentences.append(f"camera '{camera.name}': a focal length of {fx:.0f} does not fit {width} x {height} pixels; is `size` right?")
-    offset = np.abs(camera.matrix[:2, 2] / camera.size - 0.5).max()
-    if offset > 0.3:
-        u, v = camera.matrix[:2, 2]
-        sentences.append(f"camera '{camera.name}': its optical centre ({u:.0f}, {v:.0f}) is far from the middle of {width} x {height}")
-    edges = np.array([[0, height / 2], [width - 1, height / 2], [width / 2, 0], [width / 2, height - 1]])
-    if np.linalg.norm(undistort(camera, edges), axis=1).max() > 0.97 * camera.max_radius:
-        sentences.append(f"camera '{camera.name}': its lens distortion folds over inside the image; calibrate with points near the border")
-    if camera.centre[2] < -0.2:
-        sentences.append(f"camera '{camera.name}' stands {-camera.centre[2]:.1f} m under the floor; z must point up, with the floor at 0")
-    return sentences
-
-
 def orientation(camera: Camera) -> list[str]:
     """A sentence when the image is upside down or lies on its side."""
     right_up, down_up = camera.rotation[0, 2], camera.rotation[1, 2]
@@ -301,15 +287,6 @@ def orientation(camera: Camera) -> list[str]:
     if abs(right_up) > abs(down_up):
         return [f"camera '{camera.name}' lies on its side (fine, the calibration says so)"]
     return []
-
-
-def same_place(rig: Rig) -> list[str]:
-    """A sentence for each two cameras closer than 5 cm: the same calibration twice, mostly."""
-    return [
-        f"cameras '{one.name}' and '{other.name}' stand in one place; is one calibration in the file twice?"
-        for one, other in itertools.combinations(rig, 2)
-        if np.linalg.norm(one.centre - other.centre) < 0.05
-    ]
 
 
 def coverage(rig: Rig, room: np.ndarray) -> tuple[str, list[str]]:

@@ -41,6 +41,8 @@ LIMITS = {
 MAX_FRAME_NUMBER = 10_000_000
 #: Tables and lists in one another.
 MAX_DEPTH = 64
+#: So near a JPEG's end its mark of the end must be; cameras add data of their own behind it.
+JPEG_TAIL = 2**16
 MEGA = 1e6
 
 # A key of TOML with many dots makes a table in a table for each, at a cost that grows with their square.
@@ -331,7 +333,7 @@ def check_image(path: str | Path) -> None:
 
 
 def read_image(path: str | Path, flag: int | None = None) -> np.ndarray | None:
-    """An image as OpenCV reads it, (h, w, 3) uint8 BGR, or as `flag` of `cv2.imread` says; None where it cannot be read.
+    """An image as OpenCV reads it, (h, w, 3) uint8 BGR, or as `flag` of `cv2.imread` says; None where it cannot be read, or is cut off.
 
     Raises
     ------
@@ -341,10 +343,24 @@ def read_image(path: str | Path, flag: int | None = None) -> np.ndarray | None:
     import cv2
 
     check_image(path)
+    if _is_cut_off(path):
+        return None
     try:
         return cv2.imread(str(path), cv2.IMREAD_COLOR if flag is None else flag)
     except cv2.error:
         return None
+
+
+def _is_cut_off(path: str | Path) -> bool:
+    """Whether a JPEG has no end: decoders give such an image gray from there on."""
+    try:
+        with open(path, "rb") as file:
+            if file.read(3) != b"\xff\xd8\xff":
+                return False
+            file.seek(max(0, os.fstat(file.fileno()).st_size - JPEG_TAIL))
+            return b"\xff\xd9" not in file.read()
+    except OSError:
+        return False  # the decoder tells that it cannot be read
 
 
 def _image_size(file: IO[bytes]) -> tuple[int, int] | None:

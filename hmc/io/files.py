@@ -7,6 +7,7 @@ import os
 import platform
 import re
 import shutil
+import warnings
 import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -92,7 +93,9 @@ def write_figure(path: str | Path, figure: Any, dpi: float) -> None:
     temporary = part_path(path)
     try:
         sweep(path.parent)
-        figure.savefig(temporary, dpi=dpi)
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", "Glyph .* missing", UserWarning)  # a name in a script that the font lacks is boxes
+            figure.savefig(temporary, dpi=dpi)
         os.replace(temporary, path)
     except (OSError, ValueError) as error:
         raise InputError(f"{path}: the picture cannot be written ({getattr(error, 'strerror', None) or error})") from None

@@ -41,6 +41,8 @@ DEFAULT_FPS = 30.0
 HEAD_BYTES = 64
 #: Letters, digits and signs of text, in ASCII.
 TEXT_BYTES = frozenset({*range(0x20, 0x7F), *b"\t\r\n"})
+#: The largest value of an image of 12 bits.
+MOST_OF_12_BITS = 2**12 - 1
 #: After a video's last frame.
 END = 2**62
 
@@ -294,14 +296,24 @@ def _footage_of_images(path: Path, images: dict[int, Path], first_number: int = 
         raise InputError(f"{images[max(images)]}: a frame number in its name is above {MAX_FRAME_NUMBER}; rename or remove it")
     for file in images.values():
         try:
-            image = read_image(file)
+            image = read_image(file, cv2.IMREAD_COLOR | cv2.IMREAD_ANYDEPTH)
         except InputError:
             if len(images) == 1:
                 raise
             continue
         if image is not None:
+            _refuse_faint(file, image)
             return Footage(path, max(images) + 1, (image.shape[1], image.shape[0]), images)
     raise InputError(f"{path}: none of its {len(images)} images can be read; copy or convert them again")
+
+
+def _refuse_faint(path: Path, image: np.ndarray) -> None:
+    """Refuse what has 16 bits a value and uses no more than 12 of them: read as 8 bits it is black. What is all black may be so."""
+    if image.dtype == np.uint16 and 0 < image.max() <= MOST_OF_12_BITS:
+        raise InputError(
+            f"{path}: 16 bits a value, but none above {image.max()}, which is as good as black (a camera of 10 or 12 bits?); stretch its "
+            "images to the full range, or convert them to 8 bits"
+        )
 
 
 def starting_at(footage: Footage, first: int) -> Footage:

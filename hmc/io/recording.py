@@ -19,6 +19,7 @@ import numpy as np
 
 from hmc.camera.coverage import estimate_room
 from hmc.camera.model import Camera, Rig
+from hmc.camera.odd import odd_cameras
 from hmc.camera.reduction import reduce_image, reduce_mask, reduced_camera, reduction_factors
 from hmc.camera.world import World
 from hmc.errors import InputError
@@ -29,7 +30,7 @@ from hmc.io.places import AnyPlaces, RecordingPlaces, places_of, to_places
 from hmc.io.settings import read_settings
 from hmc.io.sizes import fit_size, size_cure
 from hmc.io.timing import go_by_time, rates_differ
-from hmc.io.views import all_rates, common_length, find_background, find_views, gaps, missing_views, put_in_time
+from hmc.io.views import all_rates, common_length, find_background, find_views, gaps, late_start, missing_views, put_in_time, shared_videos
 from hmc.io.world import world_of
 
 __all__ = [
@@ -52,6 +53,8 @@ DEFAULT_FPS = 30.0
 MAX_CAMERA_DISTANCE_M = 150.0
 #: So far away, in a unit that is not known, they are in millimetres rather than centimetres.
 LEAST_MM = 900.0
+#: No lens has a focal length below this share of the image's longer side (it would see 169 degrees): it is in another unit than pixels.
+LEAST_FOCAL = 0.05
 #: Silhouettes from files that lose detail are cut at the middle; from others, anything but black counts.
 LOSSY_SUFFIXES = frozenset({".jpg", ".jpeg", ".webp"})
 
@@ -227,12 +230,19 @@ def open_recording(
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     units = () if any_world else wrong_units(rig, path)
-    for problem in (*missing_views(path, names, both), *wrong_sizes(rig, footage), *wrong_sizes(rig, silhouettes), *units):
+    wrong_views = (*missing_views(path, names, both), *shared_videos(path, names, footage))
+    sizes_wrong = (*wrong_sizes(rig, footage), *wrong_sizes(rig, silhouettes))
+    for problem in (*wrong_views, *sizes_wrong, *wrong_focal_lengths(rig), *units):
         raise InputError(problem)
 
     lengths = {view.path.name: view.n_frames for view in both if view is not None}
     total = common_length(list(lengths.values()))
-    problems = [*gaps(footage), *(note for view in (*footage, *silhouettes) if view is not None for note in view.notes)]
+    problems = [
+        *([] if any_world else odd_cameras(rig)),
+        *gaps(footage),
+        *late_start(path, both),
+        *(note for view in (*footage, *silhouettes) if view is not None for note in view.notes),
+    ]
     if len(set(lengths.values())) > 1:
         problems.append(
             f"{path}: cameras differ in length ({', '.join(f'{name} {n}' for name, n in lengths.items())}); {total} frames are used"
@@ -439,6 +449,16 @@ def wrong_units(rig: Rig, path: Path | None = None) -> list[str]:
         f"calibration: cameras stand {distance:,.0f} m from the origin, which looks like {name}; "
         f'write units = "{unit}" (or "{other}") in recording.toml, or let it be found out by: '
         f"hmc world {quote(str(path)) if path else 'RECORDING'}"
+    ]
+
+
+def wrong_focal_lengths(rig: Rig) -> list[str]:
+    """A sentence for each camera with a focal length that is no number of pixels."""
+    return [
+        f"camera '{camera.name}': a focal length of {camera.matrix[0, 0]:.4g} for {_by(camera.size)} pixels, which no lens has; is it in "
+        "millimetres, or a share of the image? `matrix` must be in pixels: calibrate again, or multiply it by pixels a unit"
+        for camera in rig
+        if min(camera.matrix[0, 0], camera.matrix[1, 1]) < LEAST_FOCAL * max(camera.size)
     ]
 
 

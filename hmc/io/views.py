@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -14,10 +14,20 @@ from hmc.camera.model import Rig
 from hmc.errors import InputError
 from hmc.io.footage import Footage, find_footage, in_time, number_files, number_images, open_files, starting_at
 from hmc.io.layouts import layout_line, shifted_line
-from hmc.io.naming import Found, find_files, footage_items, item_name
+from hmc.io.naming import Found, find_files, footage_items, item_name, shown
 from hmc.io.timing import nearest_frames
 
-__all__ = ["all_rates", "common_length", "find_background", "find_views", "gaps", "missing_views", "put_in_time"]
+__all__ = [
+    "all_rates",
+    "common_length",
+    "find_background",
+    "find_views",
+    "gaps",
+    "late_start",
+    "missing_views",
+    "put_in_time",
+    "shared_videos",
+]
 
 
 def find_views(
@@ -73,6 +83,10 @@ def find_views(
 
     videos, images, masks = located("videos"), located("images"), located("silhouettes")
     footage = find("videos", videos, names, 0)
+    for name, sentence in _in_both(path, names, footage, (settings or {}).get("videos", {})):
+        if on_error is None:
+            raise InputError(sentence)
+        on_error(name, sentence)
     left = [name for name, found in zip(names, footage, strict=True) if found is None]
     first = _first_number(path / "images", images, all_names)
     others = dict(zip(left, find("images", images, left, first), strict=True))
@@ -80,6 +94,22 @@ def find_views(
     if not any(footage):
         first = _first_number(path / "silhouettes", masks, all_names)
     return footage, find("silhouettes", masks, names, first)
+
+
+def _in_both(path: Path, names: Sequence[str], videos: Sequence[Footage | None], said: Any) -> Iterator[tuple[str, str]]:
+    """Cameras with a video and with images too, where recording.toml (`videos`, as checked) does not say that the video is meant; and what
+    to do."""
+    items = {item_name(item): item for item in footage_items(path / "images") if not item.is_dir() or shown(item)}
+    for name, video in zip(names, videos, strict=True):
+        if video is not None and name in items and isinstance(said, dict) and name not in said:
+            file, other = (one.relative_to(path) for one in (video.path, items[name]))
+            yield (
+                name,
+                (
+                    f"{path}: both {file} and {other} are of camera '{name}'; leave one, or say in recording.toml that the video is meant: "
+                    f'videos = {{ "{name}" = "{file}" }}'
+                ),
+            )
 
 
 def find_background(
@@ -185,10 +215,35 @@ def gaps(views: Sequence[Footage | None]) -> list[str]:
     return sentences
 
 
+def late_start(path: Path, views: Sequence[Footage | None]) -> list[str]:
+    """A sentence where times of all cameras begin late: the recording begins with frames that no camera has."""
+    places = [view.places for view in views if view is not None]
+    if not places or any(own is None or own[:1] != (-1,) for own in places):
+        return []
+    first = min(next((frame for frame, place in enumerate(own) if place >= 0), len(own)) for own in places if own is not None)
+    return [
+        f"{path / 'times'}: no camera that is read has a frame before frame {first}; times count from the recording's first frame: take "
+        "from all of them what the earliest has"
+    ]
+
+
 def common_length(lengths: Sequence[int]) -> int:
     """Frames of which at least two cameras have an image; of the one, if there is one."""
     ordered = sorted(lengths, reverse=True)
     return ordered[min(1, len(ordered) - 1)] if ordered else 0
+
+
+def shared_videos(path: Path, names: Sequence[str], views: Sequence[Footage | None]) -> list[str]:
+    """One sentence for each two cameras with one video, by links too: whose it is cannot be told."""
+    first: dict[str, tuple[str, Footage]] = {}
+    sentences = []
+    for name, view in zip(names, views, strict=True):
+        if view is not None and view.images is None and view.arrays is None:
+            found = view.path.stat()
+            other, video = first.setdefault(f"{found.st_dev}/{found.st_ino}", (name, view))
+            if other != name:
+                sentences.append(f"{path}: cameras '{other}' and '{name}' have one video, {video.path}; give each its own")
+    return sentences
 
 
 def missing_views(path: Path, names: Sequence[str], views: Sequence[Footage | None], told: Collection[str] = ()) -> list[str]:

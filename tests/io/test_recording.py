@@ -526,6 +526,87 @@ def test_two_files_of_one_camera_are_told(recording_folder, other):
     assert open_recording(recording_folder).n_frames == 12
 
 
+def test_a_camera_in_videos_and_in_images_is_told(recording_folder):
+    """Its video would be taken, whichever was meant."""
+    write_images(recording_folder / "images" / "cam_01", range(12), (160, 120))
+    with pytest.raises(InputError, match=r"both videos/cam_01\.avi and images/cam_01 are of camera 'cam_01'; leave one, or say"):
+        open_recording(recording_folder)
+    assert open_recording(recording_folder, cameras=["cam_00", "cam_02"]).n_frames == 12
+    (recording_folder / "recording.toml").write_text('videos = { cam_01 = "videos/cam_01.avi" }\n')
+    assert open_recording(recording_folder).n_frames == 12
+    (recording_folder / "recording.toml").unlink()
+    shutil.rmtree(recording_folder / "images" / "cam_01")
+    (recording_folder / "images" / "cam_01").mkdir()  # nothing in it: nothing is chosen
+    assert open_recording(recording_folder).n_frames == 12
+
+
+@pytest.mark.parametrize("link", [os.link, os.symlink, None])
+def test_two_cameras_with_one_video_are_told(recording_folder, link):
+    videos = recording_folder / "videos"
+    if link is None:
+        (recording_folder / "recording.toml").write_text('videos = { cam_01 = "videos/cam_03.avi" }\n')
+    else:
+        (videos / "cam_03.avi").unlink()
+        link(videos / "cam_01.avi", videos / "cam_03.avi")
+    with pytest.raises(InputError, match=r"cameras 'cam_01' and 'cam_03' have one video, .*cam_0[13]\.avi; give each its own"):
+        open_recording(recording_folder)
+
+
+@pytest.mark.parametrize("bits, dark", [(10, True), (12, True), (16, False)])
+def test_images_of_ten_or_twelve_bits_are_told(recording_folder, ring, bits, dark):
+    """As 8 bits they are black, and the camera shows nobody."""
+    (recording_folder / "videos" / "cam_01.avi").unlink()
+    (recording_folder / "images" / "cam_01").mkdir(parents=True)
+    for k in range(12):
+        image = np.full((ring[1].size[1], ring[1].size[0], 3), (40 + 5 * k) << (bits - 8), np.uint16)
+        cv2.imwrite(str(recording_folder / "images" / "cam_01" / f"{k:06d}.png"), image)
+    if dark:
+        with pytest.raises(
+            InputError, match=rf"000000\.png: 16 bits a value, but none above {40 << (bits - 8)}, .* convert them to 8 bits"
+        ):
+            open_recording(recording_folder)
+    else:
+        _, frames, _ = read_all(recording_folder)
+        assert all(indices(frame) == [frame.index] * 5 for frame in frames)
+
+
+def test_a_jpeg_that_is_cut_off_is_left_out(recording_folder, ring):
+    """A decoder gives gray from there on."""
+    (recording_folder / "videos" / "cam_01.avi").unlink()
+    write_images(recording_folder / "images" / "cam_01", range(12), ring[1].size, name="{:06d}.jpg")
+    file = recording_folder / "images" / "cam_01" / "000005.jpg"
+    file.write_bytes(file.read_bytes()[:-200])
+    with open(file.with_name("000006.jpg"), "ab") as other:
+        other.write(bytes(999))  # what a camera adds behind it
+    _, frames, problems = read_all(recording_folder)
+    assert [frame.index for frame in frames if frame.images[1] is None] == [5] and problems == ["cam_01: frame 5 cannot be read; left out"]
+
+
+@pytest.mark.parametrize("by", [0.005, 1 / 160])
+def test_a_focal_length_that_is_no_number_of_pixels_is_told(recording_folder, ring, by):
+    """In millimetres, or a share of the image: else nobody is found, or with a camera less without a word."""
+    odd = replace(ring[2], matrix=ring[2].matrix * [[by], [by], [1]])
+    write_calibration(recording_folder / "calibration.toml", Rig((*ring[:2], odd, *ring[3:])))
+    with pytest.raises(InputError, match=r"camera 'cam_02': a focal length of .* for 160 x 120 pixels, which no lens has; .*millimetres"):
+        open_recording(recording_folder)
+
+
+def test_what_is_odd_in_a_calibration_is_a_problem_of_every_run(recording_folder, ring):
+    """And not of `hmc check` alone."""
+    far = replace(ring[4], translation=1000 * ring[4].translation)
+    write_calibration(recording_folder / "calibration.toml", Rig((ring[0], replace(ring[0], name="cam_01"), *ring[2:4], far)))
+    problems = open_recording(recording_folder).problems
+    assert any("cameras 'cam_00' and 'cam_01' stand in one place" in one for one in problems)
+    assert any(
+        re.search(r"camera 'cam_04' stands \d,\d+ m from the origin and the others \d\.\d; is its place in another unit", one)
+        for one in problems
+    )
+    assert open_recording(recording_folder, any_world=True).problems == ()
+    alike = [replace(camera, rotation=ring[0].rotation) for camera in ring]
+    write_calibration(recording_folder / "calibration.toml", Rig(tuple(alike)))
+    assert any("all cameras look into one direction" in one for one in open_recording(recording_folder).problems)
+
+
 def test_what_a_system_leaves_beside_files_is_no_footage(recording_folder, ring):
     write_images(recording_folder / "images" / "cam_00", range(12), ring[0].size, name="frame_{:03d}.png")
     (recording_folder / "videos" / "cam_00.avi").unlink()

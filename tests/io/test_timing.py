@@ -197,6 +197,16 @@ def test_wrong_times_are_told(recording_folder, text, words):
         open_recording(recording_folder)
 
 
+def test_times_that_all_begin_late_are_told(recording_folder):
+    """Of a clock that ran before: else the recording has thousands of frames with nobody, and no word why."""
+    for k in range(5):
+        write_times(times_file(recording_folder, f"cam_{k:02d}"), 2 + (k + np.arange(12)) / 25)
+    words = "no camera that is read has a frame before frame 50; times count from the recording's first frame"
+    assert any(words in one for one in open_recording(recording_folder).problems)
+    write_times(times_file(recording_folder, "cam_03"), np.arange(12) / 25)
+    assert not any("no camera that is read" in one for one in open_recording(recording_folder).problems)
+
+
 def test_times_and_a_first_frame_contradict_each_other(recording_folder):
     write_times(times_file(recording_folder, "cam_01"), np.arange(12) / 25)
     (recording_folder / "recording.toml").write_text("first_frame = { cam_01 = 2 }\n")
