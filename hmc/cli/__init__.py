@@ -65,6 +65,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     # Matrices are small here: threads of linear algebra would wait for one another, and results would depend on how many there are.
     for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
+    _open_what_is_closed()
     for stream in (sys.stdout, sys.stderr):
         with suppress(AttributeError, OSError, ValueError):  # of another kind, or closed
             # A name may hold signs that the terminal's encoding has not.
@@ -107,6 +108,18 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print(f"hmc {args.command}: interrupted", file=sys.stderr)
         return EXIT_INTERRUPTED
+
+
+def _open_what_is_closed() -> None:
+    """Standard streams that a process was begun without (`>&-`, some schedulers) lead nowhere. Else the next file that is opened would bear
+    their number, and what decoders and other processes say would get into it."""
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # takes the lowest free number, which is this one
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, "r" if name == "stdin" else "w", encoding="utf-8"))
 
 
 def _here() -> str:

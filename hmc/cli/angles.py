@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
+from hmc.cli.common import output_path, refuse_result_file
 from hmc.cli.export import add_result_options, read_result_asked
 
 __all__ = ["add_parser", "run"]
@@ -19,8 +19,8 @@ def add_parser(subparsers) -> None:
         "with clinical names and signs. docs/angles.md says what each is. Takes seconds.",
     )
     add_result_options(parser)
-    parser.add_argument("--out", type=Path, metavar="FILE.csv", help="the table (default: clinical_angles.csv in RESULT)")
-    parser.add_argument("--plot", type=Path, metavar="FILE.png", help="draw the angles too")
+    parser.add_argument("--out", type=output_path, metavar="FILE.csv", help="the table (default: clinical_angles.csv in RESULT)")
+    parser.add_argument("--plot", type=output_path, metavar="FILE.png", help="draw the angles too")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -29,6 +29,7 @@ def run(args: argparse.Namespace) -> int:
     from hmc.io.export.tables import write_csv
     from hmc.motion.clinical import angle_table
 
+    refuse_result_file(args.out, args.result)
     suffixes = (".png", ".pdf", ".svg")
     if args.plot is not None and args.plot.suffix.lower() not in suffixes:
         raise InputError(f"{args.plot}: a plot is one of {', '.join(suffixes)}")

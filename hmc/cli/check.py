@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from hmc.cli.common import add_session_option, camera_names, given_places, output_path
+from hmc.cli.common import add_session_option, camera_names, given_places, output_path, refuse_own_file
 from hmc.io.files import real_path
 
 __all__ = ["add_parser", "run"]
@@ -33,6 +33,8 @@ def run(args: argparse.Namespace) -> int:
     from hmc.check.cures import pose_command, sync_command
 
     places = given_places(args)
+    if args.out is not None:
+        refuse_own_file(args.out, places)
     inspection = inspect_recording(places, args.cameras, args.all)
     for finding in inspection.findings:
         print(finding)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from hmc.cli.common import positive_float, print_problems, unlike_its_run, whole_number
+from hmc.cli.common import output_path, positive_float, print_problems, refuse_result_file, unlike_its_run, whole_number
 
 __all__ = ["add_parser", "add_result_options", "read_result_asked", "run"]
 
@@ -23,7 +23,9 @@ def add_parser(subparsers) -> None:
     )
     add_result_options(parser)
     parser.add_argument("--to", required=True, choices=FORMATS, help="the format; mot writes the .osim beside it")
-    parser.add_argument("--out", type=Path, metavar="FILE", help="(default: motion.FORMAT in RESULT; one a person where a file holds one)")
+    parser.add_argument(
+        "--out", type=output_path, metavar="FILE", help="(default: motion.FORMAT in RESULT; one a person where a file holds one)"
+    )
     parser.add_argument("--fill", choices=("none", "linear", "spline"), default="none", help="fill gaps (default: none)")
     parser.add_argument("--max-gap", type=positive_float, metavar="S", help="fill no longer gaps than this, seconds (default: all)")
 
@@ -58,6 +60,7 @@ def run(args: argparse.Namespace) -> int:
     from hmc.motion.export import export_trajectories
     from hmc.motion.gaps import fill_trajectory
 
+    refuse_result_file(args.out, args.result)
     found = [fill_trajectory(one, args.fill, args.max_gap) for one in read_result_asked(args)]
     written = export_trajectories(found, args.out or args.result / f"motion.{args.to}", args.to)
     print_problems(written.notes)

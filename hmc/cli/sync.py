@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from hmc.cli.common import add_session_option, given_places, output_path, positive_float, whole_number
+from hmc.cli.common import add_session_option, given_places, output_path, positive_float, refuse_own_file, whole_number
 from hmc.io.files import real_path
 
 __all__ = ["add_parser", "run"]
@@ -47,6 +47,8 @@ def run(args: argparse.Namespace) -> int:
     from hmc.io.recording import open_recording
 
     places = given_places(args)
+    if args.out is not None:
+        refuse_own_file(args.out, places)
     recording = open_recording(places, frames=args.frames, any_world=True)
     found, shares = inspect_synchrony(recording, args.search, MOMENTS)
     name = real_path(args.recording).name

@@ -12,6 +12,7 @@ from hmc.cli.common import (
     positive_float,
     print_problems,
     progress,
+    refuse_own_file,
     unlike_its_run,
     whole_number,
 )
@@ -45,6 +46,7 @@ def add_parser(subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Draw and write."""
+    from hmc.io.places import places_of
     from hmc.io.results import run_selection
     from hmc.view.mosaic import read_result
     from hmc.view.write import PAGES, VIDEOS, write_view
@@ -57,6 +59,7 @@ def run(args: argparse.Namespace) -> int:
     if not args.start and args.frames is None:
         args.start, args.frames = run_selection(args.directory)
     recording = open_selected(args)
+    refuse_own_file(args.out, places_of(recording))
     problems = [*recording.problems, *unlike_its_run(args.directory)]
     write_view(
         args.out,

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hmc.cli.common import add_session_option, given_places, output_path, positive_float
+from hmc.cli.common import add_session_option, given_places, output_path, positive_float, refuse_own_file
 from hmc.io.files import real_path
 
 if TYPE_CHECKING:
@@ -102,6 +102,8 @@ def run(args: argparse.Namespace) -> int:
     from hmc.io.recording import background_frames, iterate_frames, open_recording
 
     places = given_places(args)
+    if args.out is not None:
+        refuse_own_file(args.out, places)
     recording = open_recording(places, any_world=True)
     rig = recording.rig
     if args.distance is not None:

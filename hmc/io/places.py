@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from hmc.io.calibration import CalibrationEntry, find_calibration, read_entries
 from hmc.io.calibration.read import PATTERNS
+from hmc.io.files import real_path
 from hmc.io.settings import read_settings
 
 if TYPE_CHECKING:
@@ -100,6 +101,15 @@ class RecordingPlaces:
 
     def changed_s(self) -> float:
         """When a file on which results depend last changed, seconds since 1970; 0 where there is none."""
+        return max((file.stat().st_mtime for file in self._sources()), default=0.0)
+
+    def has(self, path: Path) -> bool:
+        """Whether a file is one of the recording's, or would lie among those of its cameras."""
+        files = [*self._sources(), *self.path.glob("times/*"), *self.path.glob("truth/**/*")]
+        folders = {real_path(file.parent) for file in files} - {real_path(self.path)}
+        return real_path(path.parent) in folders or any(path.exists() and path.samefile(file) for file in files if file.exists())
+
+    def _sources(self) -> list[Path]:
         files = [file for pattern in SOURCES for file in self.path.glob(pattern)]
         if self.calibration is not None and self.calibration_place == self.calibration:
             files += find_calibration(self.calibration)
@@ -108,7 +118,7 @@ class RecordingPlaces:
         if self.videos is not None:
             pattern = Path(self.videos.replace(CAMERA, "*"))
             files += pattern.parent.glob(pattern.name)
-        return max((file.stat().st_mtime for file in files), default=0.0)
+        return files
 
 
 #: A recording's folder, or where its parts lie.

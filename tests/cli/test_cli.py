@@ -3,6 +3,7 @@
 import argparse
 import errno
 import os
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -44,6 +45,35 @@ def test_check_good_recording(recording_folder, tmp_path, capsys):
     lines = capsys.readouterr().out.splitlines()
     assert out.is_file() and f"picture: {out}" in lines
     assert lines[-1] == "take_1: can be used: 5 cameras, 12 frames, 25 a second"
+
+
+@pytest.mark.skipif(os.name == "nt", reason="a shell of Unix closes them")
+@pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
+def test_a_process_that_was_begun_without_streams_does_its_work(recording_folder, tmp_path, closed):
+    """It ended in a traceback when all was done, or did not begin."""
+    words = [sys.executable, "-m", "hmc", "check", str(recording_folder), "--out", str(tmp_path / "rig.png")]
+    done = subprocess.run(f"{shlex.join(words)} {closed}", shell=True, capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 0 and "Traceback" not in done.stderr and (tmp_path / "rig.png").is_file()
+
+
+@pytest.mark.parametrize("out", ["videos/cam_00.avi", "videos/new.png", "calibration.toml", "truth/a.png"])
+def test_no_picture_takes_the_place_of_a_recording_s_file(recording_folder, capsys, out):
+    """`hmc view RESULT RECORDING --out RECORDING/videos/cam_00.mp4` wrote over what was filmed."""
+    (recording_folder / "truth").mkdir()
+    (recording_folder / "truth" / "joints.csv").write_text("frame,person,joint,x,y,z\n")
+    before = {file: file.read_bytes() for file in recording_folder.rglob("*") if file.is_file()}
+    for words in (["check"], ["sync", "--dry-run"], ["world", "--dry-run"]):
+        assert main([*words, str(recording_folder), "--out", str(recording_folder / out)]) == 2
+        assert "the recording's own files; choose another place" in capsys.readouterr().err
+    assert {file: file.read_bytes() for file in recording_folder.rglob("*") if file.is_file()} == before
+    assert main(["check", str(recording_folder), "--out", str(recording_folder / "check.png")]) == 0
+
+
+@pytest.mark.parametrize("words", [["export", "--to", "csv"], ["angles"]])
+def test_no_export_takes_the_place_of_a_result_s_file(tmp_path, capsys, words):
+    (tmp_path / "joints.csv").write_text("frame,person,joint,x,y,z\n0,0,pelvis,0,0,1\n")
+    assert main([*words, str(tmp_path), "--out", str(tmp_path / "joints.csv")]) == 2
+    assert "is the result's own file; choose another name" in capsys.readouterr().err
 
 
 def test_check_default_picture_and_all_frames(recording_folder, tmp_path, monkeypatch, capsys):

@@ -315,6 +315,9 @@ def test_view_writes_pictures_and_videos(recording, result, tmp_path, capsys):
     assert frames[1] is not None and frames[2] is None and video.get(cv2.CAP_PROP_FPS) == pytest.approx(20)
     video.release()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["all.mp4", "new", "two.png"]
+    among = recording / "images" / "cam_00" / "view.png"  # it would be a frame
+    assert main([*arguments, "--out", str(among)]) == 2
+    assert "the recording's own files" in capsys.readouterr().err and not among.exists()
 
 
 def test_a_video_shows_the_frames_of_the_run(recording, result, tmp_path):
