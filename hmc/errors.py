@@ -1,6 +1,12 @@
-"""The one exception for input that a user can mend, and the words for what the system refuses."""
+"""The one exception for input that a user can mend, the words for what the system refuses, and interrupts that a library of C took for an
+error of its own."""
 
 import errno
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
 
 #: No space, no more of one's share of it, or a file larger than may be.
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -26,3 +32,29 @@ def system_words(error: OSError) -> str:
     """What the system says of a file that it did not let be read or written; in the middle of writing it names none."""
     place = "" if error.filename is None else f"{error.filename}: "
     return f"{place}{error.strerror or error}" + ("; make room, and start it again" if error.errno in FULL else "")
+
+
+@contextmanager
+def as_interrupts() -> Iterator[None]:
+    """What is raised once an interrupt came is raised as one: matplotlib makes "Invalid affine transformation matrix" of it.
+
+    Only where Python's own way of dealing with interrupts is in force; in other threads nothing is done.
+    """
+    noted: list[int] = []
+
+    def note(number: int, frame: FrameType | None) -> None:
+        noted.append(number)
+        signal.default_int_handler(number, frame)
+
+    ours = threading.current_thread() is threading.main_thread() and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    if ours:
+        signal.signal(signal.SIGINT, note)
+    try:
+        yield
+    except Exception as error:
+        if noted:
+            raise KeyboardInterrupt from error
+        raise
+    finally:
+        if ours:
+            signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 
 from hmc import __version__
-from hmc.errors import InputError, is_utf8, system_words
+from hmc.errors import InputError, as_interrupts, is_utf8, system_words
 
 __all__ = ["command_parser", "main", "make_parser", "repeated"]
 
@@ -85,11 +85,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         parser.print_help()
         return 0
     try:
-        if getattr(args, "like", None) is not None:
-            args = repeated(parser, args, argv)
-        code = args.run(args)
-        sys.stdout.flush()
-        return code or 0
+        with as_interrupts():
+            if getattr(args, "like", None) is not None:
+                args = repeated(parser, args, argv)
+            code = args.run(args)
+            sys.stdout.flush()
+            return code or 0
     except InputError as error:
         print(f"hmc {args.command}: {error}", file=sys.stderr)
         return EXIT_INPUT

@@ -8,7 +8,7 @@ import sys
 import traceback
 from pathlib import Path
 
-from hmc.errors import InputError
+from hmc.errors import InputError, as_interrupts
 from hmc.experiments.engine.experiment import Cell, Experiment, Plan
 from hmc.experiments.engine.library import EXPERIMENTS, find_experiment
 from hmc.experiments.engine.selection import changed_plan, grid_of, read_settings
@@ -24,8 +24,9 @@ def main(argv: list[str] | None = None, prog: str = "python -m hmc.experiments")
     """Run the command line, which is called `prog`; returns the exit code."""
     args = make_parser(prog).parse_args(argv)
     try:
-        add_plugins(getattr(args, "plugin", ()))
-        return args.act(args)
+        with as_interrupts():
+            add_plugins(getattr(args, "plugin", ()))
+            return args.act(args)
     except InputError as error:
         _tell(f"hmc.experiments: {error}", sys.stderr)
         return EXIT_INPUT

@@ -4,8 +4,10 @@ import argparse
 import errno
 import os
 import shlex
+import signal
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -137,6 +139,26 @@ def test_interrupt(monkeypatch, capsys):
     fake_command(monkeypatch, raising(KeyboardInterrupt()))
     assert main(["check", "x"]) == 130
     assert capsys.readouterr().err.strip() == "hmc check: interrupted"
+
+
+def test_an_interrupt_that_a_library_takes_for_an_error_of_its_own_is_an_interrupt(monkeypatch, capsys):
+    """A figure that was being drawn ended in a traceback: "Invalid affine transformation matrix"."""
+
+    def action(args):
+        with suppress(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        raise ValueError("Invalid affine transformation matrix")
+
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        fake_command(monkeypatch, action)
+        assert main(["check", "x"]) == 130 and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+        assert capsys.readouterr().err.strip() == "hmc check: interrupted"
+        fake_command(monkeypatch, raising(ValueError("of its own")))
+        with pytest.raises(ValueError, match="of its own"):
+            main(["check", "x"])
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def test_files_that_cannot_be_had_are_one_line(monkeypatch, capsys):
