@@ -31,7 +31,8 @@ import tempfile
 import time
 import traceback
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from multiprocessing import get_context
@@ -116,12 +117,14 @@ def _copied(base: Path, given: Given, where: Path) -> Path:
     return folder
 
 
-def judged(folder: Path, words: tuple[str, ...], number: int, family: str, file: str) -> Ending:
-    """Run a command in a folder and say how it ended."""
+def judged(
+    folder: Path, words: tuple[str, ...], number: int, family: str, file: str, before: Sequence[Callable[[Path], None]] = ()
+) -> Ending:
+    """Run a command in a folder, with what is done to its process before, and say how it ended."""
     log = folder.parent / "log"
     pid = os.fork()
     if pid == 0:
-        _child(folder, words, log)
+        _child(folder, words, log, before=before)
     status, late = _wait(pid)
     text = log.read_text(errors="replace")
     strangers = sorted(one.name for one in folder.parent.iterdir() if one.name not in ("in", "log"))
@@ -153,7 +156,13 @@ def judged(folder: Path, words: tuple[str, ...], number: int, family: str, file:
     return Ending(kind, why, number, family, file, " ".join(words), text[-3000:] if kind == "bad" else line, tables, said)
 
 
-def _child(folder: Path, words: tuple[str, ...], log: Path, interrupts: signal.Handlers | Callable | None = None) -> None:
+def _child(
+    folder: Path,
+    words: tuple[str, ...],
+    log: Path,
+    interrupts: signal.Handlers | Callable | None = None,
+    before: Sequence[Callable[[Path], None]] = (),
+) -> None:
     code = 99
     try:
         out = os.open(log, os.O_CREAT | os.O_WRONLY | os.O_APPEND, 0o644)
@@ -170,6 +179,8 @@ def _child(folder: Path, words: tuple[str, ...], log: Path, interrupts: signal.H
         os.setsid()
         if interrupts is not None:
             signal.signal(signal.SIGINT, interrupts)
+        for change in before:
+            change(folder)
         code = call(words)
     except SystemExit as error:
         code = error.code if isinstance(error.code, int) else 1
@@ -177,11 +188,10 @@ def _child(folder: Path, words: tuple[str, ...], log: Path, interrupts: signal.H
         traceback.print_exc()
         code = 98
     finally:
-        try:
-            sys.stdout.flush()
-            sys.stderr.flush()
-        finally:
-            os._exit(code)
+        for stream in (sys.stdout, sys.stderr):
+            with suppress(AttributeError, OSError, ValueError):  # there is none, or no room
+                stream.flush()
+        os._exit(code)
 
 
 def _wait(pid: int) -> tuple[int, bool]:
