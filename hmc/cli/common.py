@@ -48,7 +48,7 @@ __all__ = [
 
 T = TypeVar("T")
 #: What runs write, and other commands make something of.
-RESULT_FILES = frozenset({"joints.csv", "tracks.csv", "feet.csv", "pose.npz", "run.toml"})
+RESULT_FILES = frozenset({"joints.csv", "tracks.csv", "feet.csv", "evidence.csv", "pose.npz", "run.toml"})
 
 
 def add_selection_options(parser: argparse.ArgumentParser) -> None:

@@ -23,6 +23,7 @@ from hmc.body.proportions import make_bodies
 from hmc.errors import InputError
 from hmc.io.camera_faults import Faults, sentence
 from hmc.io.detections import DetectionTable
+from hmc.io.evidence import write_evidence
 from hmc.io.masks import MaskStep, keep_masks, kept_frames
 from hmc.io.recording import Recording, for_voxels
 from hmc.io.results import PoseStates, PoseTable, TrackTable, write_joints, write_pose
@@ -69,6 +70,8 @@ class PosedPeople(FinishedPeople):
     passes_apart : ndarray, shape (n, 15), or None
         How far apart two passes, forward and backward in time, have each landmark, metres; NaN where a row has one pose only. None of
         one pass.
+    evidence : mapping of str to ndarray, shape (n, 15), or None
+        What trust rests on (`hmc.io.evidence.EVIDENCE`); None where silhouettes were not asked.
     """
 
     poses: PoseTable
@@ -79,6 +82,7 @@ class PosedPeople(FinishedPeople):
     status: tuple[str, ...] = ()
     fps: float | None = None
     passes_apart: np.ndarray | None = None
+    evidence: Mapping[str, np.ndarray] | None = None
 
     @property
     def frames(self) -> np.ndarray:
@@ -130,13 +134,17 @@ class PosedPeople(FinishedPeople):
         return pd.DataFrame(columns)
 
     def save(self, folder: str | Path) -> None:
-        """Write ``joints.csv``, ``feet.csv`` where the body has feet, and ``pose.npz``, as `hmc pose` does."""
+        """Write ``joints.csv``, ``feet.csv`` where the body has feet, ``evidence.csv`` where there is some, and ``pose.npz``."""
         write_joints(Path(folder) / "joints.csv", self.poses)
         feet = self.feet
         if np.isfinite(feet.positions).any():
             write_joints(Path(folder) / "feet.csv", feet)
         else:
             (Path(folder) / "feet.csv").unlink(missing_ok=True)
+        if self.evidence is not None:
+            write_evidence(Path(folder) / "evidence.csv", self.poses, self.evidence)
+        else:
+            (Path(folder) / "evidence.csv").unlink(missing_ok=True)
         write_pose(Path(folder) / "pose.npz", replace(self.states, costs=self.costs, fps=self.fps))
 
 

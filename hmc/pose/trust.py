@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import expit
 
+from hmc.io.evidence import EVIDENCE
 from hmc.io.recording import Recording
 from hmc.io.results import PoseTable
 from hmc.landmarks import LANDMARKS
@@ -121,7 +122,7 @@ def trust_of(features: np.ndarray) -> np.ndarray:
 
 
 def with_trust(people: PosedPeople, recording: Recording, run: RunOptions) -> PosedPeople:
-    """Poses with views and trust beside their landmarks, and lines on whose poses are much in doubt and on what no body covers.
+    """Poses with views and trust beside their landmarks, what trust rests on, and lines on who is in doubt and on what no body covers.
 
     Parameters
     ----------
@@ -137,7 +138,14 @@ def with_trust(people: PosedPeople, recording: Recording, run: RunOptions) -> Po
     trust[~np.isfinite(people.positions).all(axis=2)] = np.nan
     poses = replace(people.poses, views=found.views, trust=trust)
     notes = (*people.notes, *doubt_notes(poses), *uncovered_notes(recording.rig, found.uncovered))
-    return replace(people, poses=poses, notes=notes)
+    return replace(people, poses=poses, notes=notes, evidence=_evidence(people, found))
+
+
+def _evidence(people: PosedPeople, found: BorneOut) -> dict[str, np.ndarray]:
+    """What trust rests on, of each row by itself, by the names of `hmc.io.evidence.EVIDENCE`."""
+    apart = np.full(found.shown.shape, np.nan) if people.passes_apart is None else people.passes_apart
+    costs = np.repeat(people.costs[:, None], found.shown.shape[1], axis=1)
+    return dict(zip(EVIDENCE, (found.shown, found.denied, found.bare_m, apart, costs), strict=True))
 
 
 def doubt_notes(poses: PoseTable) -> list[str]:

@@ -13,8 +13,12 @@ from numpy.testing import assert_array_equal
 
 from hmc.cli import main
 from hmc.cli import pose as command
+from hmc.io.recording import open_recording
 from hmc.io.results import read_joints, read_pose, read_run, read_tracks
+from hmc.landmarks import LANDMARKS
 from hmc.pose import backward, follow, registry
+from hmc.pose.clear_views import BorneOut
+from hmc.pose.trust import trust_features, trust_of
 from hmc.voxels import hulls as frontend
 
 
@@ -54,6 +58,7 @@ def finished(tmp_path_factory):
 
 def test_a_run_leaves_its_four_files_and_its_silhouettes_and_nothing_else(finished):
     assert sorted(path.name for path in finished.iterdir()) == [
+        "evidence.csv",
         "feet.csv",
         "joints.csv",
         "pose.npz",
@@ -116,12 +121,30 @@ def test_a_finished_run_is_not_repeated(finished, capsys, monkeypatch):
     assert {path.name: path.stat().st_mtime_ns for path in finished.iterdir()} == before
 
 
+def test_trust_follows_from_the_evidence_that_a_run_leaves(finished):
+    with open(finished / "evidence.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    joints = read_joints(finished / "joints.csv")
+    assert [row["joint"] for row in rows] == list(LANDMARKS) * len(joints.frames)
+    columns = ("views", "shown", "denied", "bare_m", "passes_apart_m", "cost_m2")
+    views, shown, denied, bare_m, apart, cost = (
+        np.array([float(row[name] or "nan") for row in rows]).reshape(-1, len(LANDMARKS)) for name in columns
+    )
+    assert_array_equal(views, joints.views)
+    assert (cost == cost[:, :1]).all() and (cost > 0).all()
+    features = trust_features(joints, BorneOut(views, shown, denied, bare_m, np.zeros(7)), apart, open_recording(TINY).fps)
+    np.testing.assert_allclose(trust_of(features), joints.trust, atol=0.003)
+    assert np.ptp(joints.trust) > 0.01
+
+
 def test_another_run_takes_kept_silhouettes_and_comes_to_the_same_bytes(finished, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(frontend, "stream_masks", None)  # nothing is segmented
     more = "--frames", "5", "--voxel", "0.05", "--silhouettes-from", str(finished), "--out", str(tmp_path / "again")
     assert pose(tmp_path, *more, "--no-silhouettes") == 0
-    assert sorted(path.name for path in (tmp_path / "again").iterdir()) == ["feet.csv", "joints.csv", "pose.npz", "run.toml", "tracks.csv"]
-    for name in ("joints.csv", "tracks.csv"):
+    assert sorted(path.name for path in (tmp_path / "again").iterdir()) == [
+        "evidence.csv", "feet.csv", "joints.csv", "pose.npz", "run.toml", "tracks.csv",
+    ]  # fmt: skip
+    for name in ("joints.csv", "evidence.csv", "tracks.csv"):
         assert (tmp_path / "again" / name).read_bytes() == (finished / name).read_bytes()
     assert pose(tmp_path, *more, "--no-silhouettes") == 0
     assert "finished before" in capsys.readouterr().out
@@ -168,6 +191,7 @@ def test_what_a_method_tells_of_each_frame_stands_beside_the_poses(tmp_path, mon
         monkeypatch.setattr(command, "pose_method", registry.pose_method)
     assert pose(tmp_path, "--method", "pso", "--frames", "5", "--voxel", "0.04", "--height", "recording") == 0
     assert {path.name for path in tmp_path.iterdir()} == {
+        "evidence.csv",
         "feet.csv",
         "fits.csv",
         "joints.csv",
