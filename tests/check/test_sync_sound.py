@@ -1,5 +1,6 @@
 """Cameras out of time are told by their sound: known shifts and clocks, and nothing where there is nothing to hear."""
 
+import shutil
 import subprocess
 import tomllib
 
@@ -164,6 +165,7 @@ def filmed(ring, folder, sounds):
         with_ffmpeg(
             *images, "-i", folder / "sound.wav", "-q:v", 3, "-c:v", "mpeg4", "-c:a", "aac", folder / "videos" / f"{camera.name}.mp4"
         )
+    shutil.rmtree(folder / "images")
     return folder
 
 
