@@ -241,11 +241,12 @@ def test_a_stopped_run_goes_on_and_ends_as_if_it_had_not_been(tmp_path, monkeypa
         assert quick(tmp_path / "cut", frames="6") == 130
     assert not (tmp_path / "cut" / "joints.csv").exists()
     assert quick(tmp_path / "cut", frames="6") == 0
-    for name in ("joints.csv", "tracks.csv"):
+    for name in ("joints.csv", "evidence.csv", "tracks.csv"):
         assert (tmp_path / "cut" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
     one, other = (read_pose(tmp_path / folder / "pose.npz") for folder in ("cut", "whole"))
     assert_array_equal(one.states, other.states)
     assert sorted(path.name for path in (tmp_path / "cut").iterdir()) == [
+        "evidence.csv",
         "joints.csv",
         "pose.npz",
         "run.toml",
