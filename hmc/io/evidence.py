@@ -35,6 +35,6 @@ def write_evidence(path: str | Path, poses: PoseTable, evidence: Mapping[str, np
                 continue
             cells = [[f"{value:.{digits}f}" if np.isfinite(value) else "" for value in values[row]] for values, digits in columns]
             file.writelines(
-                f"{poses.frames[row]},{poses.persons[row]},{name},{views},{','.join(own)}\n"
+                f"{poses.frames[row]},{poses.persons[row]},{name},{views:.0f},{','.join(own)}\n"
                 for name, views, *own in zip(poses.names, poses.views[row], *cells, strict=True)
             )

@@ -18,10 +18,24 @@ from typing import IO, Any
 
 from hmc.errors import InputError
 
-__all__ = ["atomic_write", "part_path", "real_path", "sibling", "sweep", "to_toml", "write_figure", "write_toml"]
+__all__ = ["atomic_write", "matching", "part_path", "real_path", "sibling", "sweep", "to_toml", "write_figure", "write_toml"]
 
 #: Names of files that are being written: of which machine and process.
 _PART = re.compile(r"\..*\.([0-9a-f]{8})-(\d+)\.part(\..*)?")
+
+
+def matching(folder: Path, pattern: str) -> list[Path]:
+    """What fits a pattern that a user wrote, in the order of names.
+
+    Raises
+    ------
+    InputError
+        When it is no pattern for what is in a folder; the message is the fault alone, for a line that says where it stands.
+    """
+    try:
+        return sorted(folder.glob(pattern))
+    except (ValueError, NotImplementedError, IndexError, re.error) as error:
+        raise InputError(str(error)) from None
 
 
 def real_path(path: str | Path) -> Path:

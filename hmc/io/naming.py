@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 from hmc.errors import InputError
 from hmc.io.door import check_folder
+from hmc.io.files import matching
 
 __all__ = ["FILES", "PLACE", "Found", "find_files", "tokens_of"]
 
@@ -172,8 +173,8 @@ def _in_place(path: Path) -> tuple[Path, ...]:
 
 def _by_pattern(recording: Path, kind: str, pattern: str, name: str) -> tuple[Path, ...]:
     try:
-        files = sorted(recording.glob(pattern.replace(PLACE, glob.escape(name))))
-    except (ValueError, NotImplementedError, IndexError, re.error) as error:
+        files = matching(recording, pattern.replace(PLACE, glob.escape(name)))
+    except InputError as error:
         raise InputError(f"{recording / 'recording.toml'}: `{kind}` is no pattern for files in the recording's folder ({error})") from None
     if len(files) > 1 and any(file.suffix.lower() not in IMAGE_SUFFIXES for file in files):
         raise InputError(

@@ -105,7 +105,7 @@ class RecordingPlaces:
 
     def has(self, path: Path) -> bool:
         """Whether a file is one of the recording's, or would lie among those of its cameras."""
-        files = [*self._sources(), *self.path.glob("times/*"), *self.path.glob("truth/**/*")]
+        files = [*self._sources(), *self.path.glob("truth/**/*")]
         folders = {real_path(file.parent) for file in files} - {real_path(self.path)}
         return real_path(path.parent) in folders or any(path.exists() and path.samefile(file) for file in files if file.exists())
 

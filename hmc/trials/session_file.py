@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import difflib
 import fnmatch
-import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -16,7 +15,7 @@ from typing import Any
 from hmc.errors import InputError
 from hmc.io.calibration import find_calibration
 from hmc.io.door import read_toml_file
-from hmc.io.files import real_path
+from hmc.io.files import matching, real_path
 from hmc.io.places import CAMERA, RecordingPlaces
 from hmc.io.settings import check_settings
 
@@ -232,8 +231,8 @@ class _Reading:
             return {}
         found: dict[str, Path] = {}
         try:
-            folders = sorted(self.path.parent.glob(pattern))
-        except (ValueError, NotImplementedError, IndexError, re.error) as error:
+            folders = matching(self.path.parent, pattern)
+        except InputError as error:
             self.faults.append(f"`trials`: {pattern!r} is no pattern of folders from here ({error})")
             return {}
         for folder in folders:

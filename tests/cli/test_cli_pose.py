@@ -131,6 +131,7 @@ def test_trust_follows_from_the_evidence_that_a_run_leaves(finished):
         np.array([float(row[name] or "nan") for row in rows]).reshape(-1, len(LANDMARKS)) for name in columns
     )
     assert_array_equal(views, joints.views)
+    assert all(row["views"].isdigit() for row in rows)
     assert (cost == cost[:, :1]).all() and (cost > 0).all()
     features = trust_features(joints, BorneOut(views, shown, denied, bare_m, np.zeros(7)), apart, open_recording(TINY).fps)
     np.testing.assert_allclose(trust_of(features), joints.trust, atol=0.003)

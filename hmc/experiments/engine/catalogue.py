@@ -245,8 +245,8 @@ OWN_REASONS = {
         "docs/accuracy.md has recordings that need it."
     ),
     "trust": (
-        "The coefficients are those of a fit to older poses, of a body without feet; poses have become nearer, so that low numbers are "
-        "too low. A fit of today rests on an ankle that one camera alone sees and that nothing speaks against (pick_up with four cameras)."
+        "The coefficients are those of a fit to older poses, of a body without feet; poses have become nearer, so that low numbers are too "
+        "low. A fit of today wants another threshold, .95 for .9 after both passes (trust-model)."
     ),
     "repairs": (
         "Completion is for people of the walls' color, who are in one of the three recordings; there shadows are not cut, and on tiles "
