@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from hmc.io.files import real_path
+from hmc.io.result_files import BESIDE, RESULT
 
 if TYPE_CHECKING:
     from hmc.io.camera_faults import CameraFault
@@ -47,8 +48,6 @@ __all__ = [
 ]
 
 T = TypeVar("T")
-#: What runs write, and other commands make something of.
-RESULT_FILES = frozenset({"joints.csv", "tracks.csv", "feet.csv", "evidence.csv", "pose.npz", "run.toml"})
 
 
 def add_selection_options(parser: argparse.ArgumentParser) -> None:
@@ -250,7 +249,7 @@ def refuse_result_file(out: Path | None, result: Path) -> None:
     """
     from hmc.errors import InputError
 
-    if out is not None and out.name in RESULT_FILES and real_path(out.parent) == real_path(result):
+    if out is not None and out.name in (*RESULT, *BESIDE) and real_path(out.parent) == real_path(result):
         raise InputError(f"{out}: is the result's own file; choose another name")
 
 

@@ -35,6 +35,7 @@ from hmc.cli.pose_markers import MARKERS_JOURNAL, add_marker_options, read_marke
 from hmc.cli.run_bar import FIRST_POSE, FITTING, FOLLOWING, LEARNING, SECOND_PASS, TRACKING, VIEWS, RunBar
 from hmc.cli.track import JOURNAL, add_tracker_options, selected_frontend, selected_tracker
 from hmc.io.files import real_path
+from hmc.io.result_files import RESULT
 from hmc.pose.registry import BUILT_IN, INITS, METHODS, pose_method
 
 if TYPE_CHECKING:
@@ -49,7 +50,6 @@ BACK_JOURNAL = ".back.journal"
 SMOOTH_S = 0.3
 #: What `--cues` may say.
 CUES = ("silhouettes", "silhouettes,keypoints", "keypoints")
-RESULTS = ("joints.csv", "tracks.csv", "pose.npz", "run.toml")
 
 
 def add_parser(subparsers) -> argparse.ArgumentParser:
@@ -147,7 +147,6 @@ def _run(args: argparse.Namespace, held: ExitStack) -> int:
     opened = open_meanwhile(args, held)  # and import meanwhile what poses need
     from hmc.errors import InputError
     from hmc.io.files import to_toml
-    from hmc.io.fits import write_fits
     from hmc.io.lock import only_run
     from hmc.io.results import write_run, write_tracks
     from hmc.pose.backward import backward
@@ -208,9 +207,9 @@ def _run(args: argparse.Namespace, held: ExitStack) -> int:
         parameters |= markers.parameters
         source |= markers.source
     depends_on = {"method": name, "seed": args.seed, **source, "parameters": parameters}
-    key, paths = to_toml(depends_on), {name: args.out / name for name in RESULTS}
+    key, paths = to_toml(depends_on), {name: args.out / name for name in RESULT}
     held.enter_context(only_run(args.out))
-    if was_finished([paths[name] for name in RESULTS[:3]], paths["run.toml"], depends_on):
+    if was_finished([paths[name] for name in RESULT[:3]], paths["run.toml"], depends_on):
         return 0
 
     problems: list[str] = [*recording.problems, *([] if given is None else unlike_its_run(args.tracks.parent, [args.tracks.name]))]
@@ -267,13 +266,11 @@ def _run(args: argparse.Namespace, held: ExitStack) -> int:
         leave_silhouettes(args, recording, key, problems.append)
     write_tracks(paths["tracks.csv"], _pelvis_tracks(people) if tracks is None else tracks)
     people.save(args.out)
-    if any(people.details):
-        write_fits(args.out / "fits.csv", people.frames.tolist(), people.persons.tolist(), people.status, people.details)
     note_changes(recording, source, problems)
     trust = trust_summary(people.poses)
     said = ({"trust": trust} if trust else {}) | {"options": told_options(args), "problems": gather_problems(problems)}
     said |= cameras_table(faults)
-    said["written"] = written_digests([paths[result] for result in RESULTS[:3]])
+    said["written"] = written_digests([paths[result] for result in RESULT[:3]])
     write_run(paths["run.toml"], name, parameters, args.seed, **source, **said)
     for name in (JOURNAL, POSE_JOURNAL, BACK_JOURNAL, MARKERS_JOURNAL, MASKS):
         for file in args.out.glob(f"{name}*"):

@@ -1,6 +1,6 @@
 """What a run leaves on disk, and reading it back.
 
-A result is a folder with `joints.csv`, `tracks.csv`, `pose.npz` and `run.toml`. The tables are long, in metres, with one header line.
+A result is a folder with the files of `hmc.io.result_files`. The tables are long, in metres, with one header line.
 Nothing here is pickled, so loading a result never runs code; every file appears whole or not at all.
 """
 

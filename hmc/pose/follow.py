@@ -24,8 +24,10 @@ from hmc.errors import InputError
 from hmc.io.camera_faults import Faults, sentence
 from hmc.io.detections import DetectionTable
 from hmc.io.evidence import write_evidence
+from hmc.io.fits import write_fits
 from hmc.io.masks import MaskStep, keep_masks, kept_frames
 from hmc.io.recording import Recording, for_voxels
+from hmc.io.result_files import BESIDE
 from hmc.io.results import PoseStates, PoseTable, TrackTable, write_joints, write_pose
 from hmc.landmarks import FOOT_POINTS, LANDMARKS, landmark_index
 from hmc.pose.finished import FinishedPeople
@@ -134,18 +136,18 @@ class PosedPeople(FinishedPeople):
         return pd.DataFrame(columns)
 
     def save(self, folder: str | Path) -> None:
-        """Write ``joints.csv``, ``feet.csv`` where the body has feet, ``evidence.csv`` where there is some, and ``pose.npz``."""
-        write_joints(Path(folder) / "joints.csv", self.poses)
-        feet = self.feet
+        """Write ``joints.csv``, ``pose.npz``, and what there is of `hmc.io.result_files.BESIDE`; no other run's of these stays."""
+        folder, feet = Path(folder), self.feet
+        for name in BESIDE:
+            (folder / name).unlink(missing_ok=True)
+        write_joints(folder / "joints.csv", self.poses)
         if np.isfinite(feet.positions).any():
-            write_joints(Path(folder) / "feet.csv", feet)
-        else:
-            (Path(folder) / "feet.csv").unlink(missing_ok=True)
+            write_joints(folder / "feet.csv", feet)
         if self.evidence is not None:
-            write_evidence(Path(folder) / "evidence.csv", self.poses, self.evidence)
-        else:
-            (Path(folder) / "evidence.csv").unlink(missing_ok=True)
-        write_pose(Path(folder) / "pose.npz", replace(self.states, costs=self.costs, fps=self.fps))
+            write_evidence(folder / "evidence.csv", self.poses, self.evidence)
+        if any(self.details):
+            write_fits(folder / "fits.csv", self.frames.tolist(), self.persons.tolist(), self.status, self.details)
+        write_pose(folder / "pose.npz", replace(self.states, costs=self.costs, fps=self.fps))
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 
 from hmc.errors import InputError
+from hmc.io.result_files import BESIDE, RESULT
 from hmc.trials.curves import curves_svg
 from hmc.trials.quality import TrialResult, read_trial_result, trust_line
 from hmc.trials.session_file import Session, Trial
@@ -22,7 +23,7 @@ __all__ = ["CHECK_PICTURE", "MOMENTS_FOLDER", "VIDEO", "problems_of", "session_p
 #: In a trial's folder.
 CHECK_PICTURE, MOMENTS_FOLDER, VIDEO = "check.png", "moments", "overlay.mp4"
 #: Files of a trial to which the page links, where they are there.
-LINKED = ("joints.csv", "feet.csv", "evidence.csv", "tracks.csv", "pose.npz", "fits.csv", "run.toml", VIDEO, CHECK_PICTURE, "log.txt")
+LINKED = (*RESULT, *BESIDE, VIDEO, CHECK_PICTURE, "log.txt")
 #: Width of the rig's picture, pixels.
 RIG_PX, RIG_QUALITY = 1500, 82
 _LEGEND = (

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from hmc.body.proportions import stature
+from hmc.io.result_files import RESULT
 from hmc.io.results import PoseStates, PoseTable, TrackTable, read_joints, read_pose, read_run, read_tracks
 from hmc.landmarks import LANDMARKS
 
@@ -20,8 +21,6 @@ __all__ = ["TrialResult", "person_lines", "read_trial_result", "trust_line", "tr
 MOST_NAMED = 3
 #: Of persons who are told by their numbers alone.
 NOBODY: Mapping[int, str] = MappingProxyType({})
-#: What `hmc pose` leaves; the last is written last.
-FILES = ("joints.csv", "tracks.csv", "pose.npz", "run.toml")
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +86,7 @@ def read_trial_result(folder: str | Path) -> TrialResult | None:
     InputError
         When a file of it is damaged.
     """
-    joints, tracks, states, run = (Path(folder) / name for name in FILES)
+    joints, tracks, states, run = (Path(folder) / name for name in RESULT)
     if not all(path.exists() for path in (joints, tracks, states, run)):
         return None
     return TrialResult(read_joints(joints), read_tracks(tracks), read_pose(states), read_run(run))

@@ -215,11 +215,12 @@ def test_what_a_method_tells_of_each_frame_stands_beside_the_poses(tmp_path, mon
 def test_a_changed_parameter_starts_anew(tmp_path, capsys):
     assert quick(tmp_path) == 0
     first = read_joints(tmp_path / "joints.csv")
+    (tmp_path / "fits.csv").write_text("what another method told\n")
     assert quick(tmp_path, "--seed", "5") == 0
     assert "starting anew" in capsys.readouterr().out
     second = read_joints(tmp_path / "joints.csv")
     assert np.abs(first.positions - second.positions).max() > 1e-4
-    assert read_run(tmp_path / "run.toml")["seed"] == 5
+    assert read_run(tmp_path / "run.toml")["seed"] == 5 and not (tmp_path / "fits.csv").exists()
     assert quick(tmp_path, frames="3") == 0
     assert "starting anew" in capsys.readouterr().out
     assert read_joints(tmp_path / "joints.csv").frames.max() == 2
