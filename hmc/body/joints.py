@@ -113,11 +113,12 @@ _CANTON_DEG: dict[str, tuple[float, float]] = {
     "torso_x": (-45, 45), "torso_y": (-45, 90), "torso_z": (-22.5, 22.5),
 }  # fmt: skip
 
-# Where the table is too tight for joint centres, or so wide that a limb can fold into the body.
+# Where the table is too tight for joint centres, or so wide that a limb can fold into the body. An arm that is brought behind the back goes
+# through all of the shoulders' range: turned in as it is there, its first and its third axis nearly fall together.
 _DEFAULT_DEG: dict[str, tuple[float, float]] = _CANTON_DEG | {
     "neck_x": (-45, 45), "neck_y": (-50, 60),
-    "r_shoulder_x": (-120, 130), "r_shoulder_y": (-110, 90), "r_shoulder_z": (-60, 135), "r_elbow_z": (-10, 155),
-    "l_shoulder_x": (-130, 120), "l_shoulder_y": (-110, 90), "l_shoulder_z": (-135, 60), "l_elbow_z": (-155, 10),
+    "r_shoulder_x": (-120, 170), "r_shoulder_y": (-110, 110), "r_shoulder_z": (-90, 135), "r_elbow_z": (-10, 155),
+    "l_shoulder_x": (-170, 120), "l_shoulder_y": (-110, 110), "l_shoulder_z": (-135, 90), "l_elbow_z": (-155, 10),
     "r_hip_x": (-80, 40), "r_hip_y": (-140, 50), "r_knee_y": (-8, 155),
     "l_hip_x": (-40, 80), "l_hip_y": (-140, 50), "l_knee_y": (-8, 155),
     "torso_x": (-40, 40), "torso_y": (-35, 90), "torso_z": (-45, 45),

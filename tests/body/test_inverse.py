@@ -43,6 +43,34 @@ def test_a_far_start_far_away_still_arrives():
     assert error < 0.02
 
 
+@pytest.mark.parametrize("side", ["l", "r"])
+@pytest.mark.parametrize(
+    ("upper", "fore"),
+    [
+        pytest.param((-0.35, 0.3, -0.89), (-0.3, -0.9, -0.3), id="hands clasped behind the back"),
+        pytest.param((-0.55, 0.6, -0.6), (-0.1, -0.9, -0.4), id="hands on the loins"),
+        pytest.param((-0.5, 0.85, -0.1), (-0.3, -0.2, -0.93), id="an elbow raised backward"),
+        pytest.param((-0.8, 0.4, -0.45), (-0.85, 0.1, -0.5), id="a throw from below"),
+        pytest.param((-0.3, 0.7, -0.65), (0.3, -0.7, -0.65), id="arms akimbo"),
+        pytest.param((0.7, 0.0, -0.7), (0.3, -0.9, 0.3), id="a hand on the other shoulder"),
+    ],
+)
+def test_an_arm_that_hangs_comes_to_where_people_bring_theirs(side, upper, fore):
+    """Step by step, as a tracker follows; directions of upper arm and forearm: forward, outward and up."""
+    state = neutral_state("down", BODY.limits)
+    points = landmarks(BODY, state)
+    arm = [landmark_index(f"{side}_{joint}") for joint in ("shoulder", "elbow", "wrist")]
+    outward = [1, 1 if side == "l" else -1, 1]
+    bones = np.diff(points[arm], axis=0)
+    for share in np.linspace(0, 1, 11)[1:]:
+        ways = [(1 - share) * bone / np.linalg.norm(bone) + share * np.array(way) * outward for bone, way in zip(bones, (upper, fore), strict=True)]
+        target = points.copy()
+        for k, (way, bone) in enumerate(zip(ways, bones, strict=True)):
+            target[arm[k + 1]] = target[arm[k]] + np.linalg.norm(bone) * way / np.linalg.norm(way)
+        state, _ = fit_landmarks(BODY, target, state)
+    assert np.linalg.norm(landmarks(BODY, state) - target, axis=1).max() < 0.01
+
+
 def test_the_exact_state_stays():
     state, _ = displaced(1, 0)
     found, error = fit_landmarks(BODY, landmarks(BODY, state), state)
