@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-import matplotlib.pyplot as plt
 import numpy as np
 
 from hmc.body.inverse import fit_landmarks
@@ -22,6 +21,7 @@ from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameter
 from hmc.experiments.engine.inputs import Inputs, rendered
 from hmc.experiments.engine.intervals import decide, difference
 from hmc.experiments.markerless_runs import FRONTEND, VOXEL_M, opened
+from hmc.experiments.study import recording_bars
 from hmc.experiments.truth import all_truth, standing_state, true_silhouettes
 from hmc.io.masks import MaskStep
 from hmc.io.recording import Recording
@@ -162,15 +162,7 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
         "the median upward shift of the refined ones, of all, of ankles and of the crown."
     )
     means = {body: np.array([_mean(off[label, body]) for label in labels]) for body in VARIANTS}
-    figure, axes = plt.subplots(figsize=(7, 0.5 * len(labels) + 1.2))
-    place = np.arange(len(labels))
-    for k, (body, mean) in enumerate(means.items()):
-        axes.barh(place + 0.2 * k, mean, 0.18, label=body)
-    axes.set(
-        yticks=place + 0.3, yticklabels=[label.rpartition("@")[0] for label in labels], xlabel="landmarks from their true places, mean, mm"
-    )
-    axes.invert_yaxis()
-    axes.legend(fontsize=7)
+    figure = recording_bars(labels, means, "landmarks from their true places, mean, mm")
     up = np.array([_up(off[label, AS_IT_IS], LANDMARKS) for label in labels])
     return Report((Table("body-bias", caption, rows),), {"body-bias": figure}, _claims(labels, means, up))
 

@@ -12,13 +12,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
 
 from hmc.camera.segmentation import SegmentationSettings
 from hmc.errors import InputError
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs, rendered
+from hmc.experiments.study import recording_bars
 from hmc.experiments.truth import true_silhouettes
 from hmc.tracking.resumable import person_grid
 from hmc.voxels.carving import carve, make_tables
@@ -116,13 +116,8 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
             if what == "silhouettes":
                 added = {repair: np.append(added[repair], gains[repair]) for repair in repairs}
     claims = [claim for repair in repairs[:-1] for claim in _claims(repair, added[repair], names)]
-    figure, axes = plt.subplots(figsize=(7, 0.5 * len(names) + 1.2))
-    place, height = np.arange(len(names)), 1 / (len(repairs) + 1)
-    for k, repair in enumerate(repairs):
-        axes.barh(place + k * height, added[repair], 0.9 * height, label=repair)
-    axes.axvline(0, color="black", linewidth=0.8)
-    axes.set(yticks=place + 0.3, yticklabels=[name.rpartition("@")[0] for name in names], xlabel="added to the silhouettes' overlap")
-    axes.legend(fontsize=7)
+    figure = recording_bars(names, added, "added to the silhouettes' overlap")
+    figure.axes[0].axvline(0, color="black", linewidth=0.8)
     caption = "Overlap (intersection over union) with the true silhouettes and strict hulls, and what each repair adds to it."
     return Report((Table("repairs", caption, rows),), {"repairs": figure}, tuple(claims))
 

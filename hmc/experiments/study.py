@@ -19,7 +19,7 @@ from hmc.experiments.engine.style import COLORS
 from hmc.experiments.five_actions import action_title
 from hmc.experiments.pose_intervals import score_interval
 
-__all__ = ["BAR_COLORS", "action_bars", "change_of", "draw_lines", "draw_maps", "runs_of", "score_table", "table_of"]
+__all__ = ["BAR_COLORS", "action_bars", "change_of", "draw_lines", "draw_maps", "recording_bars", "runs_of", "score_table", "table_of"]
 
 BAR_COLORS = (COLORS["particle"], COLORS["sparse"], COLORS["person"], COLORS["other"], COLORS["naive"])
 
@@ -68,6 +68,27 @@ def score_table(runs: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
 def table_of(name: str, caption: str, frame: pd.DataFrame) -> Table:
     """A data frame as a table of a report."""
     return Table(name, caption, [{str(key): value for key, value in row.items()} for row in frame.to_dict("records")])
+
+
+def recording_bars(labels: Sequence[str], values: Mapping[str, np.ndarray], xlabel: str) -> Figure:
+    """A group of bars a recording, one bar a variant; from above in the order in which they are given.
+
+    Parameters
+    ----------
+    labels : sequence of str
+        Recordings, with their digests.
+    values : mapping of str to ndarray, shape (n_labels,)
+        By variant.
+    xlabel : str
+    """
+    height, places = 0.8 / len(values), np.arange(len(labels))
+    figure, axes = plt.subplots(figsize=(7, 0.12 * len(labels) * (len(values) + 2) + 1))
+    for k, (name, value) in enumerate(values.items()):
+        axes.barh(places + (k + 0.5) * height - 0.4, value, 0.9 * height, label=name)
+    axes.set(yticks=places, yticklabels=[label.rpartition("@")[0] for label in labels], xlabel=xlabel)
+    axes.invert_yaxis()
+    figure.legend(loc="outside right upper", fontsize=7)
+    return figure
 
 
 def draw_lines(axes: Axes, table: pd.DataFrame, x: str, y: str, by: str, **labels: str) -> None:

@@ -63,10 +63,11 @@ def test_an_arm_that_hangs_comes_to_where_people_bring_theirs(side, upper, fore)
     outward = [1, 1 if side == "l" else -1, 1]
     bones = np.diff(points[arm], axis=0)
     for share in np.linspace(0, 1, 11)[1:]:
-        ways = [(1 - share) * bone / np.linalg.norm(bone) + share * np.array(way) * outward for bone, way in zip(bones, (upper, fore), strict=True)]
         target = points.copy()
-        for k, (way, bone) in enumerate(zip(ways, bones, strict=True)):
-            target[arm[k + 1]] = target[arm[k]] + np.linalg.norm(bone) * way / np.linalg.norm(way)
+        for k, (bone, end) in enumerate(zip(bones, (upper, fore), strict=True)):
+            length = np.linalg.norm(bone)
+            way = (1 - share) * bone / length + share * np.array(end) * outward
+            target[arm[k + 1]] = target[arm[k]] + length * way / np.linalg.norm(way)
         state, _ = fit_landmarks(BODY, target, state)
     assert np.linalg.norm(landmarks(BODY, state) - target, axis=1).max() < 0.01
 
