@@ -1,7 +1,8 @@
 """People stand on the floor: how far a pose hangs in the air or is sunk in the ground.
 
 Furniture hides legs from several cameras at once, and then the hull ends at the table's edge. Without the floor the legs
-would fold up into what is left of the hull.
+would fold up into what is left of the hull. But people jump, climb and sit on tables too: to hang in the air costs no more than so
+much, however high, and the floor decides what silhouettes leave open.
 """
 
 from __future__ import annotations
@@ -14,12 +15,14 @@ from hmc.body.limbs import LIMBS
 from hmc.body.model import BodyModel
 from hmc.body.proportions import sole_ends
 
-__all__ = ["HANG_M", "SINK_M", "STANDING_M", "above_floor", "floor_gap", "lowest_support", "off_floor", "sole_places"]
+__all__ = ["AIR_M", "HANG_M", "SINK_M", "STANDING_M", "above_floor", "floor_gap", "gap_slope", "lowest_support", "off_floor", "sole_places"]
 
 #: A lowest point this far above the floor is still standing (on tiptoe, on a mat, in the middle of a step), metres ...
 HANG_M = 0.10
 #: ... and this far below it (a shallow error of the calibration), metres.
 SINK_M = 0.05
+#: Beyond that, hanging in the air costs as its square at first, and never more than this height's square, metres.
+AIR_M = 0.12
 #: A sole that is known to stand is no farther from the floor than this, metres: so well is a floor known, and so thick is a mat.
 STANDING_M = 0.015
 
@@ -32,7 +35,7 @@ _BEARERS = np.r_[_FEET, _FEET, _SHANKS]
 
 
 def floor_gap(body: BodyModel, rotations: np.ndarray, positions: np.ndarray, floor_z: float) -> np.ndarray:
-    """Height of the lowest sole or knee over the band in which it stands on the floor; negative below the band, 0 in it.
+    """What the height of the lowest sole or knee counts as over the band in which it stands on the floor (`above_floor`).
 
     Parameters
     ----------
@@ -52,9 +55,28 @@ def floor_gap(body: BodyModel, rotations: np.ndarray, positions: np.ndarray, flo
 
 
 def above_floor(height: np.ndarray, floor_z: float) -> np.ndarray:
-    """The gap (`floor_gap`) of a height, metres, as from `lowest_support`."""
+    """What heights count as, metres: nothing in the band in which a sole stands, below it the depth (negative), above it at first the height
+    over it and far up no more than `AIR_M`, the root of the loss of Geman and McClure (1985).
+
+    Parameters
+    ----------
+    height : ndarray
+        Of the lowest support (`lowest_support`), metres.
+    floor_z : float
+    """
     height = height - floor_z
-    return height - np.minimum(np.maximum(height, -SINK_M), HANG_M)
+    gap = height - np.minimum(np.maximum(height, -SINK_M), HANG_M)
+    return gap / np.sqrt(_aloft(gap))
+
+
+def gap_slope(height: np.ndarray, floor_z: float) -> np.ndarray:
+    """How `above_floor` changes with the height where it is not 0; parameters as there."""
+    height = height - floor_z
+    return _aloft(height - HANG_M) ** -1.5
+
+
+def _aloft(gap: np.ndarray) -> np.ndarray:
+    return 1 + (np.maximum(gap, 0) / AIR_M) ** 2
 
 
 def off_floor(height: np.ndarray, floor_z: float) -> np.ndarray:

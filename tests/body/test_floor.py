@@ -8,14 +8,15 @@ from numpy.testing import assert_allclose
 from scipy.optimize import approx_fprime
 
 from hmc.body.feet import foot_points
-from hmc.body.flesh import surface_coordinates
-from hmc.body.floor import HANG_M, SINK_M, STANDING_M, floor_gap, lowest_support, sole_places
+from hmc.body.flesh import flesh_points, place_points, surface_coordinates
+from hmc.body.floor import AIR_M, HANG_M, SINK_M, STANDING_M, floor_gap, lowest_support, sole_places
 from hmc.body.joints import N_DOF, SEGMENTS, dof_index
-from hmc.body.kinematics import segment_transforms
+from hmc.body.kinematics import landmarks, segment_transforms
 from hmc.body.model import neutral_state
 from hmc.body.proportions import canton_body, default_body, stature
 from hmc.pose.objectives.residuals import residual_rows
 from hmc.pose.objectives.symmetric import Symmetric, SymmetricSettings, body_points
+from hmc.pose.steps.refine import RefineSettings, refine
 from hmc.pose.views.hull_target import LOOSE_M, distance_at, make_target
 from hmc.voxels.grid import VoxelGrid
 
@@ -33,10 +34,12 @@ def leg_length():
     return sum(BODY.dimensions[name] for name in ("thigh", "shank", "ankle_height"))
 
 
-@pytest.mark.parametrize("lift, gap", [(0.0, 0.0), (HANG_M, 0.0), (0.4, 0.4 - HANG_M), (-SINK_M, 0.0), (-0.3, -0.3 + SINK_M)])
-def test_gap_is_how_far_the_soles_are_off_the_floor(lift, gap):
+@pytest.mark.parametrize(
+    "lift, gap", [(0.0, 0.0), (HANG_M, 0.0), (HANG_M + 0.02, 0.02), (HANG_M + 50, AIR_M), (-SINK_M, 0.0), (-0.3, -0.3 + SINK_M)]
+)
+def test_gap_is_how_far_the_soles_are_off_the_floor_and_in_the_air_no_more_than_so_much(lift, gap):
     rotations, positions = segment_transforms(BODY, standing(0.2 + leg_length() + lift)[None])
-    assert_allclose(floor_gap(BODY, rotations, positions, 0.2), [gap], atol=1e-12)
+    assert_allclose(floor_gap(BODY, rotations, positions, 0.2), [gap], atol=1e-12, rtol=0.015)
 
 
 def test_lowest_of_soles_and_knees_carries():
@@ -62,16 +65,17 @@ def test_a_foot_that_points_down_bears_on_its_ball_and_one_that_is_lifted_on_its
     assert np.all(height < 1.0 - leg_length())
 
 
-def test_floor_row_against_finite_differences():
+@pytest.mark.parametrize("height", [1.5, 1.2, 0.5])
+def test_floor_row_against_finite_differences(height):
     box = np.argwhere(np.ones((4, 4, 8), bool)) + [18, 18, 12]
     target = make_target(GRID, box, box, None, 0.0)
     points = body_points(BODY, surface_coordinates(BODY, 60))
     objective = Symmetric(BODY, points, target, target.surface, SymmetricSettings(floor_weight=1.0))
-    state = standing(1.5)
+    state = standing(height)
     state[dof_index("r_hip_y", "l_hip_y", "root_ry")] = (-0.3, 0.2, 0.1)
     row = -1 - N_DOF  # before the rows of the posture
     values, jacobian = residual_rows(objective.linearise(state))
-    assert values[row] > 0.2
+    assert abs(values[row]) > 0.02
     for dof in range(N_DOF):
         step = np.zeros(N_DOF)
         step[dof] = 1e-6
@@ -85,7 +89,22 @@ def test_hanging_costs_and_standing_does_not():
     points = body_points(BODY, surface_coordinates(BODY, 60))
     states = np.stack([standing(leg_length()), standing(leg_length() + 0.5)])
     extra = [Symmetric(BODY, points, target, box * 0.05).cost(states) for target in (with_floor, without)]
-    assert_allclose(extra[0] - extra[1], [0, SymmetricSettings().floor_weight * (0.5 - HANG_M) ** 2], atol=1e-9)
+    gap = 0.5 - HANG_M
+    assert_allclose(extra[0] - extra[1], [0, SymmetricSettings().floor_weight * gap**2 / (1 + (gap / AIR_M) ** 2)], atol=1e-9)
+
+
+def test_who_jumps_is_where_the_hull_is():
+    """Half a metre over the floor, of which nothing hides: the floor moves nobody by more than a centimetre."""
+    grid = VoxelGrid(np.zeros(3), 0.03, (66, 66, 90))
+    body = default_body(1.7)
+    state = neutral_state()
+    state[:3] = (1.0, 1.0, 0.5 + sum(body.dimensions[name] for name in ("thigh", "shank", "ankle_height")))
+    flesh = flesh_points(body, 0.015)
+    hull = np.unique(grid.index_of(place_points(*segment_transforms(body, state), flesh.points, flesh.segment)), axis=0)
+    target = make_target(grid, hull, hull, None, 0.0)
+    points = body_points(body, surface_coordinates(body, 300))
+    found, _ = refine(Symmetric(body, points, target, target.surface), state, RefineSettings())
+    assert np.linalg.norm(landmarks(body, found) - landmarks(body, state), axis=1).mean() < 0.01
 
 
 def on_one_foot(feet):

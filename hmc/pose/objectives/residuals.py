@@ -15,7 +15,7 @@ import numpy as np
 
 from hmc.body.cone_maps import ConeMaps, cone_maps
 from hmc.body.cones import places_and_directions
-from hmc.body.floor import above_floor, lowest_support, off_floor, sole_places
+from hmc.body.floor import above_floor, gap_slope, lowest_support, off_floor, sole_places
 from hmc.body.joints import N_DOF
 from hmc.body.kinematics import dof_masks, joint_twists
 from hmc.body.nearest_cone import Candidates, Nearest, candidates, nearest_cones, towards
@@ -172,9 +172,9 @@ def _pulls(found: Distances) -> tuple[np.ndarray, np.ndarray]:
         len(_MASKS) * found.other[deep] + found.segment[deep],
     ]
     if len(gap):
-        _, bearing, carrier = found.floor
+        heights, bearing, carrier = found.floor
         up = np.zeros((len(gap), 3))
-        up[:, 2] = found.weights[np.where(gap == 0, 3, 4)]
+        up[:, 2] = np.where(gap == 0, found.weights[3] * gap_slope(heights[gap], found.objective.target.floor_z), found.weights[4])
         directions.append(up)
         places.append(bearing[gap])
         movers.append(_TO_WORLD + carrier[gap])
