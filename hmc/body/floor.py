@@ -55,8 +55,8 @@ def floor_gap(body: BodyModel, rotations: np.ndarray, positions: np.ndarray, flo
 
 
 def above_floor(height: np.ndarray, floor_z: float) -> np.ndarray:
-    """What heights count as, metres: nothing in the band in which a sole stands, below it the depth (negative), above it at first the height
-    over it and far up no more than `AIR_M`, the root of the loss of Geman and McClure (1985).
+    """What heights count as, metres: nothing in the band in which a sole stands, below it the depth (negative), above it at first the
+    height over it and far up no more than `AIR_M`, the root of the loss of Geman and McClure (1985).
 
     Parameters
     ----------
