@@ -60,8 +60,8 @@ class Distances:
     segment, other : ndarray of int, shape (n_axes,)
         As from `penetration_rows`.
     floor : tuple of ndarray
-        As from `lowest_support`, and after it heights, places and carriers of the soles that stand (`sole_places`); empty where there is
-        no floor.
+        Of the lowest support (`lowest_support`), and after it of the soles that stand (`sole_places`): how the residual changes with its
+        height, its place and its carrier; empty where there is no floor.
     spread : ndarray, shape (37,)
         Of the posture (`posture_spread`), radians.
     objective : Symmetric
@@ -128,14 +128,15 @@ def distances(objective: Symmetric, state: np.ndarray, before: Candidates | None
     weights = np.sqrt(np.array([1, settings.uncovered_weight, settings.overlap_weight, *floor_weights]) / sizes)
     gap, floor = np.zeros(0), (np.zeros(0), np.zeros((0, 3)), np.zeros(0, int))
     if target.floor_z is not None:
-        floor = lowest_support(body, rotations[None], positions[None])
-        gap = weights[3] * above_floor(floor[0], target.floor_z)
+        height, place, carrier_of = lowest_support(body, rotations[None], positions[None])
+        gap = weights[3] * above_floor(height, target.floor_z)
+        floor = weights[3] * gap_slope(height, target.floor_z), place, carrier_of
         if any(target.standing):
             soles, feet = sole_places(body, rotations[None], positions[None])
             stands = np.array(target.standing)[: len(feet)]
             bearing = soles[0, stands]
             gap = np.r_[gap, weights[4] * off_floor(bearing[:, 2], target.floor_z)]
-            floor = np.r_[floor[0], bearing[:, 2]], np.concatenate([floor[1], bearing]), np.r_[floor[2], feet[stands]]
+            floor = np.r_[floor[0], np.repeat(weights[4], len(bearing))], np.concatenate([place, bearing]), np.r_[carrier_of, feet[stands]]
     spread = posture_spread(state)
     residuals = [
         weights[0] * np.minimum(outside, objective.outside_caps),
@@ -172,9 +173,9 @@ def _pulls(found: Distances) -> tuple[np.ndarray, np.ndarray]:
         len(_MASKS) * found.other[deep] + found.segment[deep],
     ]
     if len(gap):
-        heights, bearing, carrier = found.floor
+        slope, bearing, carrier = found.floor
         up = np.zeros((len(gap), 3))
-        up[:, 2] = np.where(gap == 0, found.weights[3] * gap_slope(heights[gap], found.objective.target.floor_z), found.weights[4])
+        up[:, 2] = slope[gap]
         directions.append(up)
         places.append(bearing[gap])
         movers.append(_TO_WORLD + carrier[gap])
