@@ -12,12 +12,15 @@ import numpy as np
 from hmc.synthetic.motions import Feet, Motion, Upper, arms_by_hands, assemble, keyframes, pelvis_height
 from hmc.synthetic.skeleton import Skeleton
 
-__all__ = ["close_door", "lift_and_drop", "push_case", "struggle", "throw_item", "wave"]
+__all__ = ["behind_back", "close_door", "jump", "lift_and_drop", "push_case", "struggle", "throw_item", "wave"]
 
 _REST_LEFT, _REST_RIGHT = (0.12, 0.16, -0.92), (0.12, -0.16, -0.92)
 #: Ankles: ahead, to the left (metres), heading (degrees), left then right.
 _SQUARE = ((0.02, 0.12, 10), (-0.02, -0.12, -12))
 _STRIDE = ((0.22, 0.12, 5), (-0.20, -0.14, -30))
+
+#: Of who is in the air, metres over seconds squared, and how far heels are higher than toes halfway, radians.
+_GRAVITY, _POINTED = 9.81, 0.7
 
 Key = tuple[float, tuple[float, float, float], tuple[float, float, float], float, float, float, float]
 
@@ -92,12 +95,49 @@ def lift_and_drop(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generato
     return _keyed(skeleton, times, rng, keys, 3.4, _SQUARE)
 
 
-def _keyed(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator, keys: list[Key], period: float, prints) -> Motion:
-    """The motion through key poses that are repeated every `period` seconds, at a pace and with hands that vary."""
+def jump(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator) -> Motion:
+    """Jump as high as comes easily, swinging both arms, and stand for a moment."""
+    keys: list[Key] = [
+        (0.0, _REST_LEFT, _REST_RIGHT, 0.0, 0.03, 0.0, 0.01),
+        (0.5, (-0.40, 0.22, -0.80), (-0.40, -0.22, -0.80), 0.0, 0.60, -0.05, 0.28),
+        (0.8, (0.45, 0.20, 0.70), (0.45, -0.20, 0.70), 0.0, 0.05, 0.0, 0.0),
+        (1.1, (0.55, 0.25, 0.45), (0.55, -0.25, 0.45), 0.0, 0.05, 0.0, 0.0),
+        (1.6, (0.35, 0.25, -0.75), (0.35, -0.25, -0.75), 0.0, 0.45, -0.03, 0.22),
+    ]
+    return _keyed(skeleton, times, rng, keys, 2.4, _SQUARE, aloft=(0.85, 0.55))
+
+
+def behind_back(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator) -> Motion:
+    """Put both hands on the hips, lay them together behind the back, and let them hang."""
+    keys: list[Key] = [
+        (0.0, _REST_LEFT, _REST_RIGHT, 0.0, 0.02, 0.0, 0.004),
+        (0.7, (0.02, 0.08, -0.66), (0.02, -0.08, -0.66), 0.15, 0.0, 0.0, 0.004),
+        (1.4, (-0.30, -0.24, -0.72), (-0.30, 0.24, -0.72), 0.0, -0.03, 0.0, 0.004),
+        (2.4, (-0.32, -0.22, -0.70), (-0.32, 0.22, -0.70), -0.25, -0.03, 0.02, 0.004),
+        (3.0, (-0.28, 0.20, -0.80), (-0.28, -0.20, -0.80), 0.0, 0.05, 0.0, 0.01),
+    ]
+    return _keyed(skeleton, times, rng, keys, 3.6, _SQUARE)
+
+
+def _keyed(
+    skeleton: Skeleton,
+    times: np.ndarray,
+    rng: np.random.Generator,
+    keys: list[Key],
+    period: float,
+    prints,
+    aloft: tuple[float, float] | None = None,
+) -> Motion:
+    """The motion through key poses that are repeated every `period` seconds, at a pace and with hands that vary; `aloft` is when both feet
+    leave the floor, and for how long."""
     n, size = len(times), skeleton.height_m / 1.75
-    at, rows, now = [], [], 0.0
+    at, rows, now, lift, pointed = [], [], 0.0, np.zeros(len(times)), np.zeros(len(times))
     while now < times[-1] + period:
         pace = rng.uniform(0.92, 1.08)
+        if aloft is not None:
+            gone = np.clip(times - now - pace * aloft[0], 0, aloft[1])
+            lift += _GRAVITY / 2 * gone * (aloft[1] - gone)
+            pointed += _POINTED * np.sin(np.pi * gone / aloft[1])
         for second, left, right, *trunk in keys:
             at.append(now + pace * second)
             rows.append(np.concatenate([np.array([*left, *right]) + rng.normal(0, 0.02, 6), trunk]))
@@ -118,7 +158,10 @@ def _keyed(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator, keys
     )
     places = np.array([[x * size, y * size, skeleton.ankle_height] for x, y, _ in prints])
     yaw = np.radians([heading for _, _, heading in prints])
-    feet = Feet(np.tile(places, (n, 1, 1)), np.tile(yaw, (n, 1)), np.zeros((n, 2)), np.zeros((n, 2)))
+    ankles = np.tile(places, (n, 1, 1))
+    ankles[..., 2] += lift[:, None]
+    down = np.repeat(-pointed[:, None], 2, axis=1)
+    feet = Feet(ankles, np.tile(yaw, (n, 1)), down, down)
     pelvis = feet.ankles[:, :, :2].mean(axis=1) + size * np.stack([ahead, nothing], axis=-1)
     height = pelvis_height(skeleton, pelvis, upper.pelvis[:, 2], feet) - 0.004 - size * np.maximum(drop, 0)
     return assemble(skeleton, np.column_stack([pelvis, height]), upper, feet, arms_by_hands(skeleton, hands, elbow_out=0.7))

@@ -7,7 +7,7 @@ import numpy as np
 from hmc.synthetic.actions import box, gesture, pick_up, sit, stand, throw_catch
 from hmc.synthetic.bvh import bvh_motion, read_bvh
 from hmc.synthetic.drills import dance, kick_turn, pedal_arms, play_cube
-from hmc.synthetic.everyday import close_door, lift_and_drop, push_case, struggle, throw_item, wave
+from hmc.synthetic.everyday import behind_back, close_door, jump, lift_and_drop, push_case, struggle, throw_item, wave
 from hmc.synthetic.gait import jog, walk
 from hmc.synthetic.motions import Motion, place
 from hmc.synthetic.recipe import ActorRecipe, FurnitureRecipe
@@ -20,7 +20,7 @@ _ACTIONS = {
     "stand": stand, "box": box, "gesture": gesture, "throw_catch": throw_catch, "sit": sit, "pick_up": pick_up, "kick_turn": kick_turn,
     "pedal_arms": pedal_arms, "dance": dance, "play_cube": play_cube,
     "wave": wave, "throw_item": throw_item, "struggle": struggle, "close_door": close_door, "push_case": push_case,
-    "lift_and_drop": lift_and_drop,
+    "lift_and_drop": lift_and_drop, "jump": jump, "behind_back": behind_back,
 }  # fmt: skip
 
 

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from hmc.errors import InputError
 from hmc.io.shipped import shipped_folder
 from hmc.landmarks import landmark_index
-from hmc.synthetic import actions, gait
+from hmc.synthetic import actions, everyday, gait
 from hmc.synthetic.actor import PARTS, make_actor, pose_mesh
 from hmc.synthetic.bvh import bvh_motion, bvh_positions, read_bvh
 from hmc.synthetic.motions import angles, place
@@ -203,6 +203,28 @@ def test_throwing_and_sitting_do_what_they_say(actor):
         actor.skeleton, *(lambda m: (m.root, m.orientations))(actions.pick_up(actor.skeleton, TIMES, np.random.default_rng(0)))
     )
     assert lifted[:, landmark_index("r_wrist"), 2].min() < 0.3
+
+
+def test_who_jumps_falls_as_bodies_do_and_stands_again(actor):
+    times = np.arange(0, 2, 0.01)
+    motion = everyday.jump(actor.skeleton, times, np.random.default_rng(0))
+    marks = landmark_positions(actor.skeleton, motion.root, motion.orientations)
+    ankles = marks[:, [landmark_index("l_ankle"), landmark_index("r_ankle")], 2]
+    assert ankles.min() == pytest.approx(actor.skeleton.ankle_height, abs=0.01)
+    aloft = np.flatnonzero((ankles > actor.skeleton.ankle_height + 0.1).all(axis=1))
+    assert np.all(np.diff(aloft) == 1)
+    assert ankles.max() - actor.skeleton.ankle_height == pytest.approx(9.81 * 0.55**2 / 8, abs=0.01)
+    falling = np.diff(ankles[aloft].mean(axis=1), n=2) / 0.01**2
+    assert np.median(falling) == pytest.approx(-9.81, rel=0.1)
+
+
+def test_hands_that_are_laid_behind_the_back_lie_there(actor):
+    motion = everyday.behind_back(actor.skeleton, np.arange(0, 3, 0.04), np.random.default_rng(0))
+    marks = landmark_positions(actor.skeleton, motion.root, motion.orientations)
+    wrists = marks[:, [landmark_index("l_wrist"), landmark_index("r_wrist")]]
+    behind = wrists[:, :, 0].max(axis=1) < marks[:, landmark_index("pelvis"), 0] - 0.1  # the person faces X
+    together = np.linalg.norm(wrists[:, 0] - wrists[:, 1], axis=1) < 0.15
+    assert (behind & together).sum() * 0.04 > 0.8
 
 
 BVH = """HIERARCHY
