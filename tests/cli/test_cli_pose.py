@@ -78,8 +78,7 @@ def test_a_run_leaves_its_four_files_and_its_silhouettes_and_nothing_else(finish
         assert_array_equal(table.frames, joints.frames)
         assert_array_equal(table.persons, joints.persons)
     assert run["method"] == "apf" and run["seed"] == 0
-    # So little work leaves bodies that cover their silhouettes badly, if poses that are near the truth; the whole method: below.
-    assert len(run["problems"]) == 1 and "by their trust about 17% of the landmarks are" in run["problems"][0]
+    assert not run["problems"]
     assert run["parameters"]["voxel_size_m"] == 0.05 and run["parameters"]["preset"]["name"] == "default"
     truth = read_joints(TINY / "truth" / "joints.csv")
     error = np.linalg.norm(joints.positions - truth.where(truth.frames < 5).positions, axis=-1)
