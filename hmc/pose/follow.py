@@ -138,16 +138,21 @@ class PosedPeople(FinishedPeople):
     def save(self, folder: str | Path) -> None:
         """Write ``joints.csv``, ``pose.npz``, and what there is of `hmc.io.result_files.BESIDE`; no other run's of these stays."""
         folder, feet = Path(folder), self.feet
-        for name in BESIDE:
-            (folder / name).unlink(missing_ok=True)
+        others = set(BESIDE)
         write_joints(folder / "joints.csv", self.poses)
         if np.isfinite(feet.positions).any():
             write_joints(folder / "feet.csv", feet)
+            others.remove("feet.csv")
         if self.evidence is not None:
             write_evidence(folder / "evidence.csv", self.poses, self.evidence)
+            others.remove("evidence.csv")
         if any(self.details):
             write_fits(folder / "fits.csv", self.frames.tolist(), self.persons.tolist(), self.status, self.details)
+            others.remove("fits.csv")
         write_pose(folder / "pose.npz", replace(self.states, costs=self.costs, fps=self.fps))
+        # Last: a disk that is full takes nothing away.
+        for name in others:
+            (folder / name).unlink(missing_ok=True)
 
 
 @dataclass(frozen=True)

@@ -57,7 +57,7 @@ def test_a_body_that_went_astray_is_found_anew(one_pass):
     astray = gone_astray(people)
     assert errors(astray)[ASTRAY].min() > 0.25
     without, found = (errors(second(astray, run, anew))[ASTRAY] for anew in (None, AnewSettings()))
-    assert without.mean() > 0.12  # no frame knows better
+    assert without[3:].min() > 0.15  # no frame near these knows better
     assert found[-1] < 0.05 and found[0] < 0.05 and found.mean() < 0.1
 
 

@@ -316,7 +316,8 @@ def test_exchanged_limbs_are_put_right_and_one_gone_astray_is_found():
     seen = observe_markers(VIEWS, detections(landmarks(BODY, true), false=8, noise=1.0), GATE)
     astray = true.copy()
     astray[dof_index("r_shoulder_y", "r_elbow_z")] += -1.2, 0.8
-    for wrong in (swapped_pose(BODY, true, "legs"), astray):
+    # A search by draws: of poses that are astray one draw in four may have none that is near.
+    for wrong, least in ((swapped_pose(BODY, true, "legs"), 4), (astray, 3)):
         assert np.linalg.norm(landmarks(BODY, wrong) - landmarks(BODY, true), axis=1).max() > 0.15
         state, places = refine_to_points(BODY, seen, wrong, GATE)
         found = []
@@ -325,8 +326,7 @@ def test_exchanged_limbs_are_put_right_and_one_gone_astray_is_found():
             off = np.linalg.norm(landmarks(BODY, better) - landmarks(BODY, true), axis=1).max()
             found.append(off < 0.05 and np.nanmax(np.linalg.norm(points - landmarks(BODY, true), axis=1)) < 0.05)
             np.testing.assert_array_equal(choice.states[choice.costs.argmin()], better)
-        # A search by draws: now and then one draw of poses has none that is near.
-        assert sum(found) >= 3
+        assert sum(found) >= least
 
 
 def test_limbs_are_told_apart_over_the_whole_motion():
