@@ -14,10 +14,10 @@ __all__ = ["horizontal_distance", "is_established", "looks_like_object", "looks_
 
 
 def looks_like_person(blobs: Blobs, settings: LifecycleSettings) -> np.ndarray:
-    """Which sets of voxels may be a person who appears; shape (n,) bool. For people who stand, bend, kneel or sit.
+    """Which sets of voxels may be a person who appears; shape (n,) bool.
 
-    All must be within the settings' limits, and the tree, where there is one, decides what of that is people: groups of fragments and
-    noise are unlike anything that it has seen.
+    Of people who stand, bend, kneel or sit, all must be within the settings' limits, and the tree, where there is one, decides what of
+    that is people: groups of fragments and noise are unlike anything that it has seen. People who lie have limits of their own.
     """
     longer = blobs.sides_m[:, 0]
     top, bottom = blobs.top_m, blobs.lowest[:, 2]
@@ -31,7 +31,23 @@ def looks_like_person(blobs: Blobs, settings: LifecycleSettings) -> np.ndarray:
         & (longer >= settings.least_side_m)
         & (longer <= settings.most_side_m)
     )
-    return possible if settings.tree is None else possible & predict_person(settings.tree, feature_matrix(blobs))
+    if settings.tree is not None:
+        possible &= predict_person(settings.tree, feature_matrix(blobs))
+    return possible | _lies(blobs, settings)
+
+
+def _lies(blobs: Blobs, settings: LifecycleSettings) -> np.ndarray:
+    """Which sets of voxels may be a person who lies on the floor, or is on the hands there; shape (n,) bool."""
+    longer = blobs.sides_m[:, 0]
+    return (
+        (longer >= settings.lying_m[0])
+        & (longer <= settings.lying_m[1])
+        & (blobs.top_m < settings.least_top_m)
+        & (blobs.height_m >= settings.least_lying_height_m)
+        & (blobs.lowest[:, 2] <= settings.lying_bottom_m)
+        & (blobs.volume_m3 >= settings.lying_m3[0])
+        & (blobs.volume_m3 <= settings.lying_m3[1])
+    )
 
 
 def looks_like_object(blobs: Blobs, settings: LifecycleSettings) -> np.ndarray:

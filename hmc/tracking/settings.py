@@ -50,10 +50,16 @@ class LifecycleSettings:
     established_s : float
         A track whose voxels have looked like a person for so long altogether is one, whatever they look like now: people sit on the floor,
         lie and crouch. Verdicts do not end it (beyond the thesis).
+    known_s, same_body : float, (float, float)
+        A track whose voxels have looked like a person for so long keeps looking like one where it owns between these shares of the strict
+        hull that it had then: who goes down on the floor keeps the volume (beyond the thesis).
     still_s, still_m : float
         But it ends when what it holds has looked like an object and has not moved by more than this for so long (beyond the thesis).
     least_lying_m : float
         Objects that people leave behind are not as long as what is seen of a person who lies.
+    lying_m, lying_m3, least_lying_height_m, lying_bottom_m : (float, float), (float, float), float, float
+        Longest side, volume, least extent upwards and most height of the lowest point of a person who lies when first seen, lower than
+        `least_top_m` (beyond the thesis).
     least_efficiency, efficiency_s : float
         A track is deleted when the survival rate of its filter's particles (Canton, Eq. 3.11) has been below this share for so long
         (section 4.2.3, second criterion). Of Sparse Sampling, the share of the samples that found a voxel of their own.
@@ -86,9 +92,15 @@ class LifecycleSettings:
     edge_m: float = 0.3
     unlike_s: float = 2.0
     established_s: float = 3.0
+    known_s: float = 0.5
+    same_body: tuple[float, float] = (0.6, 1.6)
     still_s: float = 8.0
     still_m: float = 0.06
     least_lying_m: float = 0.95
+    lying_m: tuple[float, float] = (1.3, 2.2)
+    lying_m3: tuple[float, float] = (0.06, 0.3)
+    least_lying_height_m: float = 0.2
+    lying_bottom_m: float = 0.15
     least_efficiency: float = 0.05
     efficiency_s: float = 1.0
     least_distance_m: float = 0.45

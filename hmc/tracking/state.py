@@ -60,6 +60,8 @@ class Track:
         Smoothed, metres a second.
     volume_m3 : float
         Smoothed volume of the voxels owned while standing apart.
+    body_m3 : float
+        Smoothed volume of the strict hull while the voxels looked like a person and no other was near; 0 as long as nothing is known.
     first_frame, last_frame : int
         First frame seen and last frame with support.
     crowded : int
@@ -93,6 +95,7 @@ class Track:
     still: int = 0
     rest: np.ndarray = field(default_factory=lambda: np.zeros(3))
     withheld: tuple[TrackRow, ...] = ()
+    body_m3: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -64,6 +64,8 @@ class Measurement:
         Whether the voxels keep the track alive.
     like_person, like_object : ndarray of bool, shape (k,)
         Verdicts on them.
+    same_body : ndarray of bool, shape (k,)
+        Where the verdict for a person is by their volume alone: that of the body which looked like a person before.
     """
 
     locating: np.ndarray
@@ -73,6 +75,7 @@ class Measurement:
     supported: np.ndarray
     like_person: np.ndarray
     like_object: np.ndarray
+    same_body: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -232,7 +235,7 @@ def begin_update(state: TrackerState, frame: int, observation: Observation, filt
         shared=persons,
         pushed=np.full(n, -1),
         matched=np.full(k, -1),
-        measurement=Measurement(voxels, no_blobs, no_blobs, no_blobs, persons, persons, persons),
+        measurement=Measurement(voxels, no_blobs, no_blobs, no_blobs, persons, persons, persons, persons),
         tracks=state.tracks,
         memories=memories,
         candidates=state.candidates,

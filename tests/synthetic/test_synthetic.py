@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from hmc.errors import InputError
 from hmc.io.shipped import shipped_folder
 from hmc.landmarks import landmark_index
-from hmc.synthetic import actions, everyday, gait
+from hmc.synthetic import actions, everyday, gait, ground
 from hmc.synthetic.actor import PARTS, make_actor, pose_mesh
 from hmc.synthetic.bvh import bvh_motion, bvh_positions, read_bvh
 from hmc.synthetic.motions import angles, place
@@ -225,6 +225,28 @@ def test_hands_that_are_laid_behind_the_back_lie_there(actor):
     behind = wrists[:, :, 0].max(axis=1) < marks[:, landmark_index("pelvis"), 0] - 0.1  # the person faces X
     together = np.linalg.norm(wrists[:, 0] - wrists[:, 1], axis=1) < 0.15
     assert (behind & together).sum() * 0.04 > 0.8
+
+
+def test_who_does_push_ups_is_level_and_keeps_hands_and_toes_in_their_place(actor):
+    motion = ground.push_ups(actor.skeleton, np.arange(0, 5, 0.04), np.random.default_rng(0))
+    marks = landmark_positions(actor.skeleton, motion.root, motion.orientations)[50:]  # two seconds after the beginning
+    for name in ("l_wrist", "r_wrist", "l_ankle", "r_ankle"):
+        place = marks[:, landmark_index(name)]
+        assert np.ptp(place, axis=0).max() < 0.16 and 0.05 < place[:, 2].min() and place[:, 2].max() < 0.18, name
+    trunk = marks[:, landmark_index("neck")] - marks[:, landmark_index("pelvis")]
+    assert np.all(trunk[:, 2] < 0.4 * np.linalg.norm(trunk, axis=1))
+    assert np.ptp(marks[:, landmark_index("neck"), 2]) > 0.25
+
+
+@pytest.mark.parametrize("name", ["sit_ups", "lie"])
+def test_who_lies_down_is_on_the_back_and_above_the_floor(actor, name):
+    motion = getattr(ground, name)(actor.skeleton, np.arange(0, 7, 0.04), np.random.default_rng(0))
+    marks = landmark_positions(actor.skeleton, motion.root, motion.orientations)
+    assert marks[..., 2].min() > 0.03
+    lies = marks[:, landmark_index("neck"), 2] < 0.25
+    assert lies.mean() > (0.2 if name == "sit_ups" else 0.99)
+    facing = motion.orientations[lies, BONE_NAMES.index("chest"), :, 0]
+    assert np.all(facing[:, 2] > 0.9)
 
 
 BVH = """HIERARCHY

@@ -17,7 +17,8 @@ from hmc.tracking.trackers import make_tracker
 from hmc.tracking.tracks import run
 from hmc.tracking.update import FilterEstimate, begin_update
 
-CHAIR = box((-0.3, -0.25, 0), (0.25, 0.25, 0.8))
+#: Seat and back; a block of its size would hold as much as the person who left it.
+CHAIR = box((-0.3, -0.25, 0.3), (0.25, 0.25, 0.5)) | box((-0.3, -0.25, 0), (-0.2, 0.25, 0.8))
 
 
 def states(tracker, volumes):
@@ -107,6 +108,28 @@ def test_a_person_who_lies_down_and_gets_up_again_keeps_the_number(name):
     table = run(((frame, observe(GRID, volume)) for frame, volume in enumerate(volumes)), FPS, tracker)
     assert set(table.persons) == {0}
     assert list(table.frames) == list(range(len(volumes)))
+
+
+@pytest.mark.parametrize("name", ["naive", "particle", "sparse"])
+def test_who_goes_down_as_soon_as_they_are_seen_is_the_same_body(name):
+    """As large as before, though unlike a person; what is left of a third of it is not."""
+    tracker = make_tracker(name, color=False if name != "naive" else None)
+    crouching, third = box((-0.35, -0.35, 0), (0.35, 0.35, 0.5)), box((-0.35, -0.35, 0), (0.35, 0.35, 0.2))
+    seen = [person(0, 0)] * round(1.5 * FPS)
+    for low, stays in ((crouching, True), (third, False)):
+        volumes = seen + [low] * round(5 * FPS)
+        table = run(((frame, observe(GRID, volume)) for frame, volume in enumerate(volumes)), FPS, tracker)
+        assert list(table.frames) == list(range(len(volumes) if stays else len(seen)))
+
+
+@pytest.mark.parametrize("name", ["naive", "particle", "sparse"])
+def test_who_lies_from_the_first_frame_on_is_found_and_a_table_is_not(name):
+    tracker = make_tracker(name, color=False if name != "naive" else None)
+    lying = box((-0.85, -0.25, 0), (0.85, 0.25, 0.3))
+    table_top = box((-0.75, -0.4, 0.65), (0.75, 0.4, 0.75))
+    for volume, persons in ((lying, {0}), (table_top, set())):
+        table = run(((frame, observe(GRID, volume)) for frame in range(round(4 * FPS))), FPS, tracker)
+        assert set(table.persons) == persons
 
 
 def test_where_an_established_person_lies_is_told_before_they_get_up():

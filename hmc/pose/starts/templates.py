@@ -21,7 +21,12 @@ from hmc.pose.steps.refine import RefineSettings, refine
 from hmc.pose.views.hull_target import HullTarget
 from hmc.pose.views.rays import points_to_cover
 
-__all__ = ["TEMPLATES", "first_poses", "template_states"]
+__all__ = ["FLOOR_TEMPLATES", "TEMPLATES", "first_poses", "template_states"]
+
+
+def _bent(hips: float, knees: float) -> dict[str, float]:
+    return {"r_hip_y": hips, "l_hip_y": hips, "r_knee_y": knees, "l_knee_y": knees}
+
 
 #: Typical poses, degrees on top of hanging arms: (angles, height of the pelvis over the stature, lean included).
 TEMPLATES: dict[str, tuple[dict[str, float], float]] = {
@@ -44,11 +49,31 @@ TEMPLATES: dict[str, tuple[dict[str, float], float]] = {
 }
 
 
+#: More of them, of who is no higher than `FLOOR_M`.
+FLOOR_TEMPLATES: dict[str, tuple[dict[str, float], float]] = {
+    "on the back": ({"root_ry": -90}, 0.06),
+    "on the back, knees up": ({"root_ry": -90, **_bent(hips=-55, knees=100)}, 0.07),
+    "on the back, arms up": ({"root_ry": -90, "r_shoulder_x": -70, "l_shoulder_x": 70}, 0.06),
+    "on the front": ({"root_ry": 90}, 0.07),
+    "on the front, hands beside the chest": ({"root_ry": 85, "r_elbow_z": 120, "l_elbow_z": -120}, 0.08),
+    "on the hands": ({"root_ry": 70, "r_shoulder_z": 75, "l_shoulder_z": -75}, 0.24),
+    "on hands and knees": ({"root_ry": 75, **_bent(hips=-75, knees=85), "r_shoulder_z": 80, "l_shoulder_z": -80}, 0.27),
+    "on the right side": ({"root_rx": 90, **_bent(hips=-30, knees=40)}, 0.09),
+    "on the left side": ({"root_rx": -90, **_bent(hips=-30, knees=40)}, 0.09),
+    "on the seat, legs straight": (_bent(hips=-85, knees=5), 0.07),
+    "on the seat, knees up": ({"root_ry": -15, **_bent(hips=-105, knees=90)}, 0.07),
+    "squatting": ({"root_ry": 20, "torso_y": 30, **_bent(hips=-125, knees=135)}, 0.18),
+}
+#: A hull that ends lower than this is of who is on the floor, metres.
+FLOOR_M = 1.0
+#: Stray voxels are above the top.
+TOP_QUANTILE = 0.995
+
 #: Headings tried, evenly spread, and random variants of each template at each heading.
 HEADINGS, VARIANTS = 12, 4
 
 
-def template_states(body: BodyModel, xy: np.ndarray, floor_z: float, headings: np.ndarray) -> np.ndarray:
+def template_states(body: BodyModel, xy: np.ndarray, floor_z: float, headings: np.ndarray, top_m: float = np.inf) -> np.ndarray:
     """Every template pose at every heading.
 
     Parameters
@@ -60,20 +85,23 @@ def template_states(body: BodyModel, xy: np.ndarray, floor_z: float, headings: n
         Height of the floor, metres.
     headings : ndarray, shape (n,)
         Radians about Z; 0 faces X.
+    top_m : float
+        How high above the floor the hull ends; who is as low as `FLOOR_M` is on it.
 
     Returns
     -------
     ndarray, shape (n, n_templates, 37)
     """
     states = []
-    for angles, pelvis in TEMPLATES.values():
+    poses = TEMPLATES if top_m > FLOOR_M else TEMPLATES | FLOOR_TEMPLATES
+    for angles, pelvis in poses.values():
         state = neutral_state("down", body.limits)
         for name, degrees in angles.items():
             state[dof_index(name)] = np.radians(degrees)
         state[:3] = (*xy, floor_z + pelvis * body.height_m)
         states.append(np.clip(state, body.limits.low, body.limits.high))
     out = np.repeat(np.array(states)[None], len(headings), axis=0)
-    out[:, :, 3] = np.asarray(headings)[:, None]
+    out[:, :, 3] += np.asarray(headings)[:, None]
     return out
 
 
@@ -107,7 +135,8 @@ def first_poses(
     body, n_headings, variants = subject.body, HEADINGS, VARIANTS
     middle = target.surface.mean(0)
     headings = np.linspace(-np.pi, np.pi, n_headings, endpoint=False)
-    states = template_states(body, middle[:2], floor_z, headings)
+    top = float(np.quantile(target.surface[:, 2], TOP_QUANTILE)) - floor_z
+    states = template_states(body, middle[:2], floor_z, headings, top)
     n_templates = states.shape[1]
     states = np.repeat(states[:, :, None], variants, axis=2)
     spread = np.r_[0.06, 0.06, 0.05, 0.12, 0.08, 0.08, np.full(N_CANTON - 6, 0.2), np.zeros(N_DOF - N_CANTON)]

@@ -33,10 +33,25 @@ def measure_tracks(update: FrameUpdate, settings: FollowingSettings) -> FrameUpd
     filter_s = update.filter_s if update.filter else thread_time() - update.begun_s
     certain = features(observation.certain)
     upright = update.matched >= 0
-    like = looks_like_person(owned, settings.lifecycle) | upright
+    look = looks_like_person(owned, settings.lifecycle) | upright
+    same = ~look & _same_body(owned, certain, update.shared, update.state, settings.lifecycle)
+    like = look | same
     supported = upright | _supports(owned, certain, like, update.state, settings.lifecycle)
-    measurement = Measurement(locating, owned, located, certain, supported, like, looks_like_object(owned, settings.lifecycle))
+    things = looks_like_object(owned, settings.lifecycle)
+    measurement = Measurement(locating, owned, located, certain, supported, like, things, same)
     return replace(update, measurement=measurement, filter_s=filter_s)
+
+
+def _same_body(owned: Blobs, certain: Blobs, shared: np.ndarray, state: TrackerState, settings: LifecycleSettings) -> np.ndarray:
+    """Which tracks own as much of the strict hull as when they looked like a person, shape (k,) bool.
+
+    Who goes down on the floor keeps the volume, whatever the shape; who gets up from a chair leaves less there.
+    """
+    before = np.array([track.body_m3 for track in state.tracks])
+    known = np.array([track.liked >= settings.known_s * state.fps for track in state.tracks], bool) & (before > 0)
+    least, most = settings.same_body
+    within = (certain.volume_m3 >= least * before) & (certain.volume_m3 <= most * before) & (owned.volume_m3 <= settings.most_volume_m3)
+    return known & ~shared & within
 
 
 def _supports(owned: Blobs, certain: Blobs, like: np.ndarray, state: TrackerState, settings: LifecycleSettings) -> np.ndarray:

@@ -71,7 +71,8 @@ def _measured(update: FrameUpdate, k: int, correction: _Correction, settings: Fo
         is_established(track, fps, settings.lifecycle) and len(held) >= settings.lifecycle.unlike_s * fps
     )
     velocity, volume = _motion(update, k, moved, correction.gain, settings)
-    track = replace(track, position=moved, head=head, velocity=velocity, volume_m3=volume, last_frame=update.frame)
+    body = _body(update, k, settings)
+    track = replace(track, position=moved, head=head, velocity=velocity, volume_m3=volume, body_m3=body, last_frame=update.frame)
     if not told:
         return replace(track, withheld=held), []
     return replace(track, withheld=()), [replace(one, person=track.person) for one in held]
@@ -86,3 +87,13 @@ def _motion(update: FrameUpdate, k: int, position: np.ndarray, gain: float, sett
     if track.volume_m3 > 0:
         volume = track.volume_m3 if update.shared[k] else track.volume_m3 + blend * (min(volume, 2 * track.volume_m3) - track.volume_m3)
     return velocity, volume
+
+
+def _body(update: FrameUpdate, k: int, settings: FollowingSettings) -> float:
+    """Smoothed volume of the strict hull while it looks like a person who stands apart."""
+    before, measurement = update.state.tracks[k].body_m3, update.measurement
+    if update.shared[k] or measurement.same_body[k] or not measurement.like_person[k]:
+        return before
+    volume = float(measurement.certain.volume_m3[k])
+    blend = 1 - np.exp(-1 / (update.state.fps * settings.velocity_time_s)) if before > 0 else 1.0
+    return before + float(blend) * (volume - before)
