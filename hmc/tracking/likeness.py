@@ -37,14 +37,15 @@ def looks_like_person(blobs: Blobs, settings: LifecycleSettings) -> np.ndarray:
 
 
 def _lies(blobs: Blobs, settings: LifecycleSettings) -> np.ndarray:
-    """Which sets of voxels may be a person who lies on the floor, or is on the hands there; shape (n,) bool."""
+    """Which sets of voxels may be a person who lies, on the floor or on a table, or is on the hands; shape (n,) bool."""
     longer = blobs.sides_m[:, 0]
     return (
         (longer >= settings.lying_m[0])
         & (longer <= settings.lying_m[1])
-        & (blobs.top_m < settings.least_top_m)
-        & (blobs.height_m >= settings.least_lying_height_m)
-        & (blobs.lowest[:, 2] <= settings.lying_bottom_m)
+        & (blobs.top_m <= settings.most_lying_top_m)
+        & (blobs.height_m >= settings.lying_height_m[0])
+        & (blobs.height_m <= settings.lying_height_m[1])
+        & (blobs.lowest[:, 2] <= settings.most_bottom_m)
         & (blobs.volume_m3 >= settings.lying_m3[0])
         & (blobs.volume_m3 <= settings.lying_m3[1])
     )

@@ -57,9 +57,9 @@ class LifecycleSettings:
         But it ends when what it holds has looked like an object and has not moved by more than this for so long (beyond the thesis).
     least_lying_m : float
         Objects that people leave behind are not as long as what is seen of a person who lies.
-    lying_m, lying_m3, least_lying_height_m, lying_bottom_m : (float, float), (float, float), float, float
-        Longest side, volume, least extent upwards and most height of the lowest point of a person who lies when first seen, lower than
-        `least_top_m` (beyond the thesis).
+    lying_m, lying_m3, lying_height_m, most_lying_top_m : (float, float), (float, float), (float, float), float
+        Longest side, volume, extent upwards and height of the highest point of a person who lies when first seen, on the floor or on a
+        table, below which cameras look from above do not see (beyond the thesis).
     least_efficiency, efficiency_s : float
         A track is deleted when the survival rate of its filter's particles (Canton, Eq. 3.11) has been below this share for so long
         (section 4.2.3, second criterion). Of Sparse Sampling, the share of the samples that found a voxel of their own.
@@ -98,9 +98,9 @@ class LifecycleSettings:
     still_m: float = 0.06
     least_lying_m: float = 0.95
     lying_m: tuple[float, float] = (1.3, 2.2)
-    lying_m3: tuple[float, float] = (0.06, 0.3)
-    least_lying_height_m: float = 0.2
-    lying_bottom_m: float = 0.15
+    lying_m3: tuple[float, float] = (0.06, 0.4)
+    lying_height_m: tuple[float, float] = (0.2, 0.85)
+    most_lying_top_m: float = 1.5
     least_efficiency: float = 0.05
     efficiency_s: float = 1.0
     least_distance_m: float = 0.45

@@ -14,7 +14,7 @@ from hmc.body.kinematics import landmarks
 from hmc.body.model import neutral_state
 from hmc.body.proportions import canton_body
 from hmc.landmarks import LANDMARKS, landmark_index
-from hmc.pose.starts.templates import FLOOR_M, FLOOR_TEMPLATES, TEMPLATES, first_poses, template_states
+from hmc.pose.starts.templates import FLOOR_M, FLOOR_TEMPLATES, TEMPLATES, first_poses, lying_height, template_states
 
 
 def turn(one: float, other: float) -> float:
@@ -51,13 +51,23 @@ def test_templates_come_in_both_hands_or_are_symmetric():
 
 def test_templates_of_who_is_on_the_floor_are_low_and_above_it():
     body, _ = body_of()
-    states = template_states(body, np.zeros(2), 0.0, np.zeros(1), 0.6)[0]
+    states = template_states(body, np.zeros(2), 0.0, np.zeros(1), 0.0)[0]
     low = states[-len(FLOOR_TEMPLATES) :]
     points = landmarks(body, low)
     assert np.all(points[..., 2].max(1) < FLOOR_M) and np.all(points[..., 2].min(1) > -0.12)
     assert len(states) == len(TEMPLATES) + len(low)  # who sits low, kneels or is a child has one of the others
     for state, name in zip(low, FLOOR_TEMPLATES, strict=True):
         assert np.abs(low - mirror_state(state)).max(1).min() < 1e-9, name
+
+
+def test_who_lies_is_looked_for_where_they_lie_and_who_stands_is_not():
+    target = act("walk").targets[0]
+    lying = target.surface[:, [2, 0, 1]]  # the height becomes a length
+    lying = lying - [0, 0, np.quantile(lying[:, 2], 0.005)]
+    for lift, found in ((0.0, 0.2), (0.7, 0.7 + np.median(lying[:, 2]))):
+        height = lying_height(replace(target, surface=lying + [0, 0, 0.2 + lift]), 0.2)
+        assert height == pytest.approx(found if not lift else found + 0.2)
+    assert lying_height(target, 0.0) is None
 
 
 @pytest.mark.parametrize(("motion", "heading_deg"), [("gesture", 40), ("walk", -130)])

@@ -125,9 +125,9 @@ def test_who_goes_down_as_soon_as_they_are_seen_is_the_same_body(name):
 @pytest.mark.parametrize("name", ["naive", "particle", "sparse"])
 def test_who_lies_from_the_first_frame_on_is_found_and_a_table_is_not(name):
     tracker = make_tracker(name, color=False if name != "naive" else None)
-    lying = box((-0.85, -0.25, 0), (0.85, 0.25, 0.3))
+    lying, on_a_table = (box((-0.85, -0.25, low), (0.85, 0.25, low + 0.3)) for low in (0.0, 0.6))
     table_top = box((-0.75, -0.4, 0.65), (0.75, 0.4, 0.75))
-    for volume, persons in ((lying, {0}), (table_top, set())):
+    for volume, persons in ((lying, {0}), (on_a_table, {0}), (table_top, set())):
         table = run(((frame, observe(GRID, volume)) for frame in range(round(4 * FPS))), FPS, tracker)
         assert set(table.persons) == persons
 

@@ -21,7 +21,7 @@ from hmc.pose.steps.refine import RefineSettings, refine
 from hmc.pose.views.hull_target import HullTarget
 from hmc.pose.views.rays import points_to_cover
 
-__all__ = ["FLOOR_TEMPLATES", "TEMPLATES", "first_poses", "template_states"]
+__all__ = ["FLOOR_TEMPLATES", "TEMPLATES", "first_poses", "lying_height", "template_states"]
 
 
 def _bent(hips: float, knees: float) -> dict[str, float]:
@@ -49,7 +49,7 @@ TEMPLATES: dict[str, tuple[dict[str, float], float]] = {
 }
 
 
-#: More of them, of who is no higher than `FLOOR_M`.
+#: More of them, of who is on the floor or lies on something.
 FLOOR_TEMPLATES: dict[str, tuple[dict[str, float], float]] = {
     "on the back": ({"root_ry": -90}, 0.06),
     "on the back, knees up": ({"root_ry": -90, **_bent(hips=-55, knees=100)}, 0.07),
@@ -64,8 +64,9 @@ FLOOR_TEMPLATES: dict[str, tuple[dict[str, float], float]] = {
     "on the seat, knees up": ({"root_ry": -15, **_bent(hips=-105, knees=90)}, 0.07),
     "squatting": ({"root_ry": 20, "torso_y": 30, **_bent(hips=-125, knees=135)}, 0.18),
 }
-#: A hull that ends lower than this is of who is on the floor, metres.
-FLOOR_M = 1.0
+#: A hull that ends lower than this, and begins lower than the second, is of who is on the floor; one that begins higher, is no higher than
+#: the third and longer than the last, of who lies on something; metres.
+FLOOR_M, RAISED_M, FLAT_M, LONG_M = 1.0, 0.25, 0.85, 1.3
 #: Stray voxels are above the top.
 TOP_QUANTILE = 0.995
 
@@ -73,7 +74,7 @@ TOP_QUANTILE = 0.995
 HEADINGS, VARIANTS = 12, 4
 
 
-def template_states(body: BodyModel, xy: np.ndarray, floor_z: float, headings: np.ndarray, top_m: float = np.inf) -> np.ndarray:
+def template_states(body: BodyModel, xy: np.ndarray, floor_z: float, headings: np.ndarray, lying_z: float | None = None) -> np.ndarray:
     """Every template pose at every heading.
 
     Parameters
@@ -85,24 +86,50 @@ def template_states(body: BodyModel, xy: np.ndarray, floor_z: float, headings: n
         Height of the floor, metres.
     headings : ndarray, shape (n,)
         Radians about Z; 0 faces X.
-    top_m : float
-        How high above the floor the hull ends; who is as low as `FLOOR_M` is on it.
+    lying_z : float, optional
+        Height of what somebody may lie on, world, metres: those of `FLOOR_TEMPLATES` on it, too.
 
     Returns
     -------
     ndarray, shape (n, n_templates, 37)
     """
     states = []
-    poses = TEMPLATES if top_m > FLOOR_M else TEMPLATES | FLOOR_TEMPLATES
-    for angles, pelvis in poses.values():
+    poses = [(*pose, floor_z) for pose in TEMPLATES.values()]
+    if lying_z is not None:
+        poses += [(*pose, lying_z) for pose in FLOOR_TEMPLATES.values()]
+    for angles, pelvis, below in poses:
         state = neutral_state("down", body.limits)
         for name, degrees in angles.items():
             state[dof_index(name)] = np.radians(degrees)
-        state[:3] = (*xy, floor_z + pelvis * body.height_m)
+        state[:3] = (*xy, below + pelvis * body.height_m)
         states.append(np.clip(state, body.limits.low, body.limits.high))
     out = np.repeat(np.array(states)[None], len(headings), axis=0)
     out[:, :, 3] += np.asarray(headings)[:, None]
     return out
+
+
+def lying_height(target: HullTarget, floor_z: float) -> float | None:
+    """Height of what the person may lie or sit on: the floor, or what carries a long flat hull.
+
+    Cameras that look down do not see below a table: the hull reaches below its top, and the body is in its upper half.
+
+    Parameters
+    ----------
+    target : HullTarget
+    floor_z : float
+        Height of the floor, metres.
+
+    Returns
+    -------
+    float or None
+        World, metres; None of who stands.
+    """
+    points = target.surface
+    low, high = np.quantile(points, [1 - TOP_QUANTILE, TOP_QUANTILE], axis=0)
+    if high[2] - floor_z <= FLOOR_M and low[2] - floor_z <= RAISED_M:
+        return floor_z
+    flat = high[2] - low[2] <= FLAT_M and np.max(high[:2] - low[:2]) >= LONG_M
+    return float(np.median(points[:, 2])) if flat else None
 
 
 def first_poses(
@@ -135,8 +162,7 @@ def first_poses(
     body, n_headings, variants = subject.body, HEADINGS, VARIANTS
     middle = target.surface.mean(0)
     headings = np.linspace(-np.pi, np.pi, n_headings, endpoint=False)
-    top = float(np.quantile(target.surface[:, 2], TOP_QUANTILE)) - floor_z
-    states = template_states(body, middle[:2], floor_z, headings, top)
+    states = template_states(body, middle[:2], floor_z, headings, lying_height(target, floor_z))
     n_templates = states.shape[1]
     states = np.repeat(states[:, :, None], variants, axis=2)
     spread = np.r_[0.06, 0.06, 0.05, 0.12, 0.08, 0.08, np.full(N_CANTON - 6, 0.2), np.zeros(N_DOF - N_CANTON)]
