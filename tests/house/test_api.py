@@ -82,6 +82,9 @@ def test_poses_from_detections():
     uv, _ = project(recording.rig, landmarks(with_skin_markers(body), states))
     view, frame, _ = (index.ravel() for index in np.indices(uv.shape[:3]))
     detections = DetectionTable(frame, np.array(recording.rig.names)[view], uv.reshape(-1, 2))
-    people = hmc.pose(recording, method="marker-apf", detections=detections)
-    assert people.frames.tolist() == [0, 1, 2] and set(people.persons) == {0}
-    assert np.linalg.norm(people.positions - landmarks(body, states), axis=-1).mean() < 0.01
+    errors = []
+    for seed in range(3):  # one draw may leave an arm astray
+        people = hmc.pose(recording, method="marker-apf", detections=detections, seed=seed)
+        assert people.frames.tolist() == [0, 1, 2] and set(people.persons) == {0}
+        errors.append(np.linalg.norm(people.positions - landmarks(body, states), axis=-1).mean())
+    assert sorted(errors)[1] < 0.002
