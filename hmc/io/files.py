@@ -104,6 +104,8 @@ def write_figure(path: str | Path, figure: Any, dpi: float) -> None:
         When it cannot be written, or not as a picture of that kind.
     """
     path = Path(path)
+    if path.suffix[1:].lower() not in figure.canvas.get_supported_filetypes():
+        raise InputError(f"{path}: the picture cannot be written (the name of one ends in .png, .jpg, .pdf or .svg)")
     temporary = part_path(path)
     try:
         sweep(path.parent)
