@@ -15,6 +15,8 @@ __all__ = ["estimate_height", "possible_heights", "usable_frames"]
 LEAST_START_SURFACE = 50
 #: A hull that ends lower than this is no adult who stands, metres; below the second, it is no child either.
 ADULT_M, CHILD_M = 1.45, 0.9
+#: Stray voxels are above the top of a hull: it is at this quantile of its surface.
+TOP_QUANTILE = 0.995
 #: An adult's mean stature, metres.
 ADULT_MEAN_M = 1.7
 
@@ -52,7 +54,7 @@ def possible_heights(targets: Sequence[HullTarget | None], floor_z: float = 0.0)
     tuple of float
         One or two, metres, the likelier first.
     """
-    tops = [np.quantile(t.surface[:, 2], 0.995) - floor_z for t in targets if t is not None and len(t.surface) >= LEAST_START_SURFACE]
+    tops = [np.quantile(t.surface[:, 2], TOP_QUANTILE) - floor_z for t in targets if t is not None and len(t.surface) >= LEAST_START_SURFACE]
     # Arms held up, hats and stray voxels reach above the crown: the median of the frames resists all that does not last.
     top = float(np.median(tops)) if tops else 0.0
     if top > ADULT_M:

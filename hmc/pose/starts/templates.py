@@ -17,6 +17,7 @@ from hmc.body.kinematics import landmarks
 from hmc.body.model import BodyModel, neutral_state
 from hmc.pose.method import Subject
 from hmc.pose.objectives.symmetric import Symmetric, SymmetricSettings
+from hmc.pose.starts.stature import TOP_QUANTILE
 from hmc.pose.steps.refine import RefineSettings, refine
 from hmc.pose.views.hull_target import HullTarget
 from hmc.pose.views.rays import points_to_cover
@@ -67,8 +68,6 @@ FLOOR_TEMPLATES: dict[str, tuple[dict[str, float], float]] = {
 #: A hull that ends lower than this, and begins lower than the second, is of who is on the floor; one that begins higher, is no higher than
 #: the third and longer than the last, of who lies on something; metres.
 FLOOR_M, RAISED_M, FLAT_M, LONG_M = 1.0, 0.25, 0.85, 1.3
-#: Stray voxels are above the top.
-TOP_QUANTILE = 0.995
 
 #: Headings tried, evenly spread, and random variants of each template at each heading.
 HEADINGS, VARIANTS = 12, 4

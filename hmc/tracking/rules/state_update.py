@@ -81,7 +81,7 @@ def _measured(update: FrameUpdate, k: int, correction: _Correction, settings: Fo
 def _motion(update: FrameUpdate, k: int, position: np.ndarray, gain: float, settings: FollowingSettings) -> tuple[np.ndarray, float]:
     """Smoothed velocity and volume; what is measured with little gain changes them little."""
     track, fps = update.state.tracks[k], update.state.fps
-    blend = gain * (1 - np.exp(-1 / (fps * settings.velocity_time_s)))
+    blend = gain * _smoothing(fps, settings)
     velocity = track.velocity + blend * ((position - track.position) * fps - track.velocity)
     volume = float(update.measurement.owned.volume_m3[k])
     if track.volume_m3 > 0:
@@ -95,5 +95,9 @@ def _body(update: FrameUpdate, k: int, settings: FollowingSettings) -> float:
     if update.shared[k] or measurement.same_body[k] or not measurement.like_person[k]:
         return before
     volume = float(measurement.certain.volume_m3[k])
-    blend = 1 - np.exp(-1 / (update.state.fps * settings.velocity_time_s)) if before > 0 else 1.0
-    return before + float(blend) * (volume - before)
+    return before + _smoothing(update.state.fps, settings) * (volume - before) if before > 0 else volume
+
+
+def _smoothing(fps: float, settings: FollowingSettings) -> float:
+    """Share of what is new in a frame that smoothed values take."""
+    return float(1 - np.exp(-1 / (fps * settings.velocity_time_s)))
