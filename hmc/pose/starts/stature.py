@@ -54,7 +54,9 @@ def possible_heights(targets: Sequence[HullTarget | None], floor_z: float = 0.0)
     tuple of float
         One or two, metres, the likelier first.
     """
-    tops = [np.quantile(t.surface[:, 2], TOP_QUANTILE) - floor_z for t in targets if t is not None and len(t.surface) >= LEAST_START_SURFACE]
+    tops = [
+        np.quantile(t.surface[:, 2], TOP_QUANTILE) - floor_z for t in targets if t is not None and len(t.surface) >= LEAST_START_SURFACE
+    ]
     # Arms held up, hats and stray voxels reach above the crown: the median of the frames resists all that does not last.
     top = float(np.median(tops)) if tops else 0.0
     if top > ADULT_M:
