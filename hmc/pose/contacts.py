@@ -2,7 +2,8 @@
 
 Shoes of the floor's color, and what a foot stands on, are the first that silhouettes lose, and a body that is fitted to what is left hangs
 in the air, with shanks that are too short. But who walks, runs or stands has some foot that stays where it is for a moment, and such a foot
-stands on the floor. Told from the ankles of a first pass, so that the second one can hold the soles there (`hmc.body.floor`).
+stands on the floor. Told from the ankles of a first pass, so that the second one can hold the soles there (`hmc.body.floor`). Of feet on
+tiptoe, a dancer's or the back one of a lunge, nothing is said: silhouettes know better how high the heel is.
 
 That a foot at rest is one that stands is how recorded motion is rid of skating feet (Kovar, Schreiner and Gleicher 2002); bounds are ours.
 """
@@ -14,7 +15,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from hmc.body.feet import foot_points
-from hmc.body.kinematics import landmarks
+from hmc.body.floor import sole_places
+from hmc.body.kinematics import landmarks, segment_transforms
 from hmc.body.model import BodyModel
 from hmc.io.results import PoseStates
 from hmc.landmarks import LANDMARKS
@@ -30,6 +32,11 @@ ROLLING_M_S, ROLLING_SHARE, STRIDE_S = 0.45, 0.25, 1.0
 LIFTED_M = 0.08
 #: ... and with its sole no farther than this from the floor, metres: what stands on a chair's rung or a step stands elsewhere.
 FROM_FLOOR_M = 0.12
+#: A foot stands on tiptoe whose heel is so high above the floor, and so much higher than its ball, metres: of shoes that silhouettes
+#: lose the heel may seem 9 cm high ...
+HEEL_M, TIPTOE_M = 0.10, 0.05
+#: ... unless its lower end is this far below the floor: what nothing shows points anywhere.
+SUNK_M = 0.04
 #: Who kneels or lies has feet at rest whose soles are anywhere: the knee is above the ankle by this share of the shank at least.
 UPRIGHT = 0.5
 
@@ -54,7 +61,7 @@ def standing_feet(
     Returns
     -------
     dict of int to dict of int to tuple of bool
-        By person and frame: whether heel and ball of the left foot, and those of the right one, are on the floor.
+        By person and frame: whether heel and ball of the left foot, and those of the right one, are on the floor; neither, on tiptoe.
     """
     found = {}
     for person, body in bodies.items():
@@ -64,10 +71,14 @@ def standing_feet(
             continue
         own = states.states[rows]
         places = landmarks(body, own)
+        heels, balls = np.moveaxis(sole_places(body, *segment_transforms(body, own))[0][..., 2].reshape(len(rows), 2, 2), -1, 0) - floor_z
         ankles, shanks = places[:, _ANKLES], places[:, _KNEES] - places[:, _ANKLES]
         lowest = foot_points(body, own)[..., 2].reshape(len(rows), 2, 2).min(axis=2) - floor_z
         able = (np.abs(lowest) < FROM_FLOOR_M) & (shanks[..., 2] > UPRIGHT * np.linalg.norm(shanks, axis=-1))
         stand = standing_frames(states.frames[rows] / fps, ankles) & able[..., None]
+        # Only where the whole sole would be held: before each step the heel rises too, and the ball stays.
+        on_tiptoe = stand[..., 0] & (heels > HEEL_M) & (heels - balls > TIPTOE_M) & (lowest > -SUNK_M)
+        stand &= ~on_tiptoe[..., None]
         found[person] = {int(frame): tuple(parts.ravel().tolist()) for frame, parts in zip(states.frames[rows], stand, strict=True)}
     return found
 

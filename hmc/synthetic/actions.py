@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 from hmc.synthetic.motions import Feet, Motion, Upper, arms_by_angles, arms_by_hands, assemble, keyframes, pelvis_height, roll_foot
 from hmc.synthetic.skeleton import Skeleton
 
-__all__ = ["box", "gesture", "hug", "pick_up", "sit", "stand", "throw_catch"]
+__all__ = ["box", "gesture", "hug", "lunge", "pick_up", "sit", "stand", "throw_catch"]
 
 
 def stand(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator) -> Motion:
@@ -221,6 +221,25 @@ def hug(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator) -> Moti
     )
     arms = arms_by_hands(skeleton, np.tile(hands, (n, 1, 1)), elbow_out=1.2)
     return _on_feet(skeleton, times, feet, upper, arms, shift, np.full(n, 0.004))
+
+
+def lunge(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator) -> Motion:
+    """Go down on the front leg and up again, with the hands at the hips; the back foot stands on its ball all the time."""
+    n, size = len(times), skeleton.height_m / 1.75
+    feet = _planted(skeleton, n, [(0.36, 0.10, 4), (-0.40, -0.10, -6)])
+    feet = _raise_heel(skeleton, feet, 1, np.full(n, np.radians(-55)))
+    at, down, now = [0.0, 0.7], [0.0, 0.0], 0.7
+    while now < times[-1]:
+        for wait, depth in ((0.8, 1.0), (0.5, 1.0), (0.8, 0.0), (0.4, 0.0)):
+            now += wait * float(rng.uniform(0.95, 1.05))
+            at.append(now)
+            down.append(depth)
+    low = keyframes(times, np.array(at), np.array(down))
+    upper = _upper(n, pelvis=_columns(n, pitch=0.05 + 0.05 * low), abdomen=_columns(n, pitch=0.04), chest=_columns(n, pitch=0.02 * low))
+    hands = np.array([[0.10, 0.34, -0.68], [0.10, -0.34, -0.68]])
+    arms = arms_by_hands(skeleton, np.tile(hands, (n, 1, 1)), elbow_out=1.4)
+    shift = np.stack([size * (0.04 + 0.06 * low), np.zeros(n)], axis=-1)
+    return _on_feet(skeleton, times, feet, upper, arms, shift, size * (0.03 + 0.26 * low))
 
 
 def _planted(skeleton: Skeleton, n: int, prints) -> Feet:

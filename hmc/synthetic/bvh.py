@@ -1,7 +1,8 @@
 """BVH motion files, and their motions on our actors.
 
 A file's skeleton is read by the names of its joints, whatever the naming: only where joints lie is used, so that rest poses, axes and
-units do not matter. Bones take the directions that the file's have; lengths stay the actor's own.
+units do not matter. Bones take the directions that the file's have; lengths stay the actor's own. Feet of files that were carried over
+from one skeleton to another are turned as no ankle goes; these stop at an ankle's range.
 """
 
 from __future__ import annotations
@@ -19,6 +20,9 @@ from hmc.synthetic.motions import Motion, lift_clavicle
 from hmc.synthetic.skeleton import BONE_NAMES, Skeleton, joint_positions, limb_orientations, unit
 
 __all__ = ["Bvh", "bvh_motion", "bvh_positions", "read_bvh"]
+
+#: How far an ankle lifts the toes (negative) and lowers them, degrees: a passive range, as of a stretch or a dancer.
+ANKLE_RANGE_DEG = (-30.0, 70.0)
 
 
 @dataclass(frozen=True)
@@ -226,6 +230,7 @@ def _orientations(joint: dict[str, np.ndarray], skeleton: Skeleton) -> np.ndarra
         frames[:, BONE_NAMES.index(bone)] = orientation
 
     hips = (joint["l_hip"] + joint["r_hip"]) / 2
+    slope = _foot_slope(joint)
     low, high, neck = (skeleton.offsets[BONE_NAMES.index(bone)] for bone in ("abdomen", "chest", "neck"))
     pelvis = _upright(joint["l_hip"] - joint["r_hip"], joint["spine"] - hips, low)
     chest = _upright(joint["l_shoulder"] - joint["r_shoulder"], joint["neck"] - (joint["spine"] + hips) / 2, (low + high) / 2 + neck)
@@ -245,7 +250,7 @@ def _orientations(joint: dict[str, np.ndarray], skeleton: Skeleton) -> np.ndarra
         first, second = limb_orientations("leg", thigh, shank, pelvis[:, :, 0])
         put(f"{side}_thigh", first)
         put(f"{side}_shank", second)
-        foot = _foot(joint[f"{side}_toe"] - joint[f"{side}_ankle"], second[:, :, 1], skeleton)
+        foot = _foot(joint[f"{side}_toe"] - joint[f"{side}_ankle"], second, slope)
         put(f"{side}_foot", foot)
         put(f"{side}_toes", foot)
     return frames
@@ -259,14 +264,21 @@ def _upright(left: np.ndarray, up: np.ndarray, rest: np.ndarray) -> np.ndarray:
     return frame @ Rotation.from_euler("y", -np.arctan2(rest[0], rest[2])).as_matrix()
 
 
-def _foot(forward: np.ndarray, left: np.ndarray, skeleton: Skeleton) -> np.ndarray:
-    """Orientations of a foot whose ankle-to-ball direction is ``forward``."""
+def _foot_slope(joint: dict[str, np.ndarray]) -> float:
+    """How far the file's ankle-to-ball directions point down of feet that stand, radians: the median, as most feet of most frames do."""
+    feet = np.stack([joint[f"{side}_toe"] - joint[f"{side}_ankle"] for side in "lr"])
+    return float(np.median(np.arctan2(-feet[..., 2], np.hypot(feet[..., 0], feet[..., 1]))))
+
+
+def _foot(forward: np.ndarray, shank: np.ndarray, slope: float) -> np.ndarray:
+    """Orientations of a foot whose ankle-to-ball direction is ``forward``, at the end of a shank of these orientations."""
     x = unit(forward)
-    y = unit(left - np.sum(left * x, axis=-1, keepdims=True) * x)
-    frame = np.stack([x, y, np.cross(x, y)], axis=-1)
-    ball = skeleton.offsets[BONE_NAMES.index("l_toes")]
-    slope = np.arctan2(-ball[2], ball[0])
-    return frame @ Rotation.from_euler("y", -slope).as_matrix()
+    y = unit(shank[:, :, 1] - np.sum(shank[:, :, 1] * x, axis=-1, keepdims=True) * x)
+    flat = Rotation.from_euler("y", -slope).as_matrix()
+    in_shank = shank.transpose(0, 2, 1) @ np.stack([x, y, np.cross(x, y)], axis=-1) @ flat
+    lowered = np.arctan2(-in_shank[:, 2, 0], in_shank[:, 0, 0])
+    back = np.clip(lowered, *np.radians(ANKLE_RANGE_DEG)) - lowered
+    return shank @ Rotation.from_euler("y", back[:, None]).as_matrix() @ in_shank
 
 
 def _root(joint: dict[str, np.ndarray], skeleton: Skeleton) -> np.ndarray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hmc.synthetic.actions import box, gesture, pick_up, sit, stand, throw_catch
+from hmc.synthetic.actions import box, gesture, lunge, pick_up, sit, stand, throw_catch
 from hmc.synthetic.bvh import bvh_motion, read_bvh
 from hmc.synthetic.drills import dance, kick_turn, pedal_arms, play_cube
 from hmc.synthetic.everyday import behind_back, close_door, jump, lift_and_drop, push_case, struggle, throw_item, wave
@@ -22,7 +22,7 @@ _ACTIONS = {
     "pedal_arms": pedal_arms, "dance": dance, "play_cube": play_cube,
     "wave": wave, "throw_item": throw_item, "struggle": struggle, "close_door": close_door, "push_case": push_case,
     "lift_and_drop": lift_and_drop, "jump": jump, "behind_back": behind_back,
-    "push_ups": push_ups, "sit_ups": sit_ups, "lie": lie,
+    "push_ups": push_ups, "sit_ups": sit_ups, "lie": lie, "lunge": lunge,
 }  # fmt: skip
 
 

@@ -35,7 +35,7 @@ Color = tuple[float, float, float]
 
 MOTIONS = (
     "walk", "jog", "stand", "box", "gesture", "throw_catch", "sit", "pick_up", "kick_turn", "pedal_arms", "dance", "play_cube", "wave",
-    "throw_item", "struggle", "close_door", "push_case", "lift_and_drop", "jump", "behind_back", "push_ups", "sit_ups", "lie",
+    "throw_item", "struggle", "close_door", "push_case", "lift_and_drop", "jump", "behind_back", "push_ups", "sit_ups", "lie", "lunge",
     "bvh", "script",
 )  # fmt: skip
 #: What a step of a script may be.

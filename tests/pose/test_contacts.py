@@ -84,6 +84,21 @@ def test_who_kneels_may_have_the_feet_anywhere():
     assert set(standing_feet(states_of([state] * 20), {0: BODY}, 30.0, 0.0)[0].values()) == {(False,) * 4}
 
 
+def test_of_who_stands_on_tiptoe_nothing_is_said_unless_nothing_shows_the_feet():
+    state = neutral_state()
+    state[dof_index("l_ankle_y")] = np.radians(40)
+    state[2] = LEGS
+    lowest = foot_points(BODY, state)[:2, 2].min()
+    assert lowest < -0.08  # through the floor by its toes: legs of which silhouettes lose the feet
+    assert set(standing_feet(states_of([state] * 20), {0: BODY}, 30.0, 0.0)[0].values()) == {(True,) * 4}
+    state[2] -= lowest  # the toes' end on the floor; and the other foot beside it in the air, within what a floor may be off
+    found = set(standing_feet(states_of([state] * 20), {0: BODY}, 30.0, 0.0)[0].values())
+    assert len(found) == 1 and next(iter(found))[:2] == (False, False)
+    state[dof_index("l_ankle_y")] = np.radians(5)  # a heel that is hardly raised stands
+    state[2] = LEGS
+    assert set(standing_feet(states_of([state] * 20), {0: BODY}, 30.0, 0.0)[0].values()) == {(True,) * 4}
+
+
 def test_frames_without_a_pose_tell_nothing():
     lost = [*poses(LEGS, n=5), np.full(N_DOF, np.nan), *poses(LEGS, n=5)]
     found = standing_feet(states_of(lost), {0: BODY}, 30.0, 0.0)[0]

@@ -15,6 +15,7 @@ from hmc.landmarks import landmark_index
 from hmc.synthetic import actions, everyday, gait, ground
 from hmc.synthetic.actor import PARTS, make_actor, pose_mesh
 from hmc.synthetic.bvh import bvh_motion, bvh_positions, read_bvh
+from hmc.synthetic.feet import true_foot_points
 from hmc.synthetic.motions import angles, place
 from hmc.synthetic.rasterise import rasterise
 from hmc.synthetic.skeleton import BONE_NAMES, PARENTS, joint_positions, landmark_positions, make_skeleton, reach
@@ -238,6 +239,15 @@ def test_who_does_push_ups_is_level_and_keeps_hands_and_toes_in_their_place(acto
     assert np.ptp(marks[:, landmark_index("neck"), 2]) > 0.25
 
 
+def test_who_lunges_keeps_the_back_heel_up_and_the_front_foot_flat(actor):
+    motion = actions.lunge(actor.skeleton, TIMES, np.random.default_rng(0))
+    feet = true_foot_points(actor, motion.root, motion.orientations).reshape(len(TIMES), 2, 2, 3)
+    assert np.ptp(feet, axis=0).max() < 1e-6  # both stay where they are
+    assert np.abs(feet[:, 0, :, 2]).max() < 0.02 and feet[:, 1, 0, 2].min() > 0.15 and np.abs(feet[:, 1, 1, 2]).max() < 0.03
+    knees = landmark_positions(actor.skeleton, motion.root, motion.orientations)[:, landmark_index("r_knee"), 2]
+    assert knees.max() > 0.35 and 0.08 < knees.min() < 0.25
+
+
 @pytest.mark.parametrize("name", ["sit_ups", "lie"])
 def test_who_lies_down_is_on_the_back_and_above_the_floor(actor, name):
     motion = getattr(ground, name)(actor.skeleton, np.arange(0, 7, 0.04), np.random.default_rng(0))
@@ -350,3 +360,17 @@ def test_captured_bvh_files_play(shared_data, actor, name):
     marks = landmark_positions(actor.skeleton, played.root, played.orientations)
     assert np.abs(marks[:, landmark_index("head_top"), 2] - 1.70).max() < 0.12
     assert marks[:, [landmark_index("l_ankle"), landmark_index("r_ankle")], 2].min() > 0.02
+
+
+@pytest.mark.parametrize(("name", "flat"), [("12_01", 5), ("avatar_002_05", 5), ("avatar_005_09", 8)])
+def test_feet_of_captured_files_stand_flat_and_are_turned_as_ankles_go(shared_data, actor, name, flat):
+    motion = read_bvh(shared_data / "cmu" / "bvh" / f"{name}.bvh")
+    played = bvh_motion(motion, actor.skeleton, np.arange(0, len(motion.values), 4) * motion.frame_time_s)
+    lowered, tilts = [], []
+    for side in "lr":
+        shank, foot = (played.orientations[:, BONE_NAMES.index(f"{side}_{bone}")] for bone in ("shank", "foot"))
+        ahead = foot[:, :, 0]
+        lowered.append(np.degrees(np.arctan2(np.sum(-shank[:, :, 2] * ahead, axis=1), np.sum(shank[:, :, 0] * ahead, axis=1))))
+        tilts.append(np.degrees(np.arcsin(ahead[:, 2])))
+    assert np.min(lowered) > -30.01 and np.max(lowered) < 70.01  # the dancer's file has feet that are bent by 61 degrees towards the shin
+    assert abs(np.median(tilts)) < flat
