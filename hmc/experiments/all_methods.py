@@ -15,7 +15,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.ticker import LogLocator
 
-from hmc.experiments.by_action import pose_scores
+from hmc.experiments.by_action import scores_by_repeat, spread
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs
 from hmc.experiments.five_actions import action_title
@@ -143,11 +143,10 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
 
 def _scores(cells: Sequence[Cell]) -> dict[str, Any]:
     """Means over the seeds, their spread where there are several, and frames a second."""
-    seeds = dict.fromkeys(one.parameters["repeat"] for one in cells)
-    scores = [pose_scores([one for one in cells if one.parameters["repeat"] == seed]) for seed in seeds]
+    scores = scores_by_repeat(cells)
     seconds = [one.results["frame_s"] for one in cells if one.results["frame_s"]]
     columns: dict[str, Any] = {}
-    for name, spread in (
+    for name, name_of_spread in (
         ("mean_mm", "mean_spread_mm"),
         ("MMTP_mm", ""),
         ("MMTA_percent", "MMTA_spread_percent"),
@@ -155,9 +154,9 @@ def _scores(cells: Sequence[Cell]) -> dict[str, Any]:
     ):
         values = [score[name] for score in scores]
         columns[name] = float(np.mean(values))
-        if spread:
-            columns[spread] = float(np.std(values, ddof=1)) if len(values) > 1 else None
-    return columns | {"seeds": len(seeds), "frames_per_s": float(1 / np.mean(seconds)) if seconds else None}
+        if name_of_spread:
+            columns[name_of_spread] = spread(values)
+    return columns | {"seeds": len(scores), "frames_per_s": float(1 / np.mean(seconds)) if seconds else None}
 
 
 def _draw(rows: Sequence[dict[str, Any]]) -> plt.Figure:

@@ -13,7 +13,7 @@ from hmc.experiments.truth import estimates
 from hmc.metrics.angles import angular_errors, score_angles
 from hmc.metrics.landmarks import landmark_errors, score
 
-__all__ = ["AVERAGE", "COLUMNS", "action_cells", "action_rows", "pose_scores"]
+__all__ = ["AVERAGE", "COLUMNS", "action_cells", "action_rows", "pose_scores", "scores_by_repeat", "spread"]
 
 AVERAGE = "Average"
 #: What the thesis prints, in its order.
@@ -35,6 +35,17 @@ def pose_scores(cells: Sequence[Cell]) -> dict[str, float]:
     for within, own in ((STRICT_MM, strict), (NEAR_MM, near)):
         scores |= {f"MMTP_{within:.0f}_mm": float(own.mmtp), f"MMTA_{within:.0f}_percent": float(100 * own.mmta)}
     return scores
+
+
+def scores_by_repeat(cells: Sequence[Cell]) -> list[dict[str, float]]:
+    """`pose_scores` of the cells of each repeat that there is."""
+    repeats = sorted({one.parameters["repeat"] for one in cells})
+    return [pose_scores([one for one in cells if one.parameters["repeat"] == repeat]) for repeat in repeats]
+
+
+def spread(values: Sequence[float]) -> float | None:
+    """The deviation of several repeats' values; None of a single one."""
+    return float(np.std(values, ddof=1)) if len(values) > 1 else None
 
 
 def action_cells(cells: Sequence[Cell], title: str) -> list[Cell]:

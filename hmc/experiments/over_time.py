@@ -13,7 +13,7 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 
-from hmc.experiments.by_action import pose_scores
+from hmc.experiments.by_action import scores_by_repeat, spread
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs, rendered
 from hmc.experiments.engine.style import COLORS
@@ -135,8 +135,8 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
         ),
     )
     captions = {
-        "ways": f"Mean joint error of `default` with another motion prior or start, {CAMERAS} cameras, {SEEDS} seeds, and its spread over "
-        "them; what that costs, with its interval of 95 % over clips and seeds.",
+        "ways": f"Mean joint error of `default` with another motion prior or start, {CAMERAS} cameras, and its spread over "
+        "seeds; what that costs, with its interval of 95 % over clips and seeds.",
         "smoothing": "Estimates of `default` smoothed over some seconds: mean error, and its second difference from frame to frame.",
         "found-again": f"A walker whom no camera sees from {GONE_S[0]} to {GONE_S[1]} s: the mean error of the frames after that, and when "
         f"it is below {BACK_MM:.0f} mm for good.",
@@ -165,7 +165,7 @@ def _way_rows(cells: Sequence[Cell]) -> list[dict[str, Any]]:
     for action, group in _by_action(cells).items():
         by_way = _by_way(group)
         for way, own in by_way.items():
-            scores = [pose_scores([one for one in own if one.parameters["repeat"] == repeat]) for repeat in range(SEEDS)]
+            scores = scores_by_repeat(own)
             means, near = ([score[name] for score in scores] for name in ("mean_mm", "MMTA_50_percent"))
             cost = score_difference(own, by_way[DEFAULT], "mean_mm", ("way",))
             rows.append(
@@ -173,7 +173,7 @@ def _way_rows(cells: Sequence[Cell]) -> list[dict[str, Any]]:
                     "action": action,
                     "way": way,
                     "mean_mm": float(np.mean(means)),
-                    "mean_spread_mm": float(np.std(means, ddof=1)),
+                    "mean_spread_mm": spread(means),
                     "costs_mm": cost.value,
                     "costs_low_mm": cost.low,
                     "costs_high_mm": cost.high,

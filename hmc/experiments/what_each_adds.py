@@ -13,7 +13,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from hmc.experiments import markerless_runs as runs
-from hmc.experiments.by_action import pose_scores
+from hmc.experiments.by_action import scores_by_repeat, spread
 from hmc.experiments.engine.experiment import Cell, Experiment, Plan, Report, Table
 from hmc.experiments.engine.style import COLORS
 from hmc.experiments.pose_intervals import none_better, score_difference
@@ -51,13 +51,13 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
                     "cameras": number or "all",
                     "without": switch or "nothing (the whole)",
                     "mean_mm": float(np.mean(own["mean_mm"])),
-                    "mean_spread_mm": float(np.std(own["mean_mm"], ddof=1)),
+                    "mean_spread_mm": spread(own["mean_mm"]),
                     "costs_mm": cost.value,
                     "costs_low_mm": cost.low,
                     "costs_high_mm": cost.high,
                     "MMTA_percent": float(np.mean(own["MMTA_percent"])),
                     "MMTA_50_percent": float(np.mean(own["MMTA_50_percent"])),
-                    "MMTA_50_spread_percent": float(np.std(own["MMTA_50_percent"], ddof=1)),
+                    "MMTA_50_spread_percent": spread(own["MMTA_50_percent"]),
                 }
             )
     parts = [switch for switch in runs.SWITCHES if switch != runs.EVERYTHING]
@@ -71,7 +71,7 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
         for number in cameras
     )
     caption = (
-        f"Mean joint error of `default` with one part switched off, {SEEDS} seeds: mean, standard deviation over seeds, and what leaving "
+        "Mean joint error of `default` with one part switched off: mean, standard deviation over seeds, and what leaving "
         "the part out costs, with its interval of 95 % over clips and seeds."
     )
     return Report((Table("what-each-adds", caption, rows),), {"what-each-adds": _draw(rows, cameras)}, claims)
@@ -84,7 +84,7 @@ def _of(cells: Sequence[Cell], cameras: int, switch: str) -> list[Cell]:
 def _over_seeds(cells: Sequence[Cell], cameras: int, switch: str) -> dict[str, list[float]]:
     """Scores over all recordings, one value a seed."""
     own = _of(cells, cameras, switch)
-    scores = [pose_scores([one for one in own if one.parameters["repeat"] == seed]) for seed in range(SEEDS)]
+    scores = scores_by_repeat(own)
     return {name: [score[name] for score in scores] for name in scores[0]}
 
 
@@ -94,7 +94,7 @@ def _draw(rows: Sequence[dict], cameras: Sequence[int]) -> plt.Figure:
         own = [row for row in rows if row["cameras"] == (number or "all")]
         places = np.arange(len(own))[::-1]
         colors = [COLORS["paper"] if row["without"] not in runs.SWITCHES else COLORS["particle"] for row in own]
-        axes.barh(places, [row["mean_mm"] for row in own], xerr=[row["mean_spread_mm"] for row in own], color=colors, capsize=2)
+        axes.barh(places, [row["mean_mm"] for row in own], xerr=[row["mean_spread_mm"] or 0.0 for row in own], color=colors, capsize=2)
         axes.axvline(own[0]["mean_mm"], color=COLORS["paper"], linewidth=0.8)
         axes.set_yticks(places, [row["without"] for row in own])
         axes.set(xlabel="mean error (mm)", title=f"{number or 'all'} cameras, without")

@@ -14,7 +14,8 @@ from hmc.body.joints import dof_index
 from hmc.body.kinematics import landmarks
 from hmc.body.model import neutral_state
 from hmc.body.proportions import default_body
-from hmc.experiments import Cell, Plan, find_experiment
+from hmc.experiments import EXPERIMENTS, Cell, Plan, find_experiment
+from hmc.experiments.engine.selection import REPEAT, grid_of
 from hmc.experiments.engine.style import house_style
 from hmc.experiments.fig_4_2 import RANGES
 from hmc.experiments.fig_4_9 import SHOWN as SHOWN_STEPS
@@ -35,7 +36,7 @@ from hmc.landmarks import LANDMARKS
 from hmc.pose.spectral.parts import PART_NAMES
 from hmc.tracking.person_tree import LEAF, default_tree
 
-__all__ = ["RESULTS", "claims_at_random", "claims_on", "held_always"]
+__all__ = ["REPEATED", "RESULTS", "claims_at_random", "claims_on", "held_always"]
 
 FRAMES, FPS = 60, 20.0
 #: Frames in which nothing is seen, where that is studied.
@@ -331,10 +332,10 @@ RESULTS = {
 }  # fmt: skip
 
 
-def claims_on(name, draw, seed=0, quick=True):
-    """The claims of an experiment on results that ``draw(rng, parameters)`` makes of every cell."""
-    rng, plan, experiment = np.random.default_rng(seed), Plan(quick=quick), find_experiment(name)
-    cells = [Cell(parameters, draw(rng, parameters)) for parameters in experiment.grid(plan)]
+def claims_on(name, draw, seed=0, quick=True, repeats=None):
+    """The claims of an experiment on results that ``draw(rng, parameters)`` makes of every cell; ``repeats``: so many seeds of each."""
+    rng, plan, experiment = np.random.default_rng(seed), Plan(quick=quick, seeds=repeats), find_experiment(name)
+    cells = [Cell(parameters, draw(rng, parameters)) for parameters in grid_of(experiment, plan)]
     with house_style(), np.errstate(all="ignore"):
         report = experiment.report(cells, plan)
         plt.close("all")
@@ -347,7 +348,11 @@ def held_always(name, draw, quick=True, seeds=(1, 2, 3)):
     return set.intersection(*({claim.text for claim in claims_on(name, draw, seed, quick) if claim.holds} for seed in seeds))
 
 
-def claims_at_random(name, seed, noise, quick=True):
+def claims_at_random(name, seed, noise, quick=True, repeats=None):
     """The claims of an experiment's report, quick or in full, on results that are drawn at random."""
     draw = RESULTS[find_experiment(name).store_name]
-    return claims_on(name, lambda rng, parameters: draw(rng, parameters, noise), seed, quick)
+    return claims_on(name, lambda rng, parameters: draw(rng, parameters, noise), seed, quick, repeats)
+
+
+#: The experiments whose cells draw at random from seed to seed.
+REPEATED = tuple(name for name in EXPERIMENTS if any(REPEAT in cell for cell in find_experiment(name).grid(Plan())))

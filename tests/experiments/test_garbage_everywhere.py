@@ -1,7 +1,7 @@
 """A claim that holds whatever the results are says nothing: of every experiment, none may hold on shuffled results and noise alike."""
 
 import pytest
-from results_at_random import RESULTS, claims_at_random
+from results_at_random import REPEATED, RESULTS, claims_at_random
 
 from hmc.experiments import EXPERIMENTS, find_experiment
 
@@ -36,3 +36,8 @@ def test_nor_does_one_of_a_run_in_full(name):
     """Some claims are made in full alone, and more runs make narrower intervals: what is garbage must not hold there either."""
     held = held_by_all_but_one(name, quick=False)
     assert not held, "these hold on shuffled results and on noise: let them say something that can fail"
+
+
+@pytest.mark.parametrize("name", REPEATED)
+def test_a_single_seed_of_every_cell_can_be_reported(name):
+    assert claims_at_random(name, seed=0, noise=False, repeats=1)
