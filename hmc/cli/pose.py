@@ -122,7 +122,8 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
         type=int,
         choices=(1, 2),
         default=2,
-        help="1: forward in time only; 2 (default): then backward, with each person's own body, where the method has that",
+        help="1: forward in time only; 2 (default): then backward, with each person's own body, and smoothed over .2 s, where the method "
+        "has that",
     )
     parser.add_argument(
         "--smooth",
@@ -130,7 +131,7 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
         nargs="?",
         const=SMOOTH_S,
         metavar="S",
-        help=f"smooth the finished poses over so many seconds (without a number: {SMOOTH_S})",
+        help=f"smooth the finished poses, of one pass or of two, over so many seconds (without a number: {SMOOTH_S})",
     )
     add_silhouette_options(parser)
     add_marker_options(parser)

@@ -88,6 +88,7 @@ PARTS: dict[str, Part] = {
     "turning about who faces backwards": Part(back={"turned": None}),
     "colors of a person's parts": Part(back={"colors": None}),
     "feet that stand": Part(back={"standing_feet": False}),
+    "smoothing": Part(back={"smooth_s": None}),
     "the floor as others see it": Part(frontend={"ask_floor": False}),
     "completion by other cameras": Part(frontend={"complete": False}),
     "cutting of shadows": Part(frontend={"cut_shadows": False}),

@@ -13,8 +13,9 @@ first second and a half. When the recording is over more is known:
 5. Each frame then has two poses, and more with limbs of one on the other; the best way through all of them is taken
    (`hmc.pose.mixtures`). Where nothing shows a limb, the way in from before and the way out to after are joined where they meet best.
 6. Limbs that are still in doubt are looked for by the colors of the person's own parts (`hmc.pose.limb_colors`).
+7. Each frame's pose was found by itself, with an error of its own; what differs from frame to frame is smoothed (`hmc.motion.smoothing`).
 
-The third, fourth and last go on where they were when a run was stopped; the others take a moment. Ours; the papers follow forward only.
+The third, fourth and sixth go on where they were when a run was stopped; the others take a moment. Ours; the papers follow forward only.
 """
 
 from __future__ import annotations
@@ -155,11 +156,13 @@ def backward(
         end = record["frame"]
     _sweep(pass_, persons, first, end)
     people = _joined(people, persons, recording.fps, settings)
-    if settings.colors is None:
+    if settings.colors is not None:
+        run.say("asking colors")
+        subjects = {number: person.subject for number, person in persons.items()}
+        people = limbs_by_color(pass_, subjects, people, settings.colors, *_kept_colors(records, run))
+    if settings.smooth_s is None:
         return people
-    run.say("asking colors")
-    subjects = {number: person.subject for number, person in persons.items()}
-    return limbs_by_color(pass_, subjects, people, settings.colors, *_kept_colors(records, run))
+    return people.smoothed("polynomial", window_s=settings.smooth_s, fps=recording.fps, limits=method.limits)
 
 
 def _with_beside(pass_: SecondPass, people: PosedPeople, fitted: np.ndarray, bodies: Mapping[int, BodyModel]) -> SecondPass:

@@ -53,6 +53,8 @@ class BackwardSettings:
         When somebody was followed the wrong way round (`hmc.pose.turned`); None: never.
     colors : ColorSettings or None
         Which limbs are looked for by the colors of the person's parts (`hmc.pose.limb_colors`); None: none.
+    smooth_s : float or None
+        The time over which the poses are smoothed in the end, seconds (`hmc.motion.smoothing.local_polynomial`); None: they are not.
     """
 
     polish: PolishSettings
@@ -66,6 +68,7 @@ class BackwardSettings:
     anew: AnewSettings | None = field(default_factory=AnewSettings)
     turned: TurnedSettings | None = field(default_factory=TurnedSettings)
     colors: ColorSettings | None = field(default_factory=ColorSettings)
+    smooth_s: float | None = 0.2
 
 
 def mixed_poses(one: np.ndarray, other: np.ndarray) -> np.ndarray:

@@ -58,6 +58,12 @@ def second(people, run, method=None, recent=None):
     return backward(tiny_clip(FRAMES), true_tracks(FRAMES), method, people, options, run)
 
 
+def as_found():
+    """The method that leaves each frame's pose as it was found by itself."""
+    method = pose_method("apf")
+    return replace(method, back=replace(method.back, smooth_s=None))
+
+
 def turned_about(people, wrong):
     """The same poses, in the rows `wrong` the wrong way round: left is right, and front is back."""
     (body,) = make_bodies(people.states.bodies).values()
@@ -100,8 +106,23 @@ def test_it_finds_nothing_where_the_silhouettes_show_nothing(one_pass, tmp_path)
     people, run = one_pass
     lost = with_a_lost_arm(people)
     nobody = replace(true_tracks(FRAMES), positions=true_tracks(FRAMES).positions + [50.0, 0, 0])
-    found = backward(tiny_clip(FRAMES), nobody, pose_method("apf"), lost, FollowOptions(VOXEL_M, 3, HEIGHT_M), run)
+    found = backward(tiny_clip(FRAMES), nobody, as_found(), lost, FollowOptions(VOXEL_M, 3, HEIGHT_M), run)
     np.testing.assert_allclose(found.positions, lost.positions, atol=1e-9)
+
+
+def test_in_the_end_poses_are_smoothed_and_nothing_else_of_them_is_changed(one_pass):
+    people, run = one_pass
+    fps = tiny_clip(FRAMES).fps
+    rough, smooth = second(people, run, as_found()), second(people, run)
+    asked = rough.smoothed("polynomial", window_s=pose_method("apf").back.smooth_s, fps=fps, limits=pose_method("apf").limits)
+    np.testing.assert_array_equal(smooth.positions, asked.positions)
+    np.testing.assert_array_equal(smooth.costs, rough.costs)
+    np.testing.assert_array_equal(smooth.passes_apart, rough.passes_apart)
+
+    def jitter(one):
+        return np.linalg.norm(np.diff(one.positions - true_joints(FRAMES), 2, axis=0), axis=2).mean()
+
+    assert jitter(smooth) < 0.9 * jitter(rough) and np.mean(errors(smooth)) < np.mean(errors(rough)) + 0.001
 
 
 def test_a_stopped_pass_goes_on_to_the_same_numbers(one_pass, tmp_path):
