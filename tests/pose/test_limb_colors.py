@@ -51,7 +51,7 @@ def with_the_arm_before_the_chest(people):
 
 def second(people, run, colors):
     method = pose_method("apf")
-    others = dict(fit_body=None, turned=None, anew=None, hidden_places=False, smooth_s=None)
+    others = {"fit_body": None, "turned": None, "anew": None, "hidden_places": False, "smooth_s": None}
     method = replace(method, back=replace(method.back, **others, colors=colors))
     return backward(tiny_clip(FRAMES), true_tracks(FRAMES), method, people, FollowOptions(VOXEL_M, 3, HEIGHT_M), run)
 
