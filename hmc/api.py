@@ -198,7 +198,7 @@ def pose(
     method: str | PoseMethod = "apf",
     seed: int = 0,
     height_m: float | Literal["auto"] | None = None,
-    smooth_s: float = 0.0,
+    smooth_s: float | None = None,
     detections: DetectionTable | None = None,
     on_frame: Callable[[int, int], None] | None = None,
     keypoints: KeypointSource | None = None,
@@ -218,8 +218,9 @@ def pose(
         The same seed gives the same result.
     height_m : float or "auto", optional
         Stature of every person; "auto": estimated for each; where left out what the recording says of a single person, else "auto".
-    smooth_s : float
-        Time over which finished poses are smoothed, seconds; 0: they are not.
+    smooth_s : float, optional
+        Time over which finished poses are smoothed, seconds; 0: they are left as they were found. By default .2 s after a second pass, and
+        0 where there is none.
     detections : DetectionTable, optional
         Of markers (`hmc.io.detections.read_detections`), for the methods that need them; without hulls they need no tracks.
     on_frame : callable, optional
@@ -254,12 +255,14 @@ def pose(
     from hmc.pose.keypoint_cues import learn_scatter
     from hmc.pose.keypoint_tracks import tracks_of_keypoints
     from hmc.pose.keypoint_views import with_keypoint_views
+    from hmc.pose.method import as_found
     from hmc.pose.registry import pose_method
     from hmc.pose.trust import with_trust
     from hmc.pose.views.recent import RecentViews
     from hmc.voxels.run_options import RunOptions
 
     recording, method = _opened(recording), pose_method(method) if isinstance(method, str) else method
+    method = method if smooth_s is None else as_found(method)
     height = None if height_m == "auto" else recording.known_height_m if height_m is None else height_m
     recording = recording if full_images else for_method(recording, method, POSE_VOXEL_M)
     keypoints = None if keypoints is None else _in_images(keypoints, recording)

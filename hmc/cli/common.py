@@ -24,6 +24,7 @@ __all__ = [
     "camera_names",
     "cameras_table",
     "file_digest",
+    "float_from_zero",
     "gather_problems",
     "given_places",
     "image_parameters",
@@ -270,6 +271,14 @@ def positive_float(text: str) -> float:
     if not 0 < value < float("inf"):
         raise argparse.ArgumentTypeError(f"must be a number above 0; got {text!r}")
     return value
+
+
+def float_from_zero(text: str) -> float:
+    """argparse type: zero, or as `positive_float`."""
+    try:
+        return 0.0 if float(text) == 0 else positive_float(text)
+    except (ValueError, argparse.ArgumentTypeError):
+        raise argparse.ArgumentTypeError(f"must be a number, 0 or above; got {text!r}") from None
 
 
 def camera_names(text: str) -> list[str]:

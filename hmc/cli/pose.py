@@ -13,6 +13,7 @@ from hmc.cli.common import (
     add_selection_options,
     add_workers_option,
     cameras_table,
+    float_from_zero,
     gather_problems,
     image_parameters,
     load_given_plugins,
@@ -122,16 +123,16 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
         type=int,
         choices=(1, 2),
         default=2,
-        help="1: forward in time only; 2 (default): then backward, with each person's own body, and smoothed over .2 s, where the method "
-        "has that",
+        help="1: forward in time only; 2 (default): then backward, with each person's own body, and smooth, where the method has that",
     )
     parser.add_argument(
         "--smooth",
-        type=positive_float,
+        type=float_from_zero,
         nargs="?",
         const=SMOOTH_S,
         metavar="S",
-        help=f"smooth the finished poses, of one pass or of two, over so many seconds (without a number: {SMOOTH_S})",
+        help=f"smooth the finished poses over so many seconds (without a number: {SMOOTH_S}); 0: leave them as they were found "
+        "(default: .2 after two passes, 0 after one)",
     )
     add_silhouette_options(parser)
     add_marker_options(parser)
@@ -155,6 +156,7 @@ def _run(args: argparse.Namespace, held: ExitStack) -> int:
     from hmc.pose.keypoint_cues import learn_scatter
     from hmc.pose.keypoint_tracks import tracks_of_keypoints
     from hmc.pose.keypoint_views import with_keypoint_views
+    from hmc.pose.method import as_found
     from hmc.pose.trust import with_trust
     from hmc.pose.views.recent import RecentViews
     from hmc.tracking.resumable import person_grid, track_recording
@@ -164,6 +166,8 @@ def _run(args: argparse.Namespace, held: ExitStack) -> int:
     plugins = load_given_plugins(args)
     name = args.method or ("keypoints" if args.cues == CUES[2] else "apf")
     method = pose_method(name, args.preset, args.model, args.init, args.markers == "skin", args.passes, _settings(args, name))
+    if args.smooth is not None:
+        method = as_found(method)
     recording = opened()
     if not args.full_images:
         recording = for_method(recording, method, min(args.voxel, args.track_voxel))

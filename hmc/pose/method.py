@@ -8,7 +8,7 @@ function ``step(rng, tracked, view) -> (tracked, info)``; parts of one method ar
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -38,6 +38,7 @@ __all__ = [
     "StepResult",
     "Subject",
     "Tracked",
+    "as_found",
     "begin_tracking",
     "make_subject",
     "other_rng",
@@ -321,6 +322,11 @@ class PoseMethod:
     def needs_hulls(self) -> bool:
         """Whether silhouettes are made and carved: not where detections or keypoints are all that is read."""
         return bool(self.needs & HULLS_FOR)
+
+
+def as_found(method: PoseMethod) -> PoseMethod:
+    """The method without smoothing of its own (`hmc.pose.mixtures.BackwardSettings.smooth_s`), for who smooths otherwise, or not."""
+    return method if method.back is None else replace(method, back=replace(method.back, smooth_s=None))
 
 
 def unseen(tracked: Tracked, status: str = "no hull of this person in this frame") -> tuple[Tracked, StepInfo]:

@@ -217,7 +217,11 @@ def test_selection_options(recording_folder):
 
 @pytest.mark.parametrize(
     "kind, good, bad",
-    [("whole_number", "7", ["-1", "1.5", "x", ""]), ("positive_float", "0.5", ["0", "-1", "nan", "inf", "x"])],
+    [
+        ("whole_number", "7", ["-1", "1.5", "x", ""]),
+        ("positive_float", "0.5", ["0", "-1", "nan", "inf", "x"]),
+        ("float_from_zero", "0", ["-1", "nan", "inf", "x", ""]),
+    ],
 )
 def test_number_types(kind, good, bad):
     convert = getattr(common, kind)

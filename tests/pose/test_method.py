@@ -17,6 +17,7 @@ from hmc.pose.method import (
     Capture,
     PoseMethod,
     StepInfo,
+    as_found,
     begin_tracking,
     make_subject,
     other_rng,
@@ -217,3 +218,11 @@ def test_what_a_method_has_no_use_for_is_refused():
 def test_a_start_or_model_that_a_method_does_not_take_is_refused(name, preset, model, init):
     with pytest.raises(InputError, match="has no use for a scalable model" if model else f"--init {init}: method {name}"):
         pose_method(name, preset, model, init)
+
+
+def test_a_method_as_found_smooths_nothing_and_is_the_same_otherwise():
+    method = pose_method("apf")
+    assert method.back.smooth_s == 0.2 and as_found(method).back.smooth_s is None
+    assert replace(as_found(method).back, smooth_s=0.2) == method.back
+    one_pass = pose_method("apf", passes=1)
+    assert as_found(one_pass) is one_pass
