@@ -31,6 +31,7 @@ SECOND = (
     "turning about who faces backwards",
     "colors of a person's parts",
     "feet that stand",
+    "smoothing",
 )  # fmt: skip
 
 
