@@ -241,8 +241,8 @@ UNKNOWN = "What makes the difference is not known."
 OWN_REASONS = {
     "why-lost": "why-slow has the same changes of the filter where the likelihood cannot be at fault, on more clips.",
     "what-each-adds": (
-        "The silhouettes of the quick mode are clean: what only those with holes need, as the tolerant hull, costs there. "
-        "docs/accuracy.md has recordings that need it."
+        "One seed: before four cameras a limb is lost for long on few clips and found by the search there, and on the others nothing is "
+        "lost, so that the interval has both in it."
     ),
     "trust": (
         "The coefficients are those of a fit to older poses, of a body without feet; poses have become nearer, so that low numbers are too "
