@@ -265,7 +265,7 @@ def _upright(left: np.ndarray, up: np.ndarray, rest: np.ndarray) -> np.ndarray:
 
 
 def _foot_slope(joint: dict[str, np.ndarray]) -> float:
-    """How far the file's ankle-to-ball directions point down of feet that stand, radians: the median, as most feet of most frames do."""
+    """How far ankle-to-ball directions point down where feet stand, radians: the median over both and all frames, as most of them do."""
     feet = np.stack([joint[f"{side}_toe"] - joint[f"{side}_ankle"] for side in "lr"])
     return float(np.median(np.arctan2(-feet[..., 2], np.hypot(feet[..., 0], feet[..., 1]))))
 
