@@ -241,7 +241,7 @@ def pose(
     Raises
     ------
     InputError
-        When there is no such method, or what it needs is not there.
+        When there is no such method, what it needs is not there, or `smooth_s` is no such time.
 
     Examples
     --------
@@ -261,6 +261,8 @@ def pose(
     from hmc.pose.views.recent import RecentViews
     from hmc.voxels.run_options import RunOptions
 
+    if smooth_s is not None and not 0 <= smooth_s < float("inf"):
+        raise InputError(f"`smooth_s` must be a number of seconds, 0 or more; got {smooth_s}")
     recording, method = _opened(recording), pose_method(method) if isinstance(method, str) else method
     method = method if smooth_s is None else as_found(method)
     height = None if height_m == "auto" else recording.known_height_m if height_m is None else height_m

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from hmc.io.files import real_path
-from hmc.io.result_files import BESIDE, RESULT
+from hmc.io.result_files import BESIDE, RESULT, UNFINISHED
 
 if TYPE_CHECKING:
     from hmc.io.camera_faults import CameraFault
@@ -352,15 +352,18 @@ def was_finished(written: Sequence[Path], run_path: Path, depends_on: Mapping[st
     Raises
     ------
     InputError
-        When a result is not as the run wrote it.
+        When a result is not as the run wrote it, or none of a run's: nobody else's file is written over.
     """
     from hmc.errors import InputError
     from hmc.io.files import to_toml
     from hmc.io.results import read_run
 
-    if not all(path.exists() for path in (*written, run_path)):
+    there, before = [path for path in written if path.exists()], read_run(run_path) if run_path.exists() else {"written": {}}
+    others = [path for path in there if path.name not in before.get("written", [path.name])]
+    if others and not any(any(run_path.parent.glob(pattern)) for pattern in UNFINISHED):
+        raise InputError(f"{others[0]}: no run wrote it, as no {run_path.name} tells; move it away, or give another --out")
+    if len(there) < len(written) or not run_path.exists():
         return False
-    before = read_run(run_path)
     for sentence in unlike_its_run(run_path.parent, [path.name for path in written]):
         raise InputError(f"{sentence}; delete it to compute it again")
     if to_toml({name: before.get(name) for name in depends_on}) != to_toml(depends_on):

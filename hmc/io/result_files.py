@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-__all__ = ["BESIDE", "RESULT"]
+__all__ = ["BESIDE", "RESULT", "UNFINISHED"]
 
 #: What `hmc pose` always leaves; the last is written last.
 RESULT = ("joints.csv", "tracks.csv", "pose.npz", "run.toml")
 #: What is beside them where there is something to write: the feet's points, what trust rests on, and what a method tells of each frame.
 BESIDE = ("feet.csv", "evidence.csv", "fits.csv")
+#: Patterns of the files of a run that is not finished: what its stages keep, by which it goes on.
+UNFINISHED = (".*.journal*", ".masks*")

@@ -34,6 +34,20 @@ def test_a_changed_one_is_told_and_left(result, text):
     assert path.read_text() == text
 
 
+@pytest.mark.parametrize("name", ["tracks.csv", "joints.csv"])
+def test_what_no_run_wrote_is_not_written_over(result, name):
+    other = result / name
+    if name == "tracks.csv":
+        (result / "run.toml").unlink()
+    other.write_text("somebody's own")
+    written = [result / "tracks.csv", result / "joints.csv"]
+    with pytest.raises(InputError, match=rf"{name}: no run wrote it.* move it away, or give another --out"):
+        was_finished(written, result / "run.toml", RUN)
+    (result / ".pose.journal").touch()  # a run was stopped while it wrote
+    assert not was_finished(written, result / "run.toml", RUN | {"seed": 1})
+    assert other.read_text() == "somebody's own"
+
+
 def test_whoever_reads_a_changed_one_is_told(result):
     other = result / "other.csv"
     other.write_text("of no run")
