@@ -320,13 +320,18 @@ def written_digests(written: Sequence[Path]) -> dict[str, str]:
     return {path.name: file_digest(path) for path in written}
 
 
-def unlike_its_run(folder: Path, names: Collection[str] = ()) -> list[str]:
-    """A sentence for each file of a result, or for those of some names, that is not as its run wrote it; none where no run tells."""
+def _written(run: Path) -> dict[str, str] | None:
+    """`written_digests` as a `run.toml` has them: none where there is no such file, None where it does not tell."""
     from hmc.io.results import read_run
 
-    run = folder / "run.toml"
-    said = read_run(run).get("written", {}) if run.is_file() else {}
-    digests = {folder / name: said[name] for name in names or said if name in said} if isinstance(said, dict) else {}
+    said = read_run(run).get("written") if run.is_file() else {}
+    return said if isinstance(said, dict) else None
+
+
+def unlike_its_run(folder: Path, names: Collection[str] = ()) -> list[str]:
+    """A sentence for each file of a result, or for those of some names, that is not as its run wrote it; none where no run tells."""
+    said = _written(folder / "run.toml") or {}
+    digests = {folder / name: said[name] for name in names or said if name in said}
     changed = [path for path, digest in digests.items() if path.is_file() and digest != file_digest(path)]
     return [f"{path}: is not as its run wrote it (changed, or damaged)" for path in changed]
 
@@ -358,14 +363,15 @@ def was_finished(written: Sequence[Path], run_path: Path, depends_on: Mapping[st
     from hmc.io.files import to_toml
     from hmc.io.results import read_run
 
-    there, before = [path for path in written if path.exists()], read_run(run_path) if run_path.exists() else {"written": {}}
-    others = [path for path in there if path.name not in before.get("written", [path.name])]
+    there, told = [path for path in written if path.exists()], _written(run_path)
+    others = [] if told is None else [path for path in there if path.name not in told]
     if others and not any(any(run_path.parent.glob(pattern)) for pattern in UNFINISHED):
         raise InputError(f"{others[0]}: no run wrote it, as no {run_path.name} tells; move it away, or give another --out")
     if len(there) < len(written) or not run_path.exists():
         return False
     for sentence in unlike_its_run(run_path.parent, [path.name for path in written]):
         raise InputError(f"{sentence}; delete it to compute it again")
+    before = read_run(run_path)
     if to_toml({name: before.get(name) for name in depends_on}) != to_toml(depends_on):
         print(f"{run_path.parent}: its result has other parameters or another recording; starting anew")
         return False

@@ -48,6 +48,12 @@ def test_what_no_run_wrote_is_not_written_over(result, name):
     assert other.read_text() == "somebody's own"
 
 
+@pytest.mark.parametrize("written", [None, 3, "tracks.csv"])
+def test_a_run_that_does_not_tell_what_it_wrote_counts_as_its_writer(result, written):
+    write_run(result / "run.toml", "m", {"start": 0}, 0, **({} if written is None else {"written": written}))
+    assert was_finished([result / "tracks.csv"], result / "run.toml", RUN)
+
+
 def test_whoever_reads_a_changed_one_is_told(result):
     other = result / "other.csv"
     other.write_text("of no run")

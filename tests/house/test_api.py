@@ -71,13 +71,13 @@ def test_what_cannot_be_done_is_said(tmp_path):
         hmc.view(tracks, recording, tmp_path / "picture.txt")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("smooth_s", [-0.1, float("nan"), float("inf")])
 def test_a_time_to_smooth_over_is_looked_at_before_any_work(smooth_s):
     with pytest.raises(ValueError, match="`smooth_s` must be a number of seconds, 0 or more"):
         hmc.pose("nowhere", smooth_s=smooth_s)
 
 
+@pytest.mark.slow
 def test_poses_from_detections():
     """A person who wears the markers, seen by the shipped clip's cameras: no image is read, and no tracks are needed."""
     recording = hmc.open_recording(ROOT / "data" / "synthetic" / "tiny", frames=3)
