@@ -50,11 +50,18 @@ def ring(cameras: int = 5) -> Rig:
 
 @cache
 def act(
-    motion: str, frames: int = 8, fps: float = 15, heading_deg: float = 40, height_m: float = 1.78, cameras: int = 5, voxel_m: float = 0.035
+    motion: str,
+    frames: int = 8,
+    fps: float = 15,
+    heading_deg: float = 40,
+    height_m: float = 1.78,
+    cameras: int = 5,
+    voxel_m: float = 0.035,
+    fists: bool = False,
 ) -> Act:
     """Let an actor do something in the middle of the ring."""
     rng = np.random.default_rng(5)
-    actor = make_actor(height_m, "average", rng, "man", cell_m=0.03)
+    actor = make_actor(height_m, "average", rng, "man", cell_m=0.03, fists=fists)
     times = np.arange(frames) / fps
     moved = place(MOTIONS[motion](actor.skeleton, times, rng), (-0.3, -0.2), heading_deg)
     rig, grid = ring(cameras), VoxelGrid.from_room(ROOM, voxel_m)

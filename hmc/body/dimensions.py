@@ -7,14 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from hmc.body.model import BodyModel
-from hmc.body.proportions import make_body
+from hmc.body.proportions import DEFAULT_LENGTHS, make_body
 
-__all__ = ["FITTED", "GIRTHS", "LENGTHS", "FitBodySettings", "reshaped"]
+__all__ = ["FITTED", "FitBodySettings", "highest_shape", "prior_deviations", "reshaped"]
 
-#: Fitted dimensions. Hand, foot and ankle height only follow the common scale: hulls show them badly.
-LENGTHS = ("trunk", "head", "shoulder_half_width", "shoulder_drop", "hip_half_width", "upper_arm", "forearm", "thigh", "shank")
-GIRTHS = ("girth_torso", "girth_depth", "girth_head", "girth_arms", "girth_thighs", "girth_shanks")
-FITTED = ("height", *LENGTHS, *GIRTHS)
+#: Fitted dimensions. Foot and ankle height only follow the common scale: hulls show them badly.
+_BONES = ("trunk", "head", "shoulder_half_width", "shoulder_drop", "hip_half_width", "upper_arm", "forearm", "thigh", "shank")
+_GIRTHS = ("girth_torso", "girth_depth", "girth_head", "girth_arms", "girth_thighs", "girth_shanks")
+FITTED = ("height", *_BONES, "hand", *_GIRTHS)
 
 
 @dataclass(frozen=True)
@@ -30,6 +30,8 @@ class FitBodySettings:
         tenth.
     length_deviation, girth_deviation : float
         Prior deviations of the logarithms of single lengths and girths, from what they are at the common scale.
+    hand_deviation : float
+        That of how far hands reach beyond the wrists, fists little more than half as far as open ones (`highest_shape`).
     prior_weight : float
         Square metres that one prior deviation in one dimension costs.
     """
@@ -38,7 +40,28 @@ class FitBodySettings:
     scale_deviation: float = 0.10
     length_deviation: float = 0.07
     girth_deviation: float = 0.20
+    hand_deviation: float = 0.30
     prior_weight: float = 4e-6
+
+
+def prior_deviations(settings: FitBodySettings) -> np.ndarray:
+    """Prior deviations of the logarithms of the factors on `FITTED`, shape (17,)."""
+    own = {"height": settings.scale_deviation, "hand": settings.hand_deviation}
+    own |= dict.fromkeys(_BONES, settings.length_deviation) | dict.fromkeys(_GIRTHS, settings.girth_deviation)
+    return np.array([own[name] for name in FITTED])
+
+
+def highest_shape(body: BodyModel) -> np.ndarray:
+    """The largest shape that a body may get, shape (17,): hands reach as far as open ones at most, or as far as they do already.
+
+    They close, so that they may be shorter. Longer ones could only be told from a longer arm where it bends, and straight arms of which the
+    shoulder is too low would be made longer by their hands.
+    """
+    highest = np.full(len(FITTED), np.inf)
+    hand, most = body.dimensions["hand"], DEFAULT_LENGTHS["hand"] * body.height_m
+    if hand > 0:
+        highest[FITTED.index("hand")] = np.log(max(hand, most) / hand)
+    return highest
 
 
 def reshaped(body: BodyModel, shape: np.ndarray) -> BodyModel:
@@ -47,7 +70,7 @@ def reshaped(body: BodyModel, shape: np.ndarray) -> BodyModel:
     Parameters
     ----------
     body : BodyModel
-    shape : ndarray, shape (16,)
+    shape : ndarray, shape (17,)
         Logarithms of the factors on `FITTED`; that of the height is on all lengths.
     """
     factors = dict(zip(FITTED, np.exp(shape), strict=True))

@@ -72,7 +72,13 @@ def bind_orientations() -> np.ndarray:
 
 
 def make_actor(
-    height_m: float, build: str | float, rng: np.random.Generator, sex: str = "man", clothes: Clothes | None = None, cell_m: float = 0.016
+    height_m: float,
+    build: str | float,
+    rng: np.random.Generator,
+    sex: str = "man",
+    clothes: Clothes | None = None,
+    cell_m: float = 0.016,
+    fists: bool = False,
 ) -> Actor:
     """Model a person.
 
@@ -88,6 +94,8 @@ def make_actor(
     clothes : Clothes, optional
     cell_m : float
         Edge length of the mesh, metres; 0.016 gives some 10,000 vertices.
+    fists : bool
+        Whether the hands are closed.
 
     Returns
     -------
@@ -107,7 +115,7 @@ def make_actor(
     frames = bind_orientations()
     joints = joint_positions(skeleton, np.array([0, 0, skeleton.hip_height]), frames)
     posed = PosedSkeleton(skeleton, joints, frames)
-    named = body_sweeps(posed, sex, girth_of(build), clothes.loose_m, clothes.long_hair, rng)
+    named = body_sweeps(posed, sex, girth_of(build), clothes.loose_m, clothes.long_hair, rng, fists)
     names, sweeps = [name for name, _ in named], [sweep for _, sweep in named]
     mesh = mesh_of(sweeps, cell_m)
     _, each = distances(sweeps, mesh.vertices)

@@ -45,6 +45,10 @@ _LIMBS: dict[str, list[list[float]]] = {
         [-0.015, 0.026, 0.021, 0, 0], [0.03, 0.036, 0.019, 0, 0], [0.08, 0.042, 0.018, 0, -0.003], [0.12, 0.039, 0.016, 0, -0.009],
         [0.155, 0.033, 0.014, 0, -0.021], [0.178, 0.020, 0.012, 0, -0.032],
     ],
+    "fist": [
+        [-0.015, 0.026, 0.021, 0, 0], [0.025, 0.036, 0.023, 0, -0.002], [0.06, 0.042, 0.030, 0, -0.006], [0.085, 0.040, 0.030, 0, -0.008],
+        [0.100, 0.028, 0.021, 0, -0.008],
+    ],
     "thumb": [[0.0, 0.016, 0.016, 0, 0], [0.04, 0.014, 0.013, 0, 0], [0.065, 0.011, 0.011, 0, 0]],
     "thigh": [
         [-0.06, 0.070, 0.078, 0, -0.012], [0.0, 0.084, 0.092, 0, -0.010], [0.08, 0.084, 0.090, 0, -0.004], [0.20, 0.075, 0.080, 0, 0.004],
@@ -95,7 +99,7 @@ def girth_of(build: str | float) -> float:
 
 
 def body_sweeps(
-    posed: PosedSkeleton, sex: str, girth: float, loose_m: float, long_hair: bool, rng: np.random.Generator
+    posed: PosedSkeleton, sex: str, girth: float, loose_m: float, long_hair: bool, rng: np.random.Generator, fists: bool = False
 ) -> list[tuple[str, Sweep]]:
     """The body's sweeps in a given pose, each with the name of its table.
 
@@ -110,6 +114,8 @@ def body_sweeps(
     long_hair : bool
     rng : Generator
         Individual variation of girths.
+    fists : bool
+        Whether the hands are closed, the thumbs over the fingers.
 
     Returns
     -------
@@ -172,16 +178,17 @@ def body_sweeps(
             2,
             0.02,
         )
-        add("hand", f"{side}_hand", [forward, up, out], table("hand", end), 2.2, 0.012)
-        add(
-            "thumb",
-            f"{side}_hand",
-            [up, [0.8, -0.6 * sign, 0], [0.6, 0.8 * sign, -0.25]],
-            table("thumb", end),
-            2,
-            0.012,
-            (0.022 * scale, sign * 0.025 * scale, 0),
-        )
+        add("hand", f"{side}_hand", [forward, up, out], table("fist" if fists else "hand", end), 2.2, 0.012)
+        if not fists:
+            add(
+                "thumb",
+                f"{side}_hand",
+                [up, [0.8, -0.6 * sign, 0], [0.6, 0.8 * sign, -0.25]],
+                table("thumb", end),
+                2,
+                0.012,
+                (0.022 * scale, sign * 0.025 * scale, 0),
+            )
         thigh = table("thigh", factor["leg"] * (limb + 0.10 * woman), thigh_scale, loose_m)
         add("thigh", f"{side}_thigh", [left, forward, down], thigh, 2, 0.035)
         add("shank", f"{side}_shank", [left, forward, down], trousers, 2, 0.025)

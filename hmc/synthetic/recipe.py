@@ -160,6 +160,7 @@ class ActorRecipe:
         Of the shirt.
     sleeves, legs : {"long", "short"}
     long_hair : bool
+    hands : {"open", "fists"}
     loose_m : float
         How far clothes stand off the body, metres.
     cube_m : float
@@ -197,6 +198,7 @@ class ActorRecipe:
     sleeves: str = "short"
     legs: str = "long"
     long_hair: bool = False
+    hands: str = "open"
     loose_m: float = 0.007
     cube_m: float = 0.0
     cube_color: Color = (0.15, 0.55, 0.20)
@@ -404,6 +406,7 @@ def check_recipe(recipe: Recipe, where: str) -> None:
         among(actor.pattern, PATTERNS, "pattern")
         among(actor.sex, ("man", "woman"), "sex")
         among(actor.sleeves, ("long", "short"), "sleeves")
+        among(actor.hands, ("open", "fists"), "hands")
         among(actor.legs, ("long", "short"), "legs")
         within(actor.height_m, 1.2, 2.2, "height_m")
         within(actor.loose_m, 0, 0.1, "loose_m")

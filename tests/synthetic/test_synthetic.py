@@ -113,6 +113,21 @@ def test_builds_differ_in_volume_and_seeds_in_proportions():
     assert 0.005 < np.std(arms) / 1.7 / 0.162 < 0.05
 
 
+def test_fists_are_shorter_than_open_hands_and_nothing_else_changes():
+    def reach_and_rest(fists: bool):
+        one = make_actor(1.75, "average", np.random.default_rng(0), cell_m=0.02, fists=fists)
+        assert is_closed(one.triangles)
+        wrist, elbow = (one.bind_joints[BONE_NAMES.index(f"l_{bone}")] for bone in ("hand", "forearm"))
+        outwards = (wrist - elbow) / np.linalg.norm(wrist - elbow)
+        left = one.vertices[one.parts == list(PARTS).index("l_arm")]
+        return float(((left - wrist) @ outwards).max()) / 1.75, one.vertices[one.parts == list(PARTS).index("l_leg")]
+
+    (open_hand, leg), (fist, same_leg) = reach_and_rest(False), reach_and_rest(True)
+    assert 0.09 < open_hand < 0.115
+    assert 0.05 < fist < 0.065
+    np.testing.assert_allclose(leg.max(axis=0), same_leg.max(axis=0), atol=0.015)  # the same but for the mesh's cells
+
+
 @pytest.mark.parametrize(("height", "build"), [(0.4, "average"), (1.7, "enormous"), (1.7, 3.0)])
 def test_impossible_bodies_are_refused(height, build):
     with pytest.raises(InputError, match=r"height_m|build"):

@@ -225,6 +225,7 @@ def test_the_shipped_recipes_cover_the_motions():
         ({"actor": [{"hieght_m": 1.7}]}, r"\[\[actor\]\] number 1: unknown key 'hieght_m'; did you mean 'height_m'"),
         ({"rig": {"kind": "ring77"}}, "rig kind 'ring77' is unknown; did you mean 'ring7'"),
         ({"actor": [{"motion": "wlak"}]}, "did you mean 'walk'"),
+        ({"actor": [{"hands": "paws"}]}, "hands 'paws' is unknown; use one of open, fists"),
         ({"room": {"floor": "lava"}}, "texture 'lava' is unknown; use one of"),
         ({"fps": "fast"}, "'fps' has a value of the wrong kind"),
         ({"actor": [{"start_m": [1, 2, 3]}]}, "'start_m' has a value of the wrong kind"),

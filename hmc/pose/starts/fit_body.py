@@ -14,7 +14,7 @@ from functools import partial
 
 import numpy as np
 
-from hmc.body.dimensions import FITTED, GIRTHS, LENGTHS, FitBodySettings, reshaped
+from hmc.body.dimensions import FITTED, FitBodySettings, highest_shape, prior_deviations, reshaped
 from hmc.body.joints import N_DOF, JointLimits
 from hmc.body.model import BodyModel
 from hmc.pose.objectives.objective import Objective
@@ -53,11 +53,14 @@ class _Prior:
         Cost of a squared unit away from them.
     precision : ndarray, shape (n_fitted,)
         Cost a frame of a squared change of each dimension's logarithm.
+    highest : ndarray, shape (n_fitted,)
+        The largest change of each.
     """
 
     anchors: np.ndarray
     hold: np.ndarray
     precision: np.ndarray
+    highest: np.ndarray
 
 
 def with_known_stature(settings: FitBodySettings, known: bool) -> FitBodySettings:
@@ -90,11 +93,9 @@ def fit_body(
     """
     body = objectives[0].body
     hold = 4e-6 / np.r_[np.full(3, 0.1), np.full(N_DOF - 3, 0.5)] ** 2
-    precision = settings.prior_weight / np.array(
-        [settings.scale_deviation**2] + [settings.length_deviation**2] * len(LENGTHS) + [settings.girth_deviation**2] * len(GIRTHS)
-    )
+    precision = settings.prior_weight / prior_deviations(settings) ** 2
     states = np.clip(states, body.limits.low, body.limits.high)
-    prior = _Prior(states, hold, precision)
+    prior = _Prior(states, hold, precision, highest_shape(body))
     shape = np.zeros(len(FITTED))
 
     def with_shape(shape: np.ndarray) -> list[Objective]:
@@ -162,7 +163,10 @@ def _gauss_newton(frames, shape: np.ndarray, states: np.ndarray, prior: _Prior, 
         matrix += by_shape.T @ by_shape - cross.T @ inverse[:, :n_shape]
         gradient += by_shape.T @ residual - cross.T @ inverse[:, n_shape]
         solved.append((free, inverse))
-    step = np.clip(-np.linalg.solve(damped(matrix, damping, least=0.0), gradient), -0.1, 0.1)
+    free = movable(shape, gradient, np.full(n_shape, -np.inf), prior.highest)
+    step = np.zeros(n_shape)
+    step[free] = np.clip(-np.linalg.solve(damped(matrix[np.ix_(free, free)], damping, least=0.0), gradient[free]), -0.1, 0.1)
+    step = np.minimum(step, prior.highest - shape)
     new_states = states.copy()
     for row, (free, inverse) in zip(new_states, solved, strict=True):
         row[free] += np.clip(-inverse[:, n_shape] - inverse[:, :n_shape] @ step, -0.3, 0.3)
