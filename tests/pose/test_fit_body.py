@@ -90,7 +90,7 @@ def test_the_body_stays_a_person(walking):
 
 
 def test_fists_shorten_hands():
-    """The actor's open hands reach 10 % of the stature beyond the wrists, fists 6 %; the table has 8.5, and open ones stay at most there."""
+    """Open hands of the actor reach 10 % of the stature beyond the wrists, fists 6 %; the table has 8.5, where open ones stay at most."""
     hands = {}
     for fists in (False, True):
         acted = act("gesture", fps=3, cameras=7, voxel_m=0.02, fists=fists)
