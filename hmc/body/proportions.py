@@ -249,8 +249,8 @@ def _flesh(d: dict[str, float], sole: float) -> Cones:
         if d["collar"] > 0:
             collar = ((0, 0, -0.01 * h), (0, sign * d["collar"], -0.005 * h))
             cone(f"{side}_clavicle", collar, ((0.030, 0.030), (0.034, 0.034)), x, (wide, wide))
-        cone(f"{side}_upper_arm", ((front, -sign * 0.01 * h, armpit), (front, arm, elbow)), ((0.034, 0.034), (0.022, 0.022)), x, arms)
-        cone(f"{side}_forearm", ((front, 0, elbow), (front, fore, wrist)), ((0.023, 0.023), (0.016, 0.016)), x, arms)
+        cone(f"{side}_upper_arm", ((front, -sign * 0.01 * h, armpit), (front, arm, elbow)), ((0.034, 0.034), (0.025, 0.025)), x, arms)
+        cone(f"{side}_forearm", ((front, 0, elbow), (front, fore, wrist)), ((0.026, 0.026), (0.016, 0.016)), x, arms)
         shown = fore + sign * max(d["hand"] - FINGER_TIPS * h, 0.0)
         cone(f"{side}_forearm", ((front, fore, wrist), (front, shown, wrist)), ((0.021, 0.015), (0.016, 0.010)), x, arms)
         hip = (d["hip_flesh_forward"], -sign * d["hip_flesh_inward"], 0)
