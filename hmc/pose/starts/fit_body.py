@@ -163,9 +163,9 @@ def _gauss_newton(frames, shape: np.ndarray, states: np.ndarray, prior: _Prior, 
         matrix += by_shape.T @ by_shape - cross.T @ inverse[:, :n_shape]
         gradient += by_shape.T @ residual - cross.T @ inverse[:, n_shape]
         solved.append((free, inverse))
-    free = movable(shape, gradient, np.full(n_shape, -np.inf), prior.highest)
+    moving = movable(shape, gradient, np.full(n_shape, -np.inf), prior.highest)
     step = np.zeros(n_shape)
-    step[free] = np.clip(-np.linalg.solve(damped(matrix[np.ix_(free, free)], damping, least=0.0), gradient[free]), -0.1, 0.1)
+    step[moving] = np.clip(-np.linalg.solve(damped(matrix[np.ix_(moving, moving)], damping, least=0.0), gradient[moving]), -0.1, 0.1)
     step = np.minimum(step, prior.highest - shape)
     new_states = states.copy()
     for row, (free, inverse) in zip(new_states, solved, strict=True):
