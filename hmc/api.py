@@ -250,15 +250,11 @@ def pose(
     >>> list(people.to_frame().columns)
     ['frame', 'person', 'joint', 'x', 'y', 'z', 'views', 'trust']
     """
-    from hmc.pose.backward import backward
-    from hmc.pose.follow import FollowOptions, follow, for_method
-    from hmc.pose.keypoint_cues import learn_scatter
+    from hmc.pose.chain import ChainRuns, finished_poses
+    from hmc.pose.follow import FollowOptions, for_method
     from hmc.pose.keypoint_tracks import tracks_of_keypoints
-    from hmc.pose.keypoint_views import with_keypoint_views
     from hmc.pose.method import as_found
     from hmc.pose.registry import pose_method
-    from hmc.pose.trust import with_trust
-    from hmc.pose.views.recent import RecentViews
     from hmc.voxels.run_options import RunOptions
 
     if smooth_s is not None and not 0 <= smooth_s < float("inf"):
@@ -281,22 +277,10 @@ def pose(
             tracks = tracks_of_keypoints(recording, keypoints)
         elif tracks is None and method.needs_hulls:
             tracks = _tracked(recording, "sparse", seed, TRACK_VOXEL_M, masks)
-        run = RunOptions(masks=masks, key=_KEY, progress=counted)
-        cues = (
-            None
-            if keypoints is None or tracks is None or not method.keypoints
-            else learn_scatter(recording.rig, tracks, keypoints, recording.fps)
-        )
-        options = FollowOptions(POSE_VOXEL_M, seed, height, detections, keypoints=cues, recent=RecentViews())
-        people = replace(follow(recording, tracks, method, options, run), fps=recording.fps)
-        run = replace(run, progress=None)
-        if tracks is not None:
-            people = backward(recording, tracks, method, people, options, run)
-        if smooth_s:
-            people = people.smoothed("polynomial", window_s=smooth_s, limits=method.limits)
-        if tracks is not None and cues is not None and not method.needs_hulls:
-            return with_keypoint_views(people, recording, tracks, cues)
-        return with_trust(people, recording, run)
+        run = RunOptions(masks=masks, key=_KEY)
+        runs = ChainRuns(replace(run, progress=counted), run, run)
+        options = FollowOptions(POSE_VOXEL_M, seed, height, detections)
+        return finished_poses(recording, tracks, method, options, runs, keypoints, smooth_s)
 
 
 def evaluate(found: PosedPeople | TrackTable, recording: Recording) -> PoseEvaluation | MotScores:

@@ -157,7 +157,7 @@ def build(folder: Path) -> Path:
             shutil.copytree("rec/images", f"trials/{name}/images")
         _run("pose", "rec", "--out", "result", *COARSE)
         _stopped("hmc.io.results.write_tracks", "track", "rec", "--out", "stopped_track", "--voxel", "0.1", *QUICK)
-        _stopped("hmc.pose.trust.with_trust", "pose", "rec", "--out", "stopped_pose", *COARSE)
+        _stopped("hmc.pose.chain.with_trust", "pose", "rec", "--out", "stopped_pose", *COARSE)
         _run("experiments", "run", "fig-3.3", "--quick", "--quiet", "--workers", "1", "--out", "experiments")
         Path("whole").write_text("")
     finally:

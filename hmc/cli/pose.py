@@ -151,14 +151,10 @@ def _run(args: argparse.Namespace, held: ExitStack) -> int:
     from hmc.io.files import to_toml
     from hmc.io.lock import only_run
     from hmc.io.results import write_run, write_tracks
-    from hmc.pose.backward import backward
-    from hmc.pose.follow import FollowOptions, follow, for_method
-    from hmc.pose.keypoint_cues import learn_scatter
+    from hmc.pose.chain import ChainRuns, finished_poses
+    from hmc.pose.follow import FollowOptions, for_method
     from hmc.pose.keypoint_tracks import tracks_of_keypoints
-    from hmc.pose.keypoint_views import with_keypoint_views
     from hmc.pose.method import as_found
-    from hmc.pose.trust import with_trust
-    from hmc.pose.views.recent import RecentViews
     from hmc.tracking.resumable import person_grid, track_recording
     from hmc.trials.quality import trust_summary
     from hmc.voxels.run_options import RunOptions
@@ -249,21 +245,10 @@ def _run(args: argparse.Namespace, held: ExitStack) -> int:
         tracks = tracks_of_keypoints(recording, source_of_keypoints, kept(JOURNAL, TRACKING))
     bar.people = 1 if tracks is None else len(set(tracks.persons.tolist()))
     detections = None if markers is None else markers.table(args, key, problems)
-    cues = None
-    if tracks is not None and source_of_keypoints is not None:
-        cues = learn_scatter(recording.rig, tracks, source_of_keypoints, recording.fps, selected_workers(args))
-    options = FollowOptions(args.voxel, args.seed, height, detections, keypoints=cues, recent=RecentViews())
-    people = follow(recording, tracks, method, options, kept(POSE_JOURNAL, FOLLOWING))
-    if markers is not None:
-        markers.refuse_nothing(people)
-    if tracks is not None:
-        people = backward(recording, tracks, method, people, options, kept(BACK_JOURNAL, SECOND_PASS))
-    if args.smooth:
-        people = people.smoothed("polynomial", window_s=args.smooth, fps=recording.fps, limits=method.limits)
-    if hulls:
-        people = with_trust(people, recording, kept(POSE_JOURNAL, VIEWS))
-    elif tracks is not None and cues is not None:
-        people = with_keypoint_views(people, recording, tracks, cues)
+    runs = ChainRuns(kept(POSE_JOURNAL, FOLLOWING), kept(BACK_JOURNAL, SECOND_PASS), kept(POSE_JOURNAL, VIEWS))
+    options = FollowOptions(args.voxel, args.seed, height, detections)
+    refuse = None if markers is None else markers.refuse_nothing
+    people = finished_poses(recording, tracks, method, options, runs, source_of_keypoints, args.smooth, refuse)
     problems += people.notes
     if source_of_keypoints is not None:
         problems += source_of_keypoints.notes

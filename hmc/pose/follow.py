@@ -234,7 +234,7 @@ def follow(
     for decided, before in _decided(task, persons, states, views, run):
         keep_decided(run.journal, decided, before)
         done.append(replace(decided, tracked=None))  # memories are not kept for long
-    return _posed_people(done)
+    return replace(_posed_people(done), fps=recording.fps)
 
 
 _Views = Iterator[tuple[int, dict[int, PersonView]]]

@@ -1,0 +1,83 @@
+"""From tracks to finished poses: forward in time, backward, smooth, and how far each landmark is borne out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from hmc.io.keypoints import KeypointSource
+from hmc.io.recording import Recording
+from hmc.io.results import TrackTable
+from hmc.pose.backward import backward
+from hmc.pose.follow import FollowOptions, PosedPeople, follow
+from hmc.pose.keypoint_cues import learn_scatter
+from hmc.pose.keypoint_views import with_keypoint_views
+from hmc.pose.method import PoseMethod
+from hmc.pose.trust import with_trust
+from hmc.pose.views.recent import RecentViews
+from hmc.voxels.run_options import RunOptions
+
+__all__ = ["ChainRuns", "finished_poses"]
+
+
+@dataclass(frozen=True)
+class ChainRuns:
+    """How the three stages are kept and told of; their silhouettes are the same, their journals are not.
+
+    Parameters
+    ----------
+    forward, backward, views : RunOptions
+    """
+
+    forward: RunOptions
+    backward: RunOptions
+    views: RunOptions
+
+
+def finished_poses(
+    recording: Recording,
+    tracks: TrackTable | None,
+    method: PoseMethod,
+    options: FollowOptions,
+    runs: ChainRuns,
+    keypoints: KeypointSource | None = None,
+    smooth_s: float | None = None,
+    after_forward: Callable[[PosedPeople], None] | None = None,
+) -> PosedPeople:
+    """The poses of all tracked people after all that the method does, with their views, and trust where silhouettes bear them out.
+
+    Parameters
+    ----------
+    recording : Recording
+    tracks : TrackTable or None
+        None for a method that needs none.
+    method : PoseMethod
+    options : FollowOptions
+        Its `keypoints` and `recent` are set here.
+    runs : ChainRuns
+    keypoints : KeypointSource, optional
+        What a detector of 2-D keypoints saw, for a method that uses some.
+    smooth_s : float, optional
+        Poses are smoothed over so many seconds at last; a method that smooths by itself is to be asked not to (`hmc.pose.method.as_found`).
+    after_forward : callable, optional
+        Is shown what the pass forward found; what it raises ends the run.
+
+    Raises
+    ------
+    InputError
+        When the voxels are too many for the memory, or what the method needs is not given.
+    """
+    cues = None
+    if tracks is not None and keypoints is not None and method.keypoints:
+        cues = learn_scatter(recording.rig, tracks, keypoints, recording.fps, runs.forward.workers)
+    options = replace(options, keypoints=cues, recent=RecentViews())
+    people = follow(recording, tracks, method, options, runs.forward)
+    if after_forward is not None:
+        after_forward(people)
+    if tracks is not None:
+        people = backward(recording, tracks, method, people, options, runs.backward)
+    if smooth_s:
+        people = people.smoothed("polynomial", window_s=smooth_s, limits=method.limits)
+    if method.needs_hulls:
+        return with_trust(people, recording, runs.views)
+    return people if cues is None or tracks is None else with_keypoint_views(people, recording, tracks, cues)
