@@ -98,16 +98,27 @@ def standing_frames(times: np.ndarray, ankles: np.ndarray) -> np.ndarray:
     ndarray of bool, shape (n, k, 2)
     """
     speed = np.zeros(ankles.shape[:2])
-    for row, time in enumerate(times):
-        away = np.abs(times - time)
-        near = away <= max(OVER_S / 2, np.partition(away, min(2, len(away) - 1))[min(2, len(away) - 1)]) + 1e-6
-        t = times[near] - times[near].mean()
+    for row, (first, end) in enumerate(_windows(times, np.maximum(OVER_S / 2, _to_second_next(times)) + 1e-6)):
+        t = times[first:end] - times[first:end].mean()
         if t.any():  # the slope of a straight line through them
-            speed[row] = np.linalg.norm(np.tensordot(t, ankles[near], axes=(0, 0)) / (t @ t), axis=-1)
+            speed[row] = np.linalg.norm(np.tensordot(t, ankles[first:end], axes=(0, 0)) / (t @ t), axis=-1)
     rest = np.zeros((*ankles.shape[:2], 2), bool)
-    for row, time in enumerate(times):
-        stride = np.abs(times - time) <= STRIDE_S
-        low = ankles[row, :, 2] < ankles[stride][..., 2].min(axis=0) + LIFTED_M
-        rolling = np.maximum(ROLLING_M_S, ROLLING_SHARE * speed[stride].max(axis=0))
+    for row, (first, end) in enumerate(_windows(times, np.full(len(times), STRIDE_S + 1e-6))):
+        low = ankles[row, :, 2] < ankles[first:end, :, 2].min(axis=0) + LIFTED_M
+        rolling = np.maximum(ROLLING_M_S, ROLLING_SHARE * speed[first:end].max(axis=0))
         rest[row] = np.stack([speed[row] < SLOW_M_S, speed[row] < rolling], axis=-1) & low[:, None]
     return rest
+
+
+def _to_second_next(times: np.ndarray) -> np.ndarray:
+    """How far the second nearest other time is from each, where there are so many."""
+    padded = np.concatenate([[-np.inf] * 2, times, [np.inf] * 2])
+    others = np.stack([padded[2 + k : 2 + k + len(times)] for k in (-2, -1, 1, 2)], axis=-1)
+    away = np.sort(np.abs(others - times[:, None]), axis=-1)
+    return away[:, min(2, len(times) - 1) - 1] if len(times) > 1 else np.zeros(len(times))
+
+
+def _windows(times: np.ndarray, reach: np.ndarray) -> list[tuple[int, int]]:
+    """First row and end of those no farther than `reach` from each of the times, ascending."""
+    first, end = np.searchsorted(times, times - reach), np.searchsorted(times, times + reach, side="right")
+    return list(zip(first.tolist(), end.tolist(), strict=True))

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.testing import assert_array_equal
 
 from hmc.body.feet import foot_points
 from hmc.body.joints import DOF_NAMES, N_DOF, dof_index
@@ -51,6 +52,24 @@ def test_any_times_will_do(n, seed):
     times = np.cumsum(rng.choice([0.03, 0.1, 2.0], n))
     found = standing_frames(times, rng.normal(size=(n, 2, 3)))
     assert found.shape == (n, 2, 2) and found.dtype == bool
+
+
+@given(st.integers(1, 40), st.sampled_from([10, 25, 30, 60]), st.integers(0, 2**32 - 1))
+def test_rest_is_told_as_by_looking_at_all_other_frames(n, fps, seed):
+    rng = np.random.default_rng(seed)
+    times = np.sort(rng.choice(2 * n, n, replace=False)) / fps
+    ankles = np.cumsum(rng.normal(0, 0.01, (n, 2, 3)), axis=0)
+    speed = np.zeros((n, 2))
+    for row, away in enumerate(np.abs(times - times[:, None])):
+        near = away <= max(0.065, np.sort(away)[min(2, n - 1)]) + 1e-6
+        if near.sum() > 1:
+            slopes = np.polyfit(times[near] - times[row], ankles[near].reshape(near.sum(), -1), 1)[0]
+            speed[row] = np.linalg.norm(slopes.reshape(2, 3), axis=-1)
+    for row, away in enumerate(np.abs(times - times[:, None])):
+        stride = away <= 1.0 + 1e-6
+        low = ankles[row, :, 2] < ankles[stride][..., 2].min(axis=0) + 0.08
+        slow = np.stack([speed[row] < 0.3, speed[row] < np.maximum(0.45, 0.25 * speed[stride].max(axis=0))], axis=-1)
+        assert_array_equal(standing_frames(times, ankles)[row], slow & low[:, None])
 
 
 def states_of(states):
