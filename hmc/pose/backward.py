@@ -5,7 +5,8 @@ first second and a half. When the recording is over more is known:
 
 1. Who was followed the wrong way round is turned about (`hmc.pose.turned`).
 2. What the scene hides from single cameras is learnt from the first pass's poses (`hmc.pose.occluders`); and what another's pose
-   covers asks nothing of a person. Feet that stand, as their motion tells, are held to the floor (`hmc.pose.contacts`).
+   covers asks nothing of a person. Feet that stand, as their motion tells, are held to the floor, or to what is on it
+   (`hmc.pose.contacts`).
 3. The person's dimensions are fitted anew, to frames of the whole run (`hmc.pose.starts.own_body`).
 4. Each person is followed from the last frame to the first. Nothing is drawn at random but limbs that are lost: the pose of the frame after
    and the first pass's are refined side by side, so that a limb that was found again is followed back to where it was lost. Where a
@@ -35,7 +36,7 @@ from hmc.io.masks import kept_frames
 from hmc.io.recording import Recording, spread_frames
 from hmc.io.results import TrackTable
 from hmc.pose.anew import doubtful_frames, pose_anew
-from hmc.pose.contacts import standing_feet
+from hmc.pose.contacts import ground_notes, standing_feet
 from hmc.pose.follow import FollowOptions, PosedPeople
 from hmc.pose.keypoint_cues import beside_body, learn_beside
 from hmc.pose.limb_colors import Found, OtherLimb, limbs_by_color
@@ -135,8 +136,9 @@ def backward(
     else:
         turned = _followed_wrongly(pass_, people, fitted)
     people = _turned_about(people, fitted, turned, first_bodies)
-    standing = standing_feet(people.states, first_bodies, recording.fps, floor_z) if settings.standing_feet else {}
-    pass_ = replace(pass_, states=people.states, standing=standing)
+    footing = standing_feet(people.states, first_bodies, recording.fps, floor_z) if settings.standing_feet else {}
+    people = replace(people, notes=(*people.notes, *ground_notes(footing, floor_z)))
+    pass_ = replace(pass_, states=people.states, footing=footing)
     if records:
         bodies = make_bodies({int(person): body for person, body in records[0]["bodies"].items()}, method.limits)
     else:

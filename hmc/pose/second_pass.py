@@ -12,6 +12,7 @@ from hmc.body.model import BodyModel
 from hmc.io.masks import kept_frames
 from hmc.io.recording import Recording
 from hmc.io.results import PoseStates, TrackTable
+from hmc.pose.contacts import Footing
 from hmc.pose.follow import FollowOptions
 from hmc.pose.keypoint_cues import with_keypoints
 from hmc.pose.method import Capture
@@ -48,7 +49,7 @@ class SecondPass:
     states: PoseStates
     bodies: Mapping[int, BodyModel]
     places: HiddenPlaces | None
-    standing: Mapping[int, Mapping[int, tuple[bool, ...]]]
+    footing: Mapping[int, Footing]
 
     def each(self, make: Callable[[Sequence[int]], Iterator[T]], frames: Sequence[int]) -> Iterator[T]:
         """What is made of each of some frames, made ahead by processes."""
@@ -73,14 +74,15 @@ class SecondPass:
             yield frame, {person: with_own_rays(view, person, poses) for person, view in views.items()}
 
     def _on_their_feet(self, frame: int, views: dict[int, PersonView]) -> dict[int, PersonView]:
-        """The same with what is known of who stands."""
-        known = {person: self.standing.get(person, {}).get(frame, (False,) * 4) for person in views}
-        return {
-            person: replace(view, target=replace(view.target, standing=known[person]))
-            if view.target is not None and any(known[person])
-            else view
-            for person, view in views.items()
-        }
+        """The same with what is known of who stands, and on what."""
+
+        def on_feet(person: int, view: PersonView) -> PersonView:
+            known = self.footing.get(person)
+            if view.target is None or known is None:
+                return view
+            return replace(view, target=replace(view.target, floor_z=known.ground_z, standing=known.feet.get(frame, (False,) * 4)))
+
+        return {person: on_feet(person, view) for person, view in views.items()}
 
     def recent(self, frame: int) -> dict[int, PersonView] | None:
         """What the first pass saw in a frame, if that is still there and nothing has been learnt of the scene since."""

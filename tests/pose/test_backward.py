@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from methods import HEIGHT_M, VOXEL_M, followed, tiny_clip, true_joints, true_tracks
 
+import hmc
 from hmc.body.exchange import swapped_pose
 from hmc.body.joints import N_DOF
 from hmc.body.kinematics import landmarks
@@ -241,3 +242,19 @@ def test_other_numbers_of_passes_are_refused():
     with pytest.raises(InputError, match="1 or 2"):
         pose_method("apf", passes=3)
     assert pose_method("apf").back is not None and pose_method("apf", "canton2009").back is None
+
+
+@pytest.mark.slow
+def test_who_stands_above_the_floor_is_not_pulled_down_to_it_and_it_is_told(monkeypatch):
+    recording, n = tiny_clip(16), 16
+    lowered = replace(recording, room=recording.room - np.array([[0, 0, 0.06], [0, 0, 0]]))
+
+    def posed():
+        people = hmc.pose(lowered, true_tracks(n), height_m=HEIGHT_M)
+        return 1000 * np.linalg.norm(people.positions - true_joints(n), axis=-1).mean(), people.notes
+
+    found, notes = posed()
+    assert len(notes) == 1 and "person 0 stands some" in notes[0] and "cm above the floor (z = -0.06 m)" in notes[0]
+    monkeypatch.setattr("hmc.pose.contacts.RAISED_M", np.inf)
+    pulled, notes = posed()
+    assert not notes and found < pulled - 2

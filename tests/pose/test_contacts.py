@@ -11,7 +11,7 @@ from hmc.body.joints import DOF_NAMES, N_DOF, dof_index
 from hmc.body.model import neutral_state
 from hmc.body.proportions import default_body
 from hmc.io.results import PoseStates
-from hmc.pose.contacts import standing_feet, standing_frames
+from hmc.pose.contacts import ground_under, standing_feet, standing_frames
 
 BODY = default_body(1.8)
 LEGS = sum(BODY.dimensions[name] for name in ("thigh", "shank", "ankle_height"))
@@ -65,11 +65,12 @@ def test_rest_is_told_as_by_looking_at_all_other_frames(n, fps, seed):
         if near.sum() > 1:
             slopes = np.polyfit(times[near] - times[row], ankles[near].reshape(near.sum(), -1), 1)[0]
             speed[row] = np.linalg.norm(slopes.reshape(2, 3), axis=-1)
+    found = standing_frames(times, ankles)
     for row, away in enumerate(np.abs(times - times[:, None])):
         stride = away <= 1.0 + 1e-6
         low = ankles[row, :, 2] < ankles[stride][..., 2].min(axis=0) + 0.08
         slow = np.stack([speed[row] < 0.3, speed[row] < np.maximum(0.45, 0.25 * speed[stride].max(axis=0))], axis=-1)
-        assert_array_equal(standing_frames(times, ankles)[row], slow & low[:, None])
+        assert_array_equal(found[row], slow & low[:, None])
 
 
 def states_of(states):
@@ -85,14 +86,29 @@ def poses(pelvis_z, lifted=0.0, n=20):
 
 def test_who_stands_still_stands_on_both_feet_and_who_lifts_one_on_the_other():
     both = standing_feet(states_of(poses(LEGS)), {0: BODY}, 30.0, 0.0)
-    assert set(both[0].values()) == {(True,) * 4} and len(both[0]) == 20
+    assert set(both[0].feet.values()) == {(True,) * 4} and len(both[0].feet) == 20
     one = standing_feet(states_of(poses(LEGS, 1.3)), {0: BODY}, 30.0, 0.0)
-    assert set(one[0].values()) == {(True, True, False, False)}
+    assert set(one[0].feet.values()) == {(True, True, False, False)}
 
 
 def test_who_is_high_above_the_floor_stands_on_something_else():
-    assert set(standing_feet(states_of(poses(LEGS + 0.3)), {0: BODY}, 30.0, 0.0)[0].values()) == {(False,) * 4}
-    assert set(standing_feet(states_of(poses(LEGS + 0.3)), {0: BODY}, 30.0, 0.3)[0].values()) == {(True,) * 4}
+    assert set(standing_feet(states_of(poses(LEGS + 0.3)), {0: BODY}, 30.0, 0.0)[0].feet.values()) == {(False,) * 4}
+    assert set(standing_feet(states_of(poses(LEGS + 0.3)), {0: BODY}, 30.0, 0.3)[0].feet.values()) == {(True,) * 4}
+
+
+@pytest.mark.parametrize("raised_m, lost_m", [(0.06, 0.0), (0.06, 0.02), (0.09, 0.01)])
+def test_who_stands_on_a_beam_or_a_mat_stands_on_that(raised_m, lost_m):
+    stands, lifts = poses(LEGS + raised_m + lost_m), poses(LEGS + raised_m + lost_m, 1.3)
+    found = standing_feet(states_of([*stands, *lifts]), {0: BODY}, 30.0, 0.0)[0]
+    assert found.ground_z == pytest.approx(raised_m, abs=0.015)
+    assert {found.feet[3], found.feet[35]} == {(True,) * 4, (True, True, False, False)}
+
+
+@pytest.mark.parametrize("lost_m", [0.0, 0.02, 0.03])
+def test_soles_that_silhouettes_lose_are_on_the_floor_all_the_same(lost_m):
+    assert standing_feet(states_of(poses(LEGS + lost_m)), {0: BODY}, 30.0, 0.0)[0].ground_z == 0.0
+    few = np.full(4, 0.09)
+    assert ground_under(few, 0.02) == 0.02 and ground_under(np.tile(few, 4), 0.02) == pytest.approx(0.07)
 
 
 def test_who_kneels_may_have_the_feet_anywhere():
@@ -100,7 +116,7 @@ def test_who_kneels_may_have_the_feet_anywhere():
     state[2] = BODY.dimensions["thigh"] + 0.12  # on a mat
     state[dof_index("r_knee_y", "l_knee_y")], state[dof_index("r_ankle_y", "l_ankle_y")] = np.radians(85), np.radians(45)
     assert abs(foot_points(BODY, state)[:, 2].min()) < 0.1  # soles no farther from the floor than of who stands
-    assert set(standing_feet(states_of([state] * 20), {0: BODY}, 30.0, 0.0)[0].values()) == {(False,) * 4}
+    assert set(standing_feet(states_of([state] * 20), {0: BODY}, 30.0, 0.0)[0].feet.values()) == {(False,) * 4}
 
 
 def test_of_who_stands_on_tiptoe_nothing_is_said_unless_nothing_shows_the_feet():
@@ -109,18 +125,18 @@ def test_of_who_stands_on_tiptoe_nothing_is_said_unless_nothing_shows_the_feet()
     state[2] = LEGS
     lowest = foot_points(BODY, state)[:2, 2].min()
     assert lowest < -0.08  # through the floor by its toes: legs of which silhouettes lose the feet
-    assert set(standing_feet(states_of([state] * 20), {0: BODY}, 30.0, 0.0)[0].values()) == {(True,) * 4}
+    assert set(standing_feet(states_of([state] * 20), {0: BODY}, 30.0, 0.0)[0].feet.values()) == {(True,) * 4}
     state[2] -= lowest  # the toes' end on the floor; and the other foot beside it in the air, within what a floor may be off
-    found = set(standing_feet(states_of([state] * 20), {0: BODY}, 30.0, 0.0)[0].values())
+    found = set(standing_feet(states_of([state] * 20), {0: BODY}, 30.0, 0.0)[0].feet.values())
     assert len(found) == 1 and next(iter(found))[:2] == (False, False)
     state[dof_index("l_ankle_y")] = np.radians(5)  # a heel that is hardly raised stands
     state[2] = LEGS
-    assert set(standing_feet(states_of([state] * 20), {0: BODY}, 30.0, 0.0)[0].values()) == {(True,) * 4}
+    assert set(standing_feet(states_of([state] * 20), {0: BODY}, 30.0, 0.0)[0].feet.values()) == {(True,) * 4}
 
 
 def test_frames_without_a_pose_tell_nothing():
     lost = [*poses(LEGS, n=5), np.full(N_DOF, np.nan), *poses(LEGS, n=5)]
-    found = standing_feet(states_of(lost), {0: BODY}, 30.0, 0.0)[0]
+    found = standing_feet(states_of(lost), {0: BODY}, 30.0, 0.0)[0].feet
     assert sorted(found) == [0, 1, 2, 3, 4, 6, 7, 8, 9, 10] and set(found.values()) == {(True,) * 4}
 
 
