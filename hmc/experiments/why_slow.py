@@ -146,8 +146,8 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
         for change, line in own.groupby("change", sort=False):
             scores = line.set_index("action").MMTA_percent
             axes.plot(range(len(slow_first)), [scores.get(action, np.nan) for action in slow_first], "o-", label=change)
-        axes.set_xticks(range(len(slow_first)), [f"{action}\n{speeds[action]:.1f} P0 a frame" for action in slow_first])
-        axes.set(title=f"seen: {seen}", ylim=(0, 105))
+        axes.set_xticks(range(len(slow_first)), [f"{action}\n{speeds[action]:.1f}" for action in slow_first])
+        axes.set(title=f"seen: {seen}", xlabel="action, and its motion (P0 a frame)", ylim=(0, 105))
         axes.legend(fontsize=6)
     panels[0].set_ylabel("MMTA at 100 mm (%)")
 
