@@ -33,7 +33,7 @@ def all_methods() -> str:
         "| `--method` | mean error | within 100 mm | within 50 mm | frames a second | a frame |",
         "| --- | --- | --- | --- | --- | --- |",
     ]
-    for row in _rows("all-methods-other", "all-methods"):
+    for row in _rows("all-methods"):
         name, _, preset = row["method"].partition(" ")
         shown = f"`{name} --preset {preset}`" if preset else f"`{name}`"
         if not preset and name in METHOD_PAGES:
@@ -60,8 +60,10 @@ def with_tables(text: str) -> str:
     return PLACE.sub(lambda found: found[1] + TABLES[found[2]]() + found[3], text)
 
 
-def _rows(experiment: str, table: str) -> list[dict[str, str]]:
-    with open(ROOT / "results" / experiment / f"{table}.csv", encoding="utf-8", newline="") as file:
+def _rows(experiment: str) -> list[dict[str, str]]:
+    """Rows of an experiment's first table, of the fullest run of it that is stored."""
+    stored = [ROOT / "results" / f"{experiment}{part}" / f"{experiment}.csv" for part in ("", "-other", "-quick")]
+    with open(next(path for path in stored if path.is_file()), encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file))
 
 

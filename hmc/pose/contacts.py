@@ -138,7 +138,7 @@ def ground_notes(footing: Mapping[int, Footing], floor_z: float) -> list[str]:
     """
     return [
         f"person {person} stands some {100 * (one.ground_z - floor_z):.0f} cm above the floor (z = {floor_z:g} m): on a mat, a step or a "
-        "treadmill, or the floor is not where the calibration has it; hmc world puts it there"
+        "treadmill, or the floor is elsewhere; `room` in recording.toml says how low it is"
         for person, one in sorted(footing.items())
         if one.ground_z != floor_z
     ]
