@@ -32,6 +32,7 @@ from hmc.landmarks import LANDMARKS
 from hmc.pose.backward import backward
 from hmc.pose.follow import follow
 from hmc.pose.keypoint_cues import KeypointCues, learn_scatter, with_keypoints
+from hmc.pose.turned_cameras import turned_back
 from hmc.pose.views.keypoint_pose import landmarks_seen
 from hmc.pose.views.person_view import PersonView
 from hmc.synthetic.keypoints import write_keypoints
@@ -185,6 +186,7 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
     if needs_keypoints:
         source = with_fault(_keypoints(inputs, parameters["recording"], recording), recording, truth, fault, seed)
         cues = learn_scatter(recording.rig, people.tracks, source, recording.fps)
+        recording, cues, _ = turned_back(recording, people.tracks, cues)
     poses = way(parameters, Footage(recording, people, cues))
     return scored_poses(recording, poses, truth) | {"faulty": [] if fault == NO_FAULT else list(fault_frames(recording, fault, seed))}
 

@@ -14,6 +14,7 @@ from hmc.pose.keypoint_cues import learn_scatter
 from hmc.pose.keypoint_views import with_keypoint_views
 from hmc.pose.method import PoseMethod
 from hmc.pose.trust import with_trust
+from hmc.pose.turned_cameras import turned_back
 from hmc.pose.views.recent import RecentViews
 from hmc.voxels.run_options import RunOptions
 
@@ -56,7 +57,8 @@ def finished_poses(
         Its `keypoints` and `recent` are set here.
     runs : ChainRuns
     keypoints : KeypointSource, optional
-        What a detector of 2-D keypoints saw, for a method that uses some.
+        What a detector of 2-D keypoints saw, for a method that uses some. Cameras that have turned since they were calibrated, as these
+        tell, are turned back (`hmc.pose.turned_cameras`); silhouettes and tracks are those of the cameras as they are.
     smooth_s : float, optional
         Poses are smoothed over so many seconds at last; a method that smooths by itself is to be asked not to (`hmc.pose.method.as_found`).
     after_forward : callable, optional
@@ -67,11 +69,14 @@ def finished_poses(
     InputError
         When the voxels are too many for the memory, or what the method needs is not given.
     """
-    cues = None
+    cues, lines = None, list[str]()
     if tracks is not None and keypoints is not None and method.keypoints:
-        cues = learn_scatter(recording.rig, tracks, keypoints, recording.fps, runs.forward.workers)
+        workers, frontend = runs.forward.workers, runs.forward.frontend
+        cues = learn_scatter(recording.rig, tracks, keypoints, recording.fps, workers)
+        recording, cues, lines = turned_back(recording, tracks, cues, workers, keep=frontend is not None and not frontend.exclude)
     options = replace(options, keypoints=cues, recent=RecentViews())
     people = follow(recording, tracks, method, options, runs.forward)
+    people = replace(people, notes=(*lines, *people.notes))
     if after_forward is not None:
         after_forward(people)
     if tracks is not None:
