@@ -32,6 +32,8 @@ FRAMES, LEAST_DETECTIONS, SURE = 60, 60, 0.5
 #: A camera is turned that passes what the others see by more than this, metres, in the median, and by no more than this share of it when
 #: it is turned back. Of seven well calibrated cameras it was 18 to 33 mm, and 90 % of that at least.
 OFF_M, MENDED_SHARE = 0.035, 0.65
+#: A turn lasts: in each of so many parts of the run this share of a miss is left at most. A detector is wrong for a while.
+PARTS, LASTING_SHARE = 5, 0.8
 #: Cameras that are needed: three that agree tell of a fourth.
 LEAST_CAMERAS = 4
 #: A miss of more than this counts ever less, metres (Cauchy); and so far may a camera have turned, radians.
@@ -173,5 +175,8 @@ def _turn(rig: Rig, c: int, others: Sequence[int], directions: np.ndarray, devia
         return np.cross(Rotation.from_rotvec(turn).apply(lines), places)
 
     fit = least_squares(lambda turn: missed(turn).ravel(), np.zeros(3), loss="cauchy", f_scale=WIDE_M, bounds=(-MOST_TURN, MOST_TURN))
-    before, after = (float(np.median(np.linalg.norm(missed(turn), axis=1))) for turn in (np.zeros(3), fit.x))
-    return TurnedCamera(rig[c].name, fit.x, before, after)
+    before, after = (np.linalg.norm(missed(turn), axis=1) for turn in (np.zeros(3), fit.x))
+    parts = zip(np.array_split(before, PARTS), np.array_split(after, PARTS), strict=True)
+    if any(np.median(turned) > LASTING_SHARE * np.median(was) for was, turned in parts):
+        return TurnedCamera(rig[c].name, np.zeros(3), float(np.median(before)), float(np.median(before)))
+    return TurnedCamera(rig[c].name, fit.x, float(np.median(before)), float(np.median(after)))

@@ -90,6 +90,22 @@ def test_poses_are_found_with_the_camera_turned_back_or_kept_as_asked(folder):
     assert turned_back(mended, tracks, again)[2] == []
 
 
+def test_a_detector_that_is_wrong_for_two_thirds_of_a_run_is_no_camera_that_has_turned(folder):
+    recording, tracks, cues = opened(folder)
+    first = recording.n_frames // 6
+
+    def displaced(index, people):
+        wrong = first <= index < first + 2 * recording.n_frames // 3
+        return tuple(given + np.array([0.0, 25.0, 0.0]) * (wrong and c == 3) for c, given in enumerate(people))
+
+    assert turned_cameras(recording.rig, tracks, replace(cues, source=cues.source.changed(displaced))) == []
+    always = replace(
+        cues,
+        source=cues.source.changed(lambda index, people: tuple(p + np.array([0.0, 25.0, 0.0]) * (c == 3) for c, p in enumerate(people))),
+    )
+    assert [one.name for one in turned_cameras(recording.rig, tracks, always)] == [recording.rig[3].name]
+
+
 @pytest.mark.slow
 def test_a_turned_camera_costs_poses_little(folder):
     errors = {}
