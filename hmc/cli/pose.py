@@ -247,8 +247,9 @@ def _run(args: argparse.Namespace, held: ExitStack) -> int:
     detections = None if markers is None else markers.table(args, key, problems)
     runs = ChainRuns(kept(POSE_JOURNAL, FOLLOWING), kept(BACK_JOURNAL, SECOND_PASS), kept(POSE_JOURNAL, VIEWS))
     options = FollowOptions(args.voxel, args.seed, height, detections)
-    refuse = None if markers is None else markers.refuse_nothing
-    people = finished_poses(recording, tracks, method, options, runs, source_of_keypoints, args.smooth, refuse)
+    people = finished_poses(recording, tracks, method, options, runs, source_of_keypoints, args.smooth)
+    if markers is not None:
+        markers.refuse_nothing(people)
     problems += people.notes
     if source_of_keypoints is not None:
         problems += source_of_keypoints.notes

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from hmc.io.keypoints import KeypointSource
@@ -43,7 +42,6 @@ def finished_poses(
     runs: ChainRuns,
     keypoints: KeypointSource | None = None,
     smooth_s: float | None = None,
-    after_forward: Callable[[PosedPeople], None] | None = None,
 ) -> PosedPeople:
     """The poses of all tracked people after all that the method does, with their views, and trust where silhouettes bear them out.
 
@@ -61,8 +59,6 @@ def finished_poses(
         tell, are turned back (`hmc.pose.turned_cameras`); silhouettes and tracks are those of the cameras as they are.
     smooth_s : float, optional
         Poses are smoothed over so many seconds at last; a method that smooths by itself is to be asked not to (`hmc.pose.method.as_found`).
-    after_forward : callable, optional
-        Is shown what the pass forward found; what it raises ends the run.
 
     Raises
     ------
@@ -77,8 +73,6 @@ def finished_poses(
     options = replace(options, keypoints=cues, recent=RecentViews())
     people = follow(recording, tracks, method, options, runs.forward)
     people = replace(people, notes=(*lines, *people.notes))
-    if after_forward is not None:
-        after_forward(people)
     if tracks is not None:
         people = backward(recording, tracks, method, people, options, runs.backward)
     if smooth_s:
