@@ -32,7 +32,7 @@ from hmc.landmarks import LANDMARKS
 from hmc.pose.backward import backward
 from hmc.pose.follow import follow
 from hmc.pose.keypoint_cues import KeypointCues, learn_scatter, with_keypoints
-from hmc.pose.turned_cameras import turned_back
+from hmc.pose.turned_back import turned_back
 from hmc.pose.views.keypoint_pose import landmarks_seen
 from hmc.pose.views.person_view import PersonView
 from hmc.synthetic.keypoints import write_keypoints

@@ -131,6 +131,11 @@ class TrackTable:
         """The rows of one person."""
         return self.where(self.persons == person)
 
+    def at(self, frame: int) -> dict[int, np.ndarray]:
+        """Where each person is in a frame, shape (3,), metres."""
+        rows = np.flatnonzero(self.frames == frame)
+        return dict(zip(self.persons[rows].tolist(), self.positions[rows], strict=True))
+
 
 @dataclass(frozen=True)
 class PoseStates:

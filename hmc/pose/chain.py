@@ -9,11 +9,10 @@ from hmc.io.recording import Recording
 from hmc.io.results import TrackTable
 from hmc.pose.backward import backward
 from hmc.pose.follow import FollowOptions, PosedPeople, follow
-from hmc.pose.keypoint_cues import learn_scatter
 from hmc.pose.keypoint_views import with_keypoint_views
 from hmc.pose.method import PoseMethod
 from hmc.pose.trust import with_trust
-from hmc.pose.turned_cameras import turned_back
+from hmc.pose.turned_back import turned_back
 from hmc.pose.views.recent import RecentViews
 from hmc.voxels.run_options import RunOptions
 
@@ -45,6 +44,9 @@ def finished_poses(
 ) -> PosedPeople:
     """The poses of all tracked people after all that the method does, with their views, and trust where silhouettes bear them out.
 
+    Cameras that have turned since they were calibrated are turned back (`hmc.pose.turned_back`); silhouettes and tracks are those of the
+    cameras as they are.
+
     Parameters
     ----------
     recording : Recording
@@ -55,8 +57,7 @@ def finished_poses(
         Its `keypoints` and `recent` are set here.
     runs : ChainRuns
     keypoints : KeypointSource, optional
-        What a detector of 2-D keypoints saw, for a method that uses some. Cameras that have turned since they were calibrated, as these
-        tell, are turned back (`hmc.pose.turned_cameras`); silhouettes and tracks are those of the cameras as they are.
+        What a detector of 2-D keypoints saw, for a method that uses some.
     smooth_s : float, optional
         Poses are smoothed over so many seconds at last; a method that smooths by itself is to be asked not to (`hmc.pose.method.as_found`).
 
@@ -66,10 +67,8 @@ def finished_poses(
         When the voxels are too many for the memory, or what the method needs is not given.
     """
     cues, lines = None, list[str]()
-    if tracks is not None and keypoints is not None and method.keypoints:
-        workers, frontend = runs.forward.workers, runs.forward.frontend
-        cues = learn_scatter(recording.rig, tracks, keypoints, recording.fps, workers)
-        recording, cues, lines = turned_back(recording, tracks, cues, workers, keep=frontend is not None and not frontend.exclude)
+    if tracks is not None:
+        recording, cues, lines = turned_back(recording, tracks, runs.forward, keypoints if method.keypoints else None)
     options = replace(options, keypoints=cues, recent=RecentViews())
     people = follow(recording, tracks, method, options, runs.forward)
     people = replace(people, notes=(*lines, *people.notes))

@@ -20,7 +20,7 @@ from hmc.camera.model import Rig
 from hmc.io.keypoints.source import KeypointSource
 from hmc.io.recording import spread_frames
 from hmc.io.results import TrackTable
-from hmc.pose.keypoint_sides import Turned, exchanged_sides, people_at
+from hmc.pose.keypoint_sides import Turned, exchanged_sides
 from hmc.pose.objectives.keypoints import BESIDE_M, Beside
 from hmc.pose.views.keypoints import SCATTER_M, SeenKeypoints, body_detections, see_keypoints
 from hmc.pose.views.person_view import PersonView
@@ -80,7 +80,7 @@ def with_keypoints(views: Mapping[int, PersonView], rig: Rig, tracks: TrackTable
 
 def _seen(rig: Rig, tracks: TrackTable, cues: KeypointCues, frame: int) -> dict[int, SeenKeypoints]:
     detections = body_detections(cues.source, frame)
-    return see_keypoints(rig, detections, people_at(tracks, frame), cues.scatter_m, cues.turned.get(frame, {}))
+    return see_keypoints(rig, detections, tracks.at(frame), cues.scatter_m, cues.turned.get(frame, {}))
 
 
 def learn_scatter(rig: Rig, tracks: TrackTable, source: KeypointSource, fps: float, workers: int = 1) -> KeypointCues:

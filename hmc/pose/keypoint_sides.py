@@ -22,7 +22,7 @@ from hmc.pose.views.keypoints import body_detections, lines_of_people
 from hmc.processes import each_ahead
 from hmc.search.paths import cheapest_path
 
-__all__ = ["Turned", "exchanged_sides", "kept_or_exchanged", "people_at"]
+__all__ = ["Turned", "exchanged_sides", "kept_or_exchanged"]
 
 #: By frame and person, cameras that have exchanged left and right, bool (n_cameras,).
 Turned = Mapping[int, Mapping[int, np.ndarray]]
@@ -71,7 +71,7 @@ def exchanged_sides(rig: Rig, tracks: TrackTable, source: KeypointSource, fps: f
 
     def told(some: Sequence[int]) -> Iterator[dict[int, FrameSides]]:
         for frame in some:
-            people = lines_of_people(rig, body_detections(source, frame), people_at(tracks, frame))
+            people = lines_of_people(rig, body_detections(source, frame), tracks.at(frame))
             sides = {person: sides_of_frame(rig.centres, own.directions, own.deviation_m) for person, own in people.items()}
             yield {person: one for person, one in sides.items() if one.told.any()}
 
@@ -91,12 +91,6 @@ def _breaks(chain: _Chain, k: int) -> np.ndarray:
     """What it costs to be in the same state as in the frame before, and in the other, shape (2, 2)."""
     same, other = chain.breaks[k]
     return np.array([[same, other], [other, same]])
-
-
-def people_at(tracks: TrackTable, frame: int) -> dict[int, np.ndarray]:
-    """Where each person is tracked in a frame, shape (3,), metres."""
-    rows = np.flatnonzero(tracks.frames == frame)
-    return dict(zip(tracks.persons[rows].tolist(), tracks.positions[rows], strict=True))
 
 
 def _append(chain: _Chain, frame: int, sides: FrameSides, fps: float) -> None:

@@ -35,7 +35,7 @@ FOLLOWING = PERSON | FINISHED | {"pose.finished", "pose.records", "pose.follow",
 METHODS = STARTS | MIXTURES | {"pose.recovery", "pose.methods"}
 POSE = METHODS | FOLLOWING | {"pose.backward", "pose.clear_views", "pose.keypoint_tracks", "pose.occluders", "pose.registry"}
 POSE |= {"pose.contacts", "pose.keypoint_views", "pose.limb_colors", "pose.second_pass", "pose.trust", "pose.trust_model"}
-POSE |= {"pose.chain", "pose.turned_cameras"}
+POSE |= {"pose.chain", "pose.turned_back", "pose.turned_by_keypoints", "pose.turned_by_silhouettes"}
 METRICS = IO | {"metrics"}
 VIEW = VOXELS | {"body", "view"}
 EVERYTHING = POSE | METRICS | VIEW | {"motion", "check", "synthetic", "plugins"}
@@ -74,8 +74,10 @@ MAY_IMPORT = {
     "pose.limb_colors": FOLLOWING | MIXTURES | {"pose.clear_views", "pose.second_pass", "pose.trust"},
     "pose.backward": FOLLOWING | MIXTURES | {"pose.backward", "pose.contacts", "pose.limb_colors", "pose.occluders", "pose.second_pass"},
     "pose.contacts": BODY | IO,
-    "pose.turned_cameras": OBJECTIVES | {"pose.keypoint_cues", "pose.keypoint_sides"},
-    "pose.chain": FOLLOWING | {"pose.backward", "pose.keypoint_views", "pose.trust", "pose.turned_cameras"},
+    "pose.turned_by_keypoints": OBJECTIVES | {"pose.keypoint_cues"},
+    "pose.turned_by_silhouettes": VOXELS,
+    "pose.turned_back": OBJECTIVES | {"pose.keypoint_cues", "pose.turned_by_keypoints", "pose.turned_by_silhouettes"},
+    "pose.chain": FOLLOWING | {"pose.backward", "pose.keypoint_views", "pose.trust", "pose.turned_back"},
     "pose.clear_views": FOLLOWING,
     "pose.trust": FOLLOWING | {"pose.clear_views", "pose.trust_model"},
     "pose.trust_model": set(),

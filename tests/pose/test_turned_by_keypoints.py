@@ -11,12 +11,16 @@ from scipy.spatial.transform import Rotation
 
 import hmc
 from hmc.camera.model import Rig, project
+from hmc.camera.turned_cameras import turn_back
 from hmc.io.keypoints import open_keypoints
 from hmc.io.results import read_joints
 from hmc.pose.keypoint_cues import learn_scatter
 from hmc.pose.keypoint_tracks import tracks_of_keypoints
-from hmc.pose.turned_cameras import turn_back, turned_back, turned_cameras
+from hmc.pose.turned_back import turned_back
+from hmc.pose.turned_by_keypoints import turned_by_keypoints
 from hmc.synthetic.keypoints import write_keypoints
+from hmc.voxels.hulls import FrontendSettings
+from hmc.voxels.run_options import RunOptions
 
 TINY = Path(__file__).resolve().parents[2] / "data" / "synthetic" / "tiny"
 
@@ -45,7 +49,7 @@ def opened(folder, turn=(0.0, 0.0, 0.0), camera=2, cameras=()):
 def test_a_camera_that_has_turned_is_found_and_turned_back(folder, degrees, cameras):
     turn = np.radians(degrees) * np.array([0.6, -0.48, 0.64])
     recording, tracks, cues = opened(folder, turn, 1, cameras)
-    (found,) = turned_cameras(recording.rig, tracks, cues)
+    (found,) = turned_by_keypoints(recording.rig, tracks, cues)
     assert found.name == recording.rig[1].name and found.after_m < 0.65 * found.before_m
     true = hmc.open_recording(folder, cameras or None).rig
     mended = turn_back(recording.rig, [found])
@@ -61,12 +65,12 @@ def test_a_camera_that_has_turned_is_found_and_turned_back(folder, degrees, came
 def test_where_nothing_has_turned_nothing_is_turned(folder):
     for cameras in ((), ("cam_00", "cam_02", "cam_04", "cam_05")):
         recording, tracks, cues = opened(folder, cameras=cameras)
-        assert turned_cameras(recording.rig, tracks, cues) == []
+        assert turned_by_keypoints(recording.rig, tracks, cues) == []
 
 
 def test_three_cameras_do_not_tell_which_of_them_has_turned(folder):
     recording, tracks, cues = opened(folder, (0.0, 0.05, 0.0), 1, ("cam_00", "cam_02", "cam_04"))
-    assert turned_cameras(recording.rig, tracks, cues) == []
+    assert turned_by_keypoints(recording.rig, tracks, cues) == []
 
 
 def test_detections_that_are_off_anyhow_are_no_camera_that_has_turned(folder):
@@ -77,17 +81,18 @@ def test_detections_that_are_off_anyhow_are_no_camera_that_has_turned(folder):
         return tuple(given + (40 if c == 3 else 0) * np.append(rng.normal(size=2), 0.0) for c, given in enumerate(people))
 
     spoilt = replace(cues, source=cues.source.changed(wild))
-    assert turned_cameras(recording.rig, tracks, spoilt) == []
+    assert turned_by_keypoints(recording.rig, tracks, spoilt) == []
 
 
 def test_poses_are_found_with_the_camera_turned_back_or_kept_as_asked(folder):
     recording, tracks, cues = opened(folder, (0.0, 0.0, 0.03), 4)
-    mended, again, lines = turned_back(recording, tracks, cues)
+    keypoints = open_keypoints(recording)
+    mended, again, lines = turned_back(recording, tracks, RunOptions(), keypoints)
     assert len(lines) == 1 and "'cam_04' has turned by 1.7 deg" in lines[0] and "calibrate it anew" in lines[0]
     assert again.scatter_m[4].mean() < cues.scatter_m[4].mean()
-    kept, same, lines = turned_back(recording, tracks, cues, keep=True)
-    assert kept is recording and same is cues and "kept as it is" in lines[0]
-    assert turned_back(mended, tracks, again)[2] == []
+    kept, same, lines = turned_back(recording, tracks, RunOptions(FrontendSettings(exclude=False)), keypoints)
+    assert kept is recording and np.array_equal(same.scatter_m, cues.scatter_m) and "kept as it is" in lines[0]
+    assert turned_back(mended, tracks, RunOptions(), keypoints)[2] == []
 
 
 def test_a_detector_that_is_wrong_for_two_thirds_of_a_run_is_no_camera_that_has_turned(folder):
@@ -98,12 +103,12 @@ def test_a_detector_that_is_wrong_for_two_thirds_of_a_run_is_no_camera_that_has_
         wrong = first <= index < first + 2 * recording.n_frames // 3
         return tuple(given + np.array([0.0, 25.0, 0.0]) * (wrong and c == 3) for c, given in enumerate(people))
 
-    assert turned_cameras(recording.rig, tracks, replace(cues, source=cues.source.changed(displaced))) == []
+    assert turned_by_keypoints(recording.rig, tracks, replace(cues, source=cues.source.changed(displaced))) == []
     always = replace(
         cues,
         source=cues.source.changed(lambda index, people: tuple(p + np.array([0.0, 25.0, 0.0]) * (c == 3) for c, p in enumerate(people))),
     )
-    assert [one.name for one in turned_cameras(recording.rig, tracks, always)] == [recording.rig[3].name]
+    assert [one.name for one in turned_by_keypoints(recording.rig, tracks, always)] == [recording.rig[3].name]
 
 
 @pytest.mark.slow
