@@ -29,6 +29,7 @@ from hmc.pose.follow import FollowOptions, PosedPeople, follow
 from hmc.pose.method import PoseMethod
 from hmc.pose.methods.annealed import annealed_method
 from hmc.pose.steps.presets import PRESETS
+from hmc.pose.turned_back import turned_back
 from hmc.synthetic.rigs import RIGS
 from hmc.tracking.resumable import track_recording
 from hmc.voxels.hulls import FrontendSettings, stream_masks
@@ -235,6 +236,7 @@ def _run(parameters: Parameters, inputs: Inputs, recording: Recording) -> tuple[
     method, options = method_without(PARTS[without]), chain_options(parameters)
     seen = followed(parameters, inputs, recording, without)
     tracks, run = seen.tracks, seen.run
+    recording, _, _ = turned_back(recording, tracks, run)
 
     def pose(own: Path) -> PosedPeople:
         own.mkdir(exist_ok=True)

@@ -31,7 +31,7 @@ from hmc.io.results import PoseTable, TrackTable
 from hmc.landmarks import LANDMARKS
 from hmc.pose.backward import backward
 from hmc.pose.follow import follow
-from hmc.pose.keypoint_cues import KeypointCues, learn_scatter, with_keypoints
+from hmc.pose.keypoint_cues import KeypointCues, with_keypoints
 from hmc.pose.turned_back import turned_back
 from hmc.pose.views.keypoint_pose import landmarks_seen
 from hmc.pose.views.person_view import PersonView
@@ -182,11 +182,10 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
     some = opened(inputs, parameters["recording"], parameters["cameras"])
     recording = open_recording(some.path, some.rig.names, frames=parameters["frames"] or None)
     truth, fault, seed = truth_in(recording), parameters["fault"], parameters["repeat"]
-    people, cues = followed(parameters, inputs, recording), None
+    people, source = followed(parameters, inputs, recording), None
     if needs_keypoints:
         source = with_fault(_keypoints(inputs, parameters["recording"], recording), recording, truth, fault, seed)
-        cues = learn_scatter(recording.rig, people.tracks, source, recording.fps)
-        recording, cues, _ = turned_back(recording, people.tracks, cues)
+    recording, cues, _ = turned_back(recording, people.tracks, people.run, source)
     poses = way(parameters, Footage(recording, people, cues))
     return scored_poses(recording, poses, truth) | {"faulty": [] if fault == NO_FAULT else list(fault_frames(recording, fault, seed))}
 

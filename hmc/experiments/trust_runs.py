@@ -22,6 +22,7 @@ from hmc.pose.backward import backward
 from hmc.pose.clear_views import kept_borne_out
 from hmc.pose.follow import PosedPeople, follow
 from hmc.pose.trust import trust_features
+from hmc.pose.turned_back import turned_back
 
 __all__ = ["BOTH", "FAMILY", "FIRST", "SHUFFLED", "VERSION", "cell", "results_of", "some_cameras"]
 
@@ -64,6 +65,7 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
     # Others keep what they share under the number of their cameras, which are not these.
     which = f"{len(names)}-even-from-{parameters['start']}"
     seen = followed({**parameters, "cameras": which}, inputs, recording)
+    recording, _, _ = turned_back(recording, seen.tracks, seen.run)
     method, options = method_without(PARTS[WHOLE]), chain_options(parameters)
     first = follow(recording, seen.tracks, method, options, seen.run)
     return results_of(recording, truth, first, backward(recording, seen.tracks, method, first, options, seen.run), seen)

@@ -1,8 +1,8 @@
 """Cameras that have turned since they were calibrated, as silhouettes tell: by where those of each pair of cameras end.
 
-People's silhouettes in two cameras end at the same two planes through both (`hmc.camera.tangency`), whatever the people look like: two distances
-a pair and frame, and no hull that one camera has cut short. A frame in which a camera does not show everybody does not count
-for it; furniture, shadows and what segmentation loses are mended by no turn.
+People's silhouettes in two cameras end at the same two planes through both (`hmc.camera.tangency`), whatever the people look like: two
+distances a pair and frame, and no hull that one camera has cut short. A frame in which a camera does not show everybody does not count for
+it; furniture, shadows and what segmentation loses are mended by no turn.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ __all__ = ["people_outlines", "turned_by_silhouettes"]
 #: Frames that are asked, at most, well spread; and so many planes that touch what a camera shows tell.
 FRAMES, LEAST_PLANES = 40, 60
 #: A camera has turned that is off by more than this, metres, in the median of its planes, and no longer when it is turned back. Of well
-#: calibrated rigs it is 1 to 5 mm, where furniture hides somebody or segmentation loses clothes up to 8; one that is late is mended in part.
-#: A plane that is off by more than the second counts ever less.
+#: calibrated rigs it is 1 to 5 mm, where furniture hides somebody or segmentation loses clothes up to 8; one that is late is mended in
+#: part. A plane that is off by more than the second counts ever less.
 OFF_M, WIDE_M = 0.012, 0.01
 #: Above and below the middle of a tracked person, metres, a silhouette on the line between is theirs.
 REACH_M, STEPS = 0.4, 9

@@ -21,14 +21,9 @@ PAIRS = list(combinations(range(4), 2))
 def ring(rng, n=4):
     """Cameras around the origin, of different lenses and heights."""
     angles = np.linspace(0, 2 * np.pi, n, endpoint=False) + rng.uniform(-0.3, 0.3, n)
-    return Rig(
-        tuple(
-            look_at(
-                f"cam_{c:02d}", (640, 480), (3 * np.cos(a), 3 * np.sin(a), rng.uniform(1, 2.5)), (0, 0, 1), 60, (rng.uniform(-0.2, 0), 0, 0, 0)
-            )
-            for c, a in enumerate(angles)
-        )
-    )
+    places = np.column_stack([3 * np.cos(angles), 3 * np.sin(angles), rng.uniform(1, 2.5, n)])
+    lenses = np.pad(rng.uniform(-0.2, 0, (n, 1)), ((0, 0), (0, 3)))
+    return Rig(tuple(look_at(f"cam_{c:02d}", (640, 480), places[c], (0, 0, 1), 60, lenses[c]) for c in range(n)))
 
 
 def bodies(rng, n_frames, n_points=40):

@@ -44,9 +44,10 @@ def opened(masks, turn=None, camera=1, cameras=()):
     """The recording with one camera calibrated as before it was turned, where people are, and the run that kept the silhouettes."""
     recording = hmc.open_recording(TINY, cameras or None)
     if turn is not None:
-        back, rig = Rotation.from_rotvec(turn).as_matrix(), list(recording.rig)
-        rig[camera] = replace(rig[camera], rotation=rig[camera].rotation @ back.T, translation=-rig[camera].rotation @ back.T @ rig[camera].centre)
-        recording = replace(recording, rig=Rig(tuple(rig)))
+        right = recording.rig[camera]
+        rotation = right.rotation @ Rotation.from_rotvec(turn).as_matrix().T
+        wrong = replace(right, rotation=rotation, translation=-rotation @ right.centre)
+        recording = replace(recording, rig=Rig(tuple(wrong if c == camera else one for c, one in enumerate(recording.rig))))
     return recording, read_centroids(TINY / "truth" / "centroids.csv"), RunOptions(masks=masks, key="key")
 
 
