@@ -347,7 +347,7 @@ def view(found: PosedPeople | TrackTable, recording: Recording, out: str | Path,
     from hmc.view.mosaic import Result, with_bodies
     from hmc.view.write import write_view
 
-    result = Result(tracks=found) if isinstance(found, TrackTable) else with_bodies(Result(found.poses), found.states)
+    result = Result(tracks=found) if isinstance(found, TrackTable) else with_bodies(Result(found.poses, turned=found.turned), found.states)
     write_view(out, recording, result, frames)
 
 

@@ -8,7 +8,7 @@ angle's part of bundle adjustment.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -119,19 +119,19 @@ def with_turns(rays: np.ndarray, turns: Mapping[int, np.ndarray]) -> np.ndarray:
     return rays
 
 
-def turn_back(rig: Rig, found: Iterable[TurnedCamera]) -> Rig:
-    """The rig with these cameras turned back about their centres.
+def turn_back(rig: Rig, turns: Mapping[str, np.ndarray]) -> Rig:
+    """The rig with cameras turned back about their centres.
 
     Parameters
     ----------
     rig : Rig
-    found : iterable of TurnedCamera
+    turns : mapping of str to ndarray, shape (3,)
+        Rotation vectors by the cameras' names, as of `TurnedCamera`.
     """
-    turns = {one.name: Rotation.from_rotvec(one.turn).as_matrix() for one in found}
     return Rig(tuple(_rotated(camera, turns[camera.name]) if camera.name in turns else camera for camera in rig))
 
 
 def _rotated(camera: Camera, turn: np.ndarray) -> Camera:
-    """A camera with its lines of sight turned by a matrix about its centre."""
-    rotation = camera.rotation @ turn.T
+    """A camera with its lines of sight turned by a rotation vector about its centre."""
+    rotation = camera.rotation @ Rotation.from_rotvec(turn).as_matrix().T
     return replace(camera, rotation=rotation, translation=-rotation @ camera.centre)

@@ -173,12 +173,14 @@ def _feet(args: argparse.Namespace, persons) -> dict[str, float]:
 
 def _in_images(args: argparse.Namespace, estimated, true_poses, truth_images: Path | None, selected):
     """Scores in images, against marked landmarks or the projected true joints."""
+    from hmc.camera.turned_cameras import turn_back
+    from hmc.io.camera_turns import read_turns
     from hmc.io.recording import read_rig
     from hmc.metrics.scores.images import THRESHOLDS_PX, evaluate_images, image_landmarks, read_image_landmarks
 
     if args.recording is None:
         raise InputError("scores in images need the RECORDING, for its calibration")
-    rig = read_rig(args.recording)
+    rig = turn_back(read_rig(args.recording), read_turns(args.directory))
     if truth_images is not None:
         truth = selected(read_image_landmarks(truth_images, rig.names))
     else:

@@ -236,7 +236,7 @@ def _run(parameters: Parameters, inputs: Inputs, recording: Recording) -> tuple[
     method, options = method_without(PARTS[without]), chain_options(parameters)
     seen = followed(parameters, inputs, recording, without)
     tracks, run = seen.tracks, seen.run
-    recording, _, _ = turned_back(recording, tracks, run)
+    recording = turned_back(recording, tracks, run).recording
 
     def pose(own: Path) -> PosedPeople:
         own.mkdir(exist_ok=True)

@@ -185,7 +185,8 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
     people, source = followed(parameters, inputs, recording), None
     if needs_keypoints:
         source = with_fault(_keypoints(inputs, parameters["recording"], recording), recording, truth, fault, seed)
-    recording, cues, _ = turned_back(recording, people.tracks, people.run, source)
+    mended = turned_back(recording, people.tracks, people.run, source)
+    recording, cues = mended.recording, mended.cues
     poses = way(parameters, Footage(recording, people, cues))
     return scored_poses(recording, poses, truth) | {"faulty": [] if fault == NO_FAULT else list(fault_frames(recording, fault, seed))}
 

@@ -65,7 +65,7 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
     # Others keep what they share under the number of their cameras, which are not these.
     which = f"{len(names)}-even-from-{parameters['start']}"
     seen = followed({**parameters, "cameras": which}, inputs, recording)
-    recording, _, _ = turned_back(recording, seen.tracks, seen.run)
+    recording = turned_back(recording, seen.tracks, seen.run).recording
     method, options = method_without(PARTS[WHOLE]), chain_options(parameters)
     first = follow(recording, seen.tracks, method, options, seen.run)
     return results_of(recording, truth, first, backward(recording, seen.tracks, method, first, options, seen.run), seen)

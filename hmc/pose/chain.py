@@ -12,7 +12,7 @@ from hmc.pose.follow import FollowOptions, PosedPeople, follow
 from hmc.pose.keypoint_views import with_keypoint_views
 from hmc.pose.method import PoseMethod
 from hmc.pose.trust import with_trust
-from hmc.pose.turned_back import turned_back
+from hmc.pose.turned_back import TurnedBack, turned_back
 from hmc.pose.views.recent import RecentViews
 from hmc.voxels.run_options import RunOptions
 
@@ -66,12 +66,13 @@ def finished_poses(
     InputError
         When the voxels are too many for the memory, or what the method needs is not given.
     """
-    cues, lines = None, list[str]()
-    if tracks is not None:
-        recording, cues, lines = turned_back(recording, tracks, runs.forward, keypoints if method.keypoints else None)
+    mended = (
+        TurnedBack(recording) if tracks is None else turned_back(recording, tracks, runs.forward, keypoints if method.keypoints else None)
+    )
+    recording, cues = mended.recording, mended.cues
     options = replace(options, keypoints=cues, recent=RecentViews())
     people = follow(recording, tracks, method, options, runs.forward)
-    people = replace(people, notes=(*lines, *people.notes))
+    people = replace(people, notes=(*mended.notes, *people.notes), turned=mended.turns)
     if tracks is not None:
         people = backward(recording, tracks, method, people, options, runs.backward)
     if smooth_s:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
@@ -22,6 +22,7 @@ from hmc.body.model import BodyModel
 from hmc.body.proportions import make_bodies
 from hmc.errors import InputError
 from hmc.io.camera_faults import Faults, sentence
+from hmc.io.camera_turns import TURNED_CAMERAS, write_turns
 from hmc.io.detections import DetectionTable
 from hmc.io.evidence import write_evidence
 from hmc.io.fits import write_fits
@@ -74,6 +75,8 @@ class PosedPeople(FinishedPeople):
         one pass.
     evidence : mapping of str to ndarray, shape (n, 15), or None
         What trust rests on (`hmc.io.evidence.EVIDENCE`); None where silhouettes were not asked.
+    turned : mapping of str to ndarray, shape (3,)
+        Cameras that were turned back before poses were found (`hmc.pose.turned_back`).
     """
 
     poses: PoseTable
@@ -85,6 +88,7 @@ class PosedPeople(FinishedPeople):
     fps: float | None = None
     passes_apart: np.ndarray | None = None
     evidence: Mapping[str, np.ndarray] | None = None
+    turned: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     @property
     def frames(self) -> np.ndarray:
@@ -149,6 +153,9 @@ class PosedPeople(FinishedPeople):
         if any(self.details):
             write_fits(folder / "fits.csv", self.frames.tolist(), self.persons.tolist(), self.status, self.details)
             others.remove("fits.csv")
+        if self.turned:
+            write_turns(folder, self.turned)
+            others.remove(TURNED_CAMERAS)
         write_pose(folder / "pose.npz", replace(self.states, costs=self.costs, fps=self.fps))
         # Last: a disk that is full takes nothing away.
         for name in others:

@@ -5,10 +5,14 @@ Silhouettes tell first, as every recording has them; what keypoints tell, they t
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
-from hmc.camera.turned_cameras import TurnedCamera, turn_back
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from hmc.camera.turned_cameras import TurnedCamera
+from hmc.io.camera_turns import as_posed
 from hmc.io.keypoints import KeypointSource
 from hmc.io.recording import Recording
 from hmc.io.results import TrackTable
@@ -17,13 +21,32 @@ from hmc.pose.turned_by_keypoints import turned_by_keypoints
 from hmc.pose.turned_by_silhouettes import turned_by_silhouettes
 from hmc.voxels.run_options import RunOptions
 
-__all__ = ["turned_back"]
+__all__ = ["TurnedBack", "turned_back"]
 
 
-def turned_back(
-    recording: Recording, tracks: TrackTable, run: RunOptions, keypoints: KeypointSource | None = None
-) -> tuple[Recording, KeypointCues | None, list[str]]:
-    """The recording with cameras turned back that have turned, what its keypoints tell then, and a line on each such camera.
+@dataclass(frozen=True)
+class TurnedBack:
+    """A recording whose cameras look where they did when its videos were made.
+
+    Parameters
+    ----------
+    recording : Recording
+    cues : KeypointCues or None
+        What its keypoints tell by these cameras.
+    turns : mapping of str to ndarray, shape (3,)
+        Rotation vectors, world, radians, by which cameras were turned back about their centres.
+    notes : tuple of str
+        A line on each camera that has turned.
+    """
+
+    recording: Recording
+    cues: KeypointCues | None = None
+    turns: Mapping[str, np.ndarray] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+
+def turned_back(recording: Recording, tracks: TrackTable, run: RunOptions, keypoints: KeypointSource | None = None) -> TurnedBack:
+    """Turn cameras back that have turned since they were calibrated.
 
     Parameters
     ----------
@@ -36,21 +59,27 @@ def turned_back(
     """
     keep = run.frontend is not None and not run.frontend.exclude
     found = turned_by_silhouettes(recording, tracks, run)
-    mended, lines = recording if keep else _turned(recording, found), [_line(one, keep) for one in found]
-    if keypoints is None:
-        return mended, None, lines
-    cues = learn_scatter(mended.rig, tracks, keypoints, mended.fps, run.workers)
-    if keep and found:  # they would tell the same
-        return mended, cues, lines
-    found = turned_by_keypoints(mended.rig, tracks, cues, run.workers)
-    if found and not keep:
-        mended = _turned(mended, found)
-        cues = learn_scatter(mended.rig, tracks, keypoints, mended.fps, run.workers)
-    return mended, cues, lines + [_line(one, keep) for one in found]
+    turns = {} if keep else _added({}, found)
+    notes, cues = [_line(one, keep) for one in found], None
+    if keypoints is not None:
+        rig = as_posed(recording, turns).rig
+        cues = learn_scatter(rig, tracks, keypoints, recording.fps, run.workers)
+        # Of cameras that are kept as they are, keypoints tell the same again.
+        more = [] if keep and found else turned_by_keypoints(rig, tracks, cues, run.workers)
+        notes += [_line(one, keep) for one in more]
+        if more and not keep:
+            turns = _added(turns, more)
+            cues = learn_scatter(as_posed(recording, turns).rig, tracks, keypoints, recording.fps, run.workers)
+    return TurnedBack(as_posed(recording, turns), cues, turns, tuple(notes))
 
 
-def _turned(recording: Recording, found: Sequence[TurnedCamera]) -> Recording:
-    return replace(recording, rig=turn_back(recording.rig, found)) if found else recording
+def _added(turns: Mapping[str, np.ndarray], found: Sequence[TurnedCamera]) -> dict[str, np.ndarray]:
+    """Turns with those that were found after them."""
+    all_turns = dict(turns)
+    for one in found:
+        before = Rotation.from_rotvec(all_turns.get(one.name, np.zeros(3)))
+        all_turns[one.name] = (Rotation.from_rotvec(one.turn) * before).as_rotvec()
+    return all_turns
 
 
 def _line(one: TurnedCamera, keep: bool) -> str:

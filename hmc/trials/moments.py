@@ -11,6 +11,7 @@ import numpy as np
 
 from hmc.camera.coverage import in_view
 from hmc.camera.model import Camera, project
+from hmc.io.camera_turns import as_posed
 from hmc.io.files import atomic_write
 from hmc.io.recording import Recording, iterate_frames, only_cameras, spread_frames
 from hmc.view.mosaic import Person, Result, draw_people, people_in
@@ -51,6 +52,7 @@ def write_moments(folder: Path, recording: Recording, result: Result) -> None:
     frames = moments_of(result)
     if not frames:
         return
+    recording = as_posed(recording, result.turned)
     people = {frame: [one for one in people_in(result, frame) if one.landmarks is not None] for frame in frames}
     shown = only_cameras(recording, choose_cameras(recording, list(people.values())))
     for frame in frames:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import cv2
@@ -16,6 +16,7 @@ from hmc.body.model import BodyModel
 from hmc.body.proportions import make_bodies
 from hmc.camera.model import Camera
 from hmc.errors import InputError
+from hmc.io.camera_turns import read_turns
 from hmc.io.keypoints import KeypointSource
 from hmc.io.masks import MaskStep
 from hmc.io.recording import Frame, Recording, iterate_frames
@@ -66,13 +67,14 @@ class Person:
 
 @dataclass(frozen=True)
 class Result:
-    """A result as far as it was written: poses, tracks, state vectors with the persons' bodies, the run's silhouettes."""
+    """A result as far as it was written: poses, tracks, states with the bodies, the run's silhouettes, cameras that it turned back."""
 
     poses: PoseTable | None = None
     tracks: TrackTable | None = None
     states: PoseStates | None = None
     bodies: Mapping[int, BodyModel] | None = None
     silhouettes: KeptSilhouettes | None = None
+    turned: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     @property
     def frames(self) -> np.ndarray:
@@ -97,7 +99,7 @@ class Layout:
 
 
 def read_result(directory: str | Path) -> Result:
-    """Read what there is of `joints.csv`, `tracks.csv` and `pose.npz`.
+    """Read what there is of `joints.csv`, `tracks.csv` and `pose.npz`, and of cameras that were turned back.
 
     Raises
     ------
@@ -110,7 +112,7 @@ def read_result(directory: str | Path) -> Result:
     if poses is None and tracks is None:
         raise InputError(f"{directory}: neither joints.csv nor tracks.csv; give the folder that `hmc pose` or `hmc track` wrote")
     states = read_pose(directory / "pose.npz") if (directory / "pose.npz").exists() else None
-    result = Result(poses, tracks, silhouettes=open_silhouettes(directory))
+    result = Result(poses, tracks, silhouettes=open_silhouettes(directory), turned=read_turns(directory))
     if states is not None and N_CANTON <= len(states.dof_names) < N_DOF and states.dof_names == DOF_NAMES[: len(states.dof_names)]:
         # Of before the trunk bent, or the ankles did: their joints, which come last, are at 0.
         states = replace(states, dof_names=DOF_NAMES, states=np.pad(states.states, ((0, 0), (0, N_DOF - len(states.dof_names)))))

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 
 from hmc.errors import InputError
+from hmc.io.camera_turns import as_posed
 from hmc.io.files import atomic_write
 from hmc.io.keypoints import open_keypoints
 from hmc.io.recording import Recording
@@ -58,7 +59,7 @@ def write_view(
     InputError
         When the ending is of neither, a frame is not in the selection, keypoints cannot be read, or the file cannot be written.
     """
-    path, (report, progress) = Path(path), how
+    path, (report, progress), recording = Path(path), how, as_posed(recording, result.turned)
     suffix = path.suffix.lower()
     if suffix not in PICTURES + VIDEOS + PAGES:
         raise InputError(f"{path}: must end in .png (a picture), .mp4 (a video), .html (a page to turn) or .rrd (for Rerun)")

@@ -52,7 +52,7 @@ def test_a_camera_that_has_turned_is_found_and_turned_back(folder, degrees, came
     (found,) = turned_by_keypoints(recording.rig, tracks, cues)
     assert found.name == recording.rig[1].name and found.after_m < 0.65 * found.before_m
     true = hmc.open_recording(folder, cameras or None).rig
-    mended = turn_back(recording.rig, [found])
+    mended = turn_back(recording.rig, {found.name: found.turn})
     assert_allclose(mended.centres, true.centres, atol=1e-9)
     joints = read_joints(folder / "truth" / "joints.csv").positions[::5].reshape(-1, 3)
     off = [np.linalg.norm(project(rig[1], joints)[0] - project(true[1], joints)[0], axis=1).mean() for rig in (recording.rig, mended)]
@@ -87,12 +87,12 @@ def test_detections_that_are_off_anyhow_are_no_camera_that_has_turned(folder):
 def test_poses_are_found_with_the_camera_turned_back_or_kept_as_asked(folder):
     recording, tracks, cues = opened(folder, (0.0, 0.0, 0.03), 4)
     keypoints = open_keypoints(recording)
-    mended, again, lines = turned_back(recording, tracks, RunOptions(), keypoints)
-    assert len(lines) == 1 and "'cam_04' has turned by 1.7 deg" in lines[0] and "calibrate it anew" in lines[0]
-    assert again.scatter_m[4].mean() < cues.scatter_m[4].mean()
-    kept, same, lines = turned_back(recording, tracks, RunOptions(FrontendSettings(exclude=False)), keypoints)
-    assert kept is recording and np.array_equal(same.scatter_m, cues.scatter_m) and "kept as it is" in lines[0]
-    assert turned_back(mended, tracks, RunOptions(), keypoints)[2] == []
+    mended = turned_back(recording, tracks, RunOptions(), keypoints)
+    assert len(mended.notes) == 1 and "'cam_04' has turned by 1.7 deg" in mended.notes[0] and "calibrate it anew" in mended.notes[0]
+    assert mended.cues.scatter_m[4].mean() < cues.scatter_m[4].mean() and list(mended.turns) == ["cam_04"]
+    kept = turned_back(recording, tracks, RunOptions(FrontendSettings(exclude=False)), keypoints)
+    assert kept.recording is recording and np.array_equal(kept.cues.scatter_m, cues.scatter_m) and "kept as it is" in kept.notes[0]
+    assert turned_back(mended.recording, tracks, RunOptions(), keypoints).notes == ()
 
 
 def test_a_detector_that_is_wrong_for_two_thirds_of_a_run_is_no_camera_that_has_turned(folder):

@@ -10,8 +10,11 @@ from scipy.spatial.transform import Rotation
 import hmc
 from hmc.camera.model import Rig
 from hmc.camera.turned_cameras import turn_back
+from hmc.errors import InputError
+from hmc.io.camera_turns import TURNED_CAMERAS, as_posed, read_turns, write_turns
 from hmc.io.masks import keep_masks, kept_masks
-from hmc.io.results import TrackTable, read_centroids
+from hmc.io.result_files import BESIDE
+from hmc.io.results import TrackTable, read_centroids, read_joints
 from hmc.pose.turned_back import turned_back
 from hmc.pose.turned_by_silhouettes import people_outlines, turned_by_silhouettes
 from hmc.voxels.hulls import FrontendSettings, stream_masks
@@ -63,7 +66,7 @@ def few(masks, tmp_path):
 
 def left(rig, found, true, camera):
     """Degrees by which a camera is off when it is turned back."""
-    turned = turn_back(rig, found)[camera]
+    turned = turn_back(rig, {one.name: one.turn for one in found})[camera]
     return np.degrees(Rotation.from_matrix(turned.rotation @ true[camera].rotation.T).magnitude())
 
 
@@ -164,9 +167,44 @@ def _with_blob(mask):
 
 def test_poses_are_found_with_the_camera_turned_back_or_kept_as_asked(masks):
     recording, tracks, run = opened(masks, TURN)
-    mended, cues, lines = turned_back(recording, tracks, run)
-    assert cues is None and len(lines) == 1 and "'cam_01' has turned by 1." in lines[0] and "silhouettes end beside" in lines[0]
-    assert left(mended.rig, [], hmc.open_recording(TINY).rig, 1) < 0.25
-    kept, _, lines = turned_back(recording, tracks, replace(run, frontend=FrontendSettings(exclude=False)))
-    assert kept is recording and "kept as it is" in lines[0]
-    assert turned_back(mended, tracks, run)[2] == []
+    mended = turned_back(recording, tracks, run)
+    assert mended.cues is None and len(mended.notes) == 1
+    assert "'cam_01' has turned by 1." in mended.notes[0] and "silhouettes end beside" in mended.notes[0]
+    assert left(mended.recording.rig, [], hmc.open_recording(TINY).rig, 1) < 0.25
+    kept = turned_back(recording, tracks, replace(run, frontend=FrontendSettings(exclude=False)))
+    assert kept.recording is recording and not kept.turns and "kept as it is" in kept.notes[0]
+    assert turned_back(mended.recording, tracks, run).notes == ()
+
+
+def test_pictures_are_drawn_by_the_cameras_with_which_poses_were_found(masks, tmp_path):
+    recording, tracks, run = opened(masks, TURN)
+    turns = turned_back(recording, tracks, run).turns
+    write_turns(tmp_path, turns)
+    assert (tmp_path / TURNED_CAMERAS).name in BESIDE
+    again = read_turns(tmp_path)
+    assert list(again) == ["cam_01"]
+    assert left(as_posed(recording, again).rig, [], hmc.open_recording(TINY).rig, 1) < 0.25
+    assert read_turns(tmp_path / "none") == {} and as_posed(recording, {}) is recording
+
+
+@pytest.mark.parametrize(
+    "text", ["cam_01 = 3", 'cam_01 = ["a", 0, 0]', "cam_01 = [0.1, 0.2]", "cam_01 = [nan, 0, 0]", "cam_01 = [true, 0, 0]"]
+)
+def test_turns_that_are_none_are_told_with_their_file(tmp_path, text):
+    (tmp_path / TURNED_CAMERAS).write_text(text)
+    with pytest.raises(InputError, match=r"turned_cameras\.toml: `cam_01` must be a rotation vector"):
+        read_turns(tmp_path)
+
+
+@pytest.mark.slow
+def test_a_turned_camera_costs_poses_little(tmp_path):
+    recording, _, _ = opened(None, TURN)
+    truth = read_joints(TINY / "truth" / "joints.csv")
+    right, wrong = (hmc.pose(one) for one in (hmc.open_recording(TINY), recording))
+    assert not right.turned and list(wrong.turned) == ["cam_01"]
+    errors = [1000 * np.linalg.norm(one.positions - truth.positions[one.frames], axis=-1).mean() for one in (right, wrong)]
+    assert errors[1] < errors[0] + 3
+    wrong.save(tmp_path)
+    assert list(read_turns(tmp_path)) == ["cam_01"]
+    right.save(tmp_path)
+    assert read_turns(tmp_path) == {}
