@@ -1,4 +1,4 @@
-"""What a camera costs that has turned since it was calibrated, as it is and turned back: recordings with truth, calibrations that are wrong.
+"""What a camera costs that has turned since it was calibrated, as it is and turned back: recordings with truth and a wrong calibration.
 
     python docs/turned_cameras.py data/r1 --turned cam_02 --frames 90
     python docs/turned_cameras.py data/r1 --turned cam_02 --frames 90 --cameras cam_00 cam_02 cam_04 cam_06
