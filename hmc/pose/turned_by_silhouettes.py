@@ -26,10 +26,10 @@ __all__ = ["people_outlines", "turned_by_silhouettes"]
 
 #: Frames that are asked, at most, well spread; and so many planes that touch what a camera shows tell.
 FRAMES, LEAST_PLANES = 40, 60
-#: A camera has turned that is off by more than this, metres, in the median of its planes, and no longer when it is turned back. Of well
-#: calibrated rigs it is 1 to 5 mm, where furniture hides somebody or segmentation loses clothes up to 8; one that is late is mended in
-#: part. A plane that is off by more than the second counts ever less.
-OFF_M, WIDE_M = 0.012, 0.01
+#: A camera has turned that is off by more than this, metres, in the median of its planes, and by no more than the second when it is turned
+#: back: one that is late is mended in part. Of well calibrated rigs it is 1 to 5 mm, where furniture hides somebody or segmentation loses
+#: clothes up to 8, which no turn mends. A plane that is off by more than the third counts ever less.
+OFF_M, LEFT_M, WIDE_M = 0.006, 0.012, 0.01
 #: Above and below the middle of a tracked person, metres, a silhouette on the line between is theirs.
 REACH_M, STEPS = 0.4, 9
 
@@ -121,4 +121,4 @@ def _turned(rig: Rig, outlines: Outlines) -> list[TurnedCamera]:
 
         return fitted_turn(misses, WIDE_M, rig[c].name, "silhouettes end beside")
 
-    return farthest_off_first(telling, OFF_M, OFF_M, tried)
+    return farthest_off_first(telling, OFF_M, LEFT_M, tried)
