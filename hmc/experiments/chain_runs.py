@@ -21,7 +21,7 @@ from hmc.experiments.markerless_runs import TRACK_VOXEL_M, VOXEL_M, opened
 from hmc.experiments.truth import all_truth, truth_path
 from hmc.io.masks import keep_masks
 from hmc.io.provenance import code_digest
-from hmc.io.recording import Recording, open_recording
+from hmc.io.recording import Recording, for_voxels, open_recording
 from hmc.io.results import PoseTable, TrackTable, read_centroids
 from hmc.metrics.scores import evaluate_pose, evaluate_tracks
 from hmc.pose.backward import backward
@@ -36,8 +36,8 @@ from hmc.voxels.hulls import FrontendSettings, stream_masks
 from hmc.voxels.run_options import RunOptions
 
 __all__ = [
-    "FAMILY", "FEW", "MANY", "PARTS", "VERSION", "WHOLE", "FollowedPeople", "Part", "cell", "chain_options", "followed", "method_without",
-    "name_of", "one_before_many", "scored_poses", "truth_in",
+    "FAMILY", "FEW", "MANY", "PARTS", "VERSION", "WHOLE", "FollowedPeople", "Part", "as_read", "cell", "chain_options", "followed",
+    "method_without", "name_of", "one_before_many", "scored_poses", "truth_in",
 ]  # fmt: skip
 
 FAMILY, VERSION = "chain", 1
@@ -142,10 +142,15 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
         When the recording has no truth, or none in these frames.
     """
     some = opened(inputs, parameters["recording"], parameters["cameras"])
-    recording = open_recording(some.path, some.rig.names, frames=parameters["frames"] or None)
+    recording = as_read(open_recording(some.path, some.rig.names, frames=parameters["frames"] or None))
     truth = truth_in(recording)
     people, counts = _run(parameters, inputs, recording)
     return scored_poses(recording, people.poses, truth) | {"tracks": counts}
+
+
+def as_read(recording: Recording) -> Recording:
+    """The recording with images no larger than the command reads them."""
+    return for_voxels(recording, min(VOXEL_M, TRACK_VOXEL_M))
 
 
 def truth_in(recording: Recording) -> PoseTable:

@@ -19,7 +19,7 @@ from scipy.signal import butter, sosfiltfilt
 
 from hmc.errors import InputError
 from hmc.experiments.chain_runs import PARTS as CHAIN_PARTS
-from hmc.experiments.chain_runs import WHOLE, FollowedPeople, chain_options, followed, method_without, scored_poses, truth_in
+from hmc.experiments.chain_runs import WHOLE, FollowedPeople, as_read, chain_options, followed, method_without, scored_poses, truth_in
 from hmc.experiments.engine.experiment import Parameters, Results
 from hmc.experiments.engine.inputs import Inputs, once, recipe_of
 from hmc.experiments.engine.store import digest
@@ -180,11 +180,12 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
     """
     way, needs_keypoints = WAYS[parameters["cues"]]
     some = opened(inputs, parameters["recording"], parameters["cameras"])
-    recording = open_recording(some.path, some.rig.names, frames=parameters["frames"] or None)
+    recorded = open_recording(some.path, some.rig.names, frames=parameters["frames"] or None)
+    recording = as_read(recorded)
     truth, fault, seed = truth_in(recording), parameters["fault"], parameters["repeat"]
     people, source = followed(parameters, inputs, recording), None
     if needs_keypoints:
-        source = with_fault(_keypoints(inputs, parameters["recording"], recording), recording, truth, fault, seed)
+        source = with_fault(_keypoints(inputs, parameters["recording"], recorded), recorded, truth, fault, seed).reduced(recording.factors)
     mended = turned_back(recording, people.tracks, people.run, source)
     recording, cues = mended.recording, mended.cues
     poses = way(parameters, Footage(recording, people, cues))

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hmc.experiments.chain_runs import PARTS, WHOLE, FollowedPeople, chain_options, followed, method_without, truth_in
+from hmc.experiments.chain_runs import PARTS, WHOLE, FollowedPeople, as_read, chain_options, followed, method_without, truth_in
 from hmc.experiments.engine.experiment import Parameters, Results
 from hmc.experiments.engine.inputs import Inputs
 from hmc.io.recording import Recording, open_recording
@@ -60,7 +60,7 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
     """
     folder = inputs.recording_folder(parameters["recording"])
     names = some_cameras(open_recording(folder).rig.names, parameters["cameras"])
-    recording = open_recording(folder, names, start=parameters["start"], frames=parameters["frames"] or None)
+    recording = as_read(open_recording(folder, names, start=parameters["start"], frames=parameters["frames"] or None))
     truth = truth_in(recording)
     # Others keep what they share under the number of their cameras, which are not these.
     which = f"{len(names)}-even-from-{parameters['start']}"
