@@ -2,7 +2,8 @@
 
 People's silhouettes in two cameras end at the same two planes through both (`hmc.camera.tangency`), whatever the people look like: two
 distances a pair and frame, and no hull that one camera has cut short. A frame in which a camera does not show everybody does not count for
-it; furniture, shadows and what segmentation loses are mended by no turn.
+it; furniture, shadows and what segmentation loses are mended by no turn. Planes through cameras at one height touch heads and soles, and
+tell little of what is to the side; so cameras that are turned back have to leave a larger hull too: the right ones leave the largest.
 """
 
 from __future__ import annotations
@@ -15,11 +16,13 @@ import numpy as np
 
 from hmc.camera.model import Camera, Rig, project
 from hmc.camera.tangency import Outlines, convex_outline, tangent_misses
-from hmc.camera.turned_cameras import LEAST_CAMERAS, TurnedCamera, farthest_off_first, fitted_turn, with_turns
+from hmc.camera.turned_cameras import LEAST_CAMERAS, TurnedCamera, farthest_off_first, fitted_turn, turn_back, with_turns
 from hmc.io.masks import MaskStep, kept_frames
 from hmc.io.recording import Recording, spread_frames
 from hmc.io.results import TrackTable
 from hmc.processes import each_ahead
+from hmc.voxels.carving import carve, make_tables
+from hmc.voxels.grid import VoxelGrid
 from hmc.voxels.run_options import RunOptions
 
 __all__ = ["people_outlines", "turned_by_silhouettes"]
@@ -30,6 +33,8 @@ FRAMES, LEAST_PLANES = 40, 60
 #: back: one that is late is mended in part. Of well calibrated rigs it is 1 to 5 mm, where furniture hides somebody or segmentation loses
 #: clothes up to 8, which no turn mends. A plane that is off by more than the third counts ever less.
 OFF_M, LEFT_M, WIDE_M = 0.006, 0.012, 0.01
+#: Frames of these whose hulls are carved, the side of their voxels, and how far around people they reach, metres.
+HULL_FRAMES, VOXEL_M, AROUND_M = 10, 0.05, 1.2
 #: Above and below the middle of a tracked person, metres, a silhouette on the line between is theirs.
 REACH_M, STEPS = 0.4, 9
 
@@ -60,7 +65,14 @@ def turned_by_silhouettes(recording: Recording, tracks: TrackTable, run: RunOpti
             yield people_outlines(recording.rig, tracks.at(step.index), step)
 
     middles = np.array([np.mean(list(tracks.at(frame).values()), axis=0) for frame in frames])
-    return _turned(recording.rig, _together(list(each_ahead(outlined, frames, run.workers)), middles))
+    found = _turned(recording.rig, _together(list(each_ahead(outlined, frames, run.workers)), middles))
+    if not found:
+        return []
+    some = spread_frames(np.array(frames), HULL_FRAMES)
+    room = _around(recording.room, tracks.positions[np.isin(tracks.frames, some)])
+    rigs = recording.rig, turn_back(recording.rig, {one.name: one.turn for one in found})
+    before, after = (_hull_voxels(rig, room, kept_frames(masks, run.key, some) or ()) for rig in rigs)
+    return found if after > before else []
 
 
 def people_outlines(rig: Rig, people: dict[int, np.ndarray], step: MaskStep) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -104,6 +116,18 @@ def _together(of_frames: list[list[tuple[np.ndarray, np.ndarray]]], middles: np.
         for c, (directions, inside) in enumerate(of_cameras):
             rays[f, c, : len(inside)], whole[f, c, : len(inside)] = directions, inside
     return Outlines(rays, whole, middles)
+
+
+def _around(room: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """The part of a room, (2, 3) metres, in which people at these places are, from floor to ceiling."""
+    low, high = np.maximum(room[0], places.min(axis=0) - AROUND_M), np.minimum(room[1], places.max(axis=0) + AROUND_M)
+    return np.array([[*low[:2], room[0, 2]], [*high[:2], room[1, 2]]])
+
+
+def _hull_voxels(rig: Rig, room: np.ndarray, steps: Iterable[MaskStep]) -> int:
+    """Voxels of the hulls of all frames together."""
+    tables = make_tables(VoxelGrid.from_room(room, VOXEL_M, len(rig)), rig)
+    return sum(int(carve(tables, step.masks).sum()) for step in steps)
 
 
 def _turned(rig: Rig, outlines: Outlines) -> list[TurnedCamera]:

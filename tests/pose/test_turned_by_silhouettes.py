@@ -8,8 +8,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import hmc
+import hmc.pose.turned_by_silhouettes as turned_by_silhouettes_module
 from hmc.camera.model import Rig
-from hmc.camera.turned_cameras import turn_back
+from hmc.camera.turned_cameras import TurnedCamera, turn_back
 from hmc.errors import InputError
 from hmc.io.camera_turns import TURNED_CAMERAS, as_posed, read_turns, write_turns
 from hmc.io.masks import keep_masks, kept_masks
@@ -138,6 +139,17 @@ def test_noise_in_place_of_silhouettes_turns_nothing(masks, tmp_path):
 
     recording, tracks, _ = opened(masks)
     assert turned_by_silhouettes(recording, tracks, changed(masks, tmp_path / "noise", noise)) == []
+
+
+def test_a_turn_that_leaves_a_smaller_hull_is_none(masks, monkeypatch):
+    """As planes through cameras at one height may tell: heads and soles fit, and what is to the side does not."""
+    recording, tracks, run = opened(masks, TURN)
+    aside = TurnedCamera("cam_04", np.array([0.0, 0.0, 0.03]), 0.03, 0.002, "silhouettes end beside")
+    monkeypatch.setattr(turned_by_silhouettes_module, "_turned", lambda rig, outlines: [aside])
+    assert turned_by_silhouettes(recording, tracks, run) == []
+    back = replace(aside, name="cam_01", turn=-TURN)
+    monkeypatch.setattr(turned_by_silhouettes_module, "_turned", lambda rig, outlines: [back])
+    assert turned_by_silhouettes(recording, tracks, run) == [back]
 
 
 def test_nothing_is_told_without_silhouettes_or_people(masks, tmp_path):
