@@ -127,7 +127,7 @@ def test_keypoints_go_with_images_that_are_made_smaller(clip, tmp_path, monkeypa
         given.append((rig[0].size, source.factors))
         raise hmc.InputError("enough")
 
-    monkeypatch.setattr("hmc.pose.chain.learn_scatter", learn)
+    monkeypatch.setattr("hmc.pose.turned_back.learn_scatter", learn)
     recording = hmc.open_recording(clip, frames=2)
     source = open_keypoints(recording)
     tracks = tracks_of_keypoints(recording, source)
