@@ -10,14 +10,12 @@ the truth, once as `hmc pose` makes them, and once with `--no-exclude`, which ke
 from __future__ import annotations
 
 import argparse
-import os
 import shutil
-import subprocess
-import sys
 import tomllib
 from pathlib import Path
 
 import numpy as np
+from faulty_cameras import hmc
 
 from hmc.camera.turned_cameras import turn_back
 from hmc.io.calibration.toml import write_calibration
@@ -35,14 +33,6 @@ def make(source: Path, folder: Path, camera: str, degrees: float) -> None:
         if item.name not in ("calibration.toml", "keypoints"):
             (folder / item.name).symlink_to(item.resolve())
     write_calibration(folder / "calibration.toml", turn_back(open_recording(source).rig, {camera: np.radians(degrees) * AXIS}))
-
-
-def hmc(*words: str | Path) -> str:
-    """What a command says."""
-    done = subprocess.run([sys.executable, "-m", "hmc", *map(os.fspath, words)], capture_output=True, text=True, check=False)
-    if done.returncode:
-        raise SystemExit(f"hmc {' '.join(map(str, words))}:\n{done.stdout}{done.stderr}")
-    return done.stdout + done.stderr
 
 
 def main() -> int:
@@ -63,8 +53,8 @@ def main() -> int:
             shutil.rmtree(result, ignore_errors=True)
             some = ("--cameras", ",".join(given.cameras)) if given.cameras else ()
             frames = ("--frames", str(given.frames), "--height", "auto", "--cues", "silhouettes", "--quiet")
-            told = hmc("pose", folder, "--out", result, *frames, *some, *options)
-            hmc("evaluate", result, folder)
+            told = hmc("pose", str(folder), "--out", str(result), *frames, *some, *options)
+            hmc("evaluate", str(result), str(folder))
             means.append(tomllib.loads((result / "metrics.toml").read_text())["pose"]["mean_mm"])
             said = "; ".join(line.removeprefix("note: ").split(";")[0] for line in told.splitlines() if "has turned by" in line)
         print(f"| {degrees:g} | {means[0]:.1f} | {means[1]:.1f} | {said} |", flush=True)
