@@ -308,7 +308,7 @@ def _views_from(
 
     def seen(hulls: Iterable[HullStep]) -> Iterator[tuple[int, dict[int, PersonView]]]:
         for hull in hulls if options.change is None else map(options.change, hulls):
-            views = with_keypoints(views_of(recording, grid, tracks, hull, method.needs), recording.rig, tracks, cues)
+            views = with_keypoints(views_of(recording, grid, tracks, hull, method.needs), recording.rig, tracks, cues, hull.masks)
             yield hull.index, _with_markers(views, recording, method, options)
 
     def again(masks: Iterable[MaskStep] | None) -> Iterator[tuple[int, dict[int, PersonView]]]:

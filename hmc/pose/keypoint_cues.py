@@ -60,7 +60,13 @@ class KeypointCues:
     turned: Turned = field(default_factory=dict)
 
 
-def with_keypoints(views: Mapping[int, PersonView], rig: Rig, tracks: TrackTable, cues: KeypointCues | None) -> dict[int, PersonView]:
+def with_keypoints(
+    views: Mapping[int, PersonView],
+    rig: Rig,
+    tracks: TrackTable,
+    cues: KeypointCues | None,
+    masks: Sequence[np.ndarray | None] | None = None,
+) -> dict[int, PersonView]:
     """The views of one frame, with the keypoints of each person.
 
     Parameters
@@ -70,17 +76,21 @@ def with_keypoints(views: Mapping[int, PersonView], rig: Rig, tracks: TrackTable
     tracks : TrackTable
     cues : KeypointCues or None
         The views as they are where there are none.
+    masks : sequence of ndarray of bool, shape (height, width), or None, optional
+        The frame's silhouettes, one a camera: detections beside all of them are left out (`hmc.pose.views.off_people`).
     """
     if cues is None or not views:
         return dict(views)
     frame = next(iter(views.values())).frame
-    seen = _seen(rig, tracks, cues, frame)
+    seen = _seen(rig, tracks, cues, frame, masks)
     return {person: replace(view, keypoints=seen.get(person)) for person, view in views.items()}
 
 
-def _seen(rig: Rig, tracks: TrackTable, cues: KeypointCues, frame: int) -> dict[int, SeenKeypoints]:
+def _seen(
+    rig: Rig, tracks: TrackTable, cues: KeypointCues, frame: int, masks: Sequence[np.ndarray | None] | None = None
+) -> dict[int, SeenKeypoints]:
     detections = body_detections(cues.source, frame)
-    return see_keypoints(rig, detections, tracks.at(frame), cues.scatter_m, cues.turned.get(frame, {}))
+    return see_keypoints(rig, detections, tracks.at(frame), cues.scatter_m, cues.turned.get(frame, {}), masks)
 
 
 def learn_scatter(rig: Rig, tracks: TrackTable, source: KeypointSource, fps: float, workers: int = 1) -> KeypointCues:

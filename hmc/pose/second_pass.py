@@ -99,7 +99,7 @@ class SecondPass:
         for hull in stream_hulls(self.recording, grid, self.run.frontend, masks=masks):
             unseen = None if self.places is None else unseen_voxels(self.places, hull.masks)
             views = views_of(self.recording, grid, self.tracks, hull, unseen=unseen)
-            yield with_keypoints(views, self.recording.rig, self.tracks, self.options.keypoints)
+            yield with_keypoints(views, self.recording.rig, self.tracks, self.options.keypoints, hull.masks)
 
     def rng(self, person: int, frame: int) -> np.random.Generator:
         """The random numbers of a person's frame."""

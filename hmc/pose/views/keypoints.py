@@ -20,6 +20,7 @@ from hmc.io.keypoints.layouts import KEYPOINTS
 from hmc.io.keypoints.source import KeypointSource
 from hmc.pose.views.exchanged_sides import sides_of_frame, with_turned
 from hmc.pose.views.line_meeting import meeting_points
+from hmc.pose.views.off_people import off_people
 
 __all__ = [
     "SCATTER_M", "PersonLines", "SeenKeypoints", "body_detections", "lines_of", "lines_of_people", "see_keypoints", "sight_lines",
@@ -89,11 +90,28 @@ class PersonLines:
         0 there.
     deviation_m : ndarray, shape (n_cameras, 15)
         Scatter across the line where the person is.
+    pixels : ndarray, shape (n_cameras, 15, 2)
+        Column and row; NaN where nothing was given.
     """
 
     directions: np.ndarray
     confidence: np.ndarray
     deviation_m: np.ndarray
+    pixels: np.ndarray
+
+    def with_sides(self, turned: np.ndarray) -> PersonLines:
+        """The same with left and right exchanged in some cameras (n_cameras,)."""
+        return PersonLines(*(with_turned(one, turned) for one in (self.directions, self.confidence, self.deviation_m, self.pixels)))
+
+    def without(self, cameras: np.ndarray) -> PersonLines:
+        """The same without what some cameras (n_cameras,) gave."""
+        gone = cameras[:, None, None]
+        return PersonLines(
+            np.where(gone, np.nan, self.directions),
+            np.where(gone[..., 0], 0.0, self.confidence),
+            self.deviation_m,
+            np.where(gone, np.nan, self.pixels),
+        )
 
 
 def body_detections(source: KeypointSource, frame: int) -> list[np.ndarray]:
@@ -114,6 +132,7 @@ def see_keypoints(
     people: Mapping[int, np.ndarray],
     scatter_m: np.ndarray | None = None,
     turned: Mapping[int, np.ndarray] | None = None,
+    masks: Sequence[np.ndarray | None] | None = None,
 ) -> dict[int, SeenKeypoints]:
     """Whose the detections of a frame are, and what they say of each person.
 
@@ -129,6 +148,8 @@ def see_keypoints(
     turned : mapping of int to ndarray of bool of shape (n_cameras,), optional
         Cameras that have exchanged each person's left and right; none of who is not in it. By default what this frame tells
         (`hmc.pose.views.exchanged_sides`), the fewer cameras.
+    masks : sequence of ndarray of bool, shape (height, width), or None, optional
+        Silhouettes, one a camera: detections beside all of them are left out (`hmc.pose.views.off_people`).
 
     Returns
     -------
@@ -141,11 +162,17 @@ def see_keypoints(
             sides = sides_of_frame(rig.centres, own.directions, own.deviation_m).turned
         else:
             sides = turned.get(person, np.zeros(len(rig), bool))
-        directions, confidence, deviation = (with_turned(values, sides) for values in (own.directions, own.confidence, own.deviation_m))
-        camera, keypoint = np.nonzero(confidence > 0)
-        across = _across(directions[camera, keypoint])
-        points = meeting_points(rig.centres, directions, deviation)
-        out[person] = SeenKeypoints(keypoint, camera, rig.centres[camera], across, deviation[camera, keypoint], points)
+        own = own.with_sides(sides)
+        points = meeting_points(rig.centres, own.directions, own.deviation_m)
+        if masks is not None:
+            off = off_people(rig, own, points, people[person], masks)
+            if off.any():
+                own = own.without(off)
+                points = meeting_points(rig.centres, own.directions, own.deviation_m)
+        camera, keypoint = np.nonzero(own.confidence > 0)
+        if len(camera):
+            across, deviation = _across(own.directions[camera, keypoint]), own.deviation_m[camera, keypoint]
+            out[person] = SeenKeypoints(keypoint, camera, rig.centres[camera], across, deviation, points)
     return out
 
 
@@ -174,7 +201,9 @@ def lines_of_people(
         lines = [lines_of(camera, one) for camera, one in zip(rig, own, strict=True)]
         directions, confidence = np.array([line[0] for line in lines]), np.array([line[1] for line in lines])
         if (confidence > 0).any():
-            out[person] = PersonLines(directions, confidence, scatter / np.sqrt(np.maximum(confidence, LEAST_CONFIDENCE)))
+            pixels = np.array([np.full((N_KEYPOINTS, 2), np.nan) if one is None else one[:, :2] for one in own])
+            deviation = scatter / np.sqrt(np.maximum(confidence, LEAST_CONFIDENCE))
+            out[person] = PersonLines(directions, confidence, deviation, pixels)
     return out
 
 
