@@ -16,7 +16,7 @@ import numpy as np
 from hmc.body.keypoint_places import MIRRORED
 from hmc.pose.views.line_meeting import MEET, between_lines, meeting_points, passing
 
-__all__ = ["TURN_SHARE", "FrameSides", "pattern_scores", "patterns_of", "sides_of_frame", "with_turned"]
+__all__ = ["TURN_SHARE", "FrameSides", "pattern_scores", "patterns_of", "possible_sides", "sides_of_frame", "with_turned"]
 
 #: A camera's left and right are told where one way round lowers its distances from the others' points to this share of the other way's.
 TURN_SHARE = 0.5
@@ -27,6 +27,8 @@ LEAST_TOLD = 4
 TURN_COST = 5 * MEET**2
 #: With more cameras, not all patterns are looked at, but those that pairs of cameras suggest.
 ALL_PATTERNS = 10
+#: Patterns that meet less closely than the best one by more than this are not possible, squared deviations; and so many at most are.
+DOUBTED, MOST_PATTERNS = 60.0, 4
 _SIDED = np.flatnonzero(MIRRORED != np.arange(len(MIRRORED)))
 
 
@@ -42,11 +44,19 @@ class FrameSides:
         Cameras of which the frame tells; the complement is ``told & ~turned``.
     points : ndarray, shape (15, 3)
         Where lines meet so, world, metres; of the complement they are these, mirrored.
+    excess : float
+        By how much lines of another pattern meet more closely, squared deviations.
     """
 
     turned: np.ndarray
     told: np.ndarray
     points: np.ndarray
+    excess: float = 0.0
+
+    def is_like(self, other: FrameSides) -> bool:
+        """Whether both turn the same cameras against the others."""
+        same, mirrored = self.turned == other.turned, (self.told & ~self.turned) == other.turned
+        return bool((self.told == other.told).all() and (same.all() or mirrored.all()))
 
 
 def with_turned(values: np.ndarray, turned: np.ndarray) -> np.ndarray:
@@ -72,21 +82,51 @@ def sides_of_frame(centres: np.ndarray, directions: np.ndarray, deviation: np.nd
     FrameSides
         A camera that agrees with nobody, or is as near either way round, is not told of and not turned.
     """
-    best = np.zeros(len(centres), bool)
+    return possible_sides(centres, directions, deviation)[0]
+
+
+def possible_sides(centres: np.ndarray, directions: np.ndarray, deviation: np.ndarray) -> tuple[FrameSides, ...]:
+    """The same, and other patterns that one frame does not tell from it for sure, as of two cameras that stand level.
+
+    Parameters
+    ----------
+    centres, directions, deviation
+        As of `sides_of_frame`.
+
+    Returns
+    -------
+    tuple of FrameSides
+        What `sides_of_frame` says first; no two alike.
+    """
+    patterns, scores = np.zeros((1, len(centres)), bool), np.zeros(1)
     there = np.flatnonzero(np.isfinite(directions).all(axis=-1).any(axis=1))
     if len(there) > 1:
         distances = _distances(centres[there], directions[there], deviation[there])
-        patterns = patterns_of(len(there)) if len(there) <= ALL_PATTERNS else _suggested(distances)
-        turns = np.minimum(patterns.sum(axis=1), (~patterns).sum(axis=1))
-        best[there] = patterns[(_scores(distances, patterns) + TURN_COST * turns).argmin()]
-    points = _points(centres, directions, deviation, best)
-    told = _told(centres, directions, deviation, points, best)
-    if (best & ~told).any():
-        points = _points(centres, directions, deviation, best & told)
-    turned = best & told
+        some = patterns_of(len(there)) if len(there) <= ALL_PATTERNS else _suggested(distances)
+        scores = _scores(distances, some)
+        turns = np.minimum(some.sum(axis=1), (~some).sum(axis=1))
+        order = np.argsort(scores + TURN_COST * turns, kind="stable")
+        order = order[(scores[order] < scores[order[0]] + DOUBTED) | (order == order[0])][:MOST_PATTERNS]
+        patterns, scores = np.zeros((len(order), len(centres)), bool), scores[order]
+        patterns[:, there] = some[order]
+    out: list[FrameSides] = []
+    for pattern, score in zip(patterns, scores.tolist(), strict=True):
+        sides = _sides(centres, directions, deviation, pattern, score - float(scores.min()))
+        if not any(sides.is_like(other) for other in out):
+            out.append(sides)
+    return tuple(out)
+
+
+def _sides(centres: np.ndarray, directions: np.ndarray, deviation: np.ndarray, pattern: np.ndarray, excess: float) -> FrameSides:
+    """A pattern without the cameras that do not tell of it; turned are the fewer cameras."""
+    points = _points(centres, directions, deviation, pattern)
+    told = _told(centres, directions, deviation, points, pattern)
+    if (pattern & ~told).any():
+        points = _points(centres, directions, deviation, pattern & told)
+    turned = pattern & told
     if 2 * turned.sum() > told.sum():
-        return FrameSides(told & ~turned, told, points[MIRRORED])
-    return FrameSides(turned, told, points)
+        return FrameSides(told & ~turned, told, points[MIRRORED], excess)
+    return FrameSides(turned, told, points, excess)
 
 
 def patterns_of(cameras: int) -> np.ndarray:
