@@ -29,8 +29,8 @@ Turned = Mapping[int, Mapping[int, np.ndarray]]
 
 #: What a camera that is turned costs, a second. Three of four cameras for two seconds, then, are still less than two breaks of continuity.
 TURNED_COST = 15.0
-#: What a squared deviation costs, a second, by which lines of a pattern meet less closely than of another. A detector errs alike for as long:
-#: what it guessed has met more closely exchanged for whole seconds.
+#: What a squared deviation costs, a second, by which lines of a pattern meet less closely than of another. A detector errs alike for as
+#: long: what it guessed has met more closely exchanged for whole seconds.
 EXCESS_COST = 1.0
 #: How well the way from right to left is known, metres, and how fast it changes: arms and legs against one another, metres a second.
 WAY_M, WAY_M_S = 0.08, 3.0
