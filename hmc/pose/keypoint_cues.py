@@ -36,8 +36,9 @@ MEDIAN_IN_PLANE = 2 * np.log(2)
 SCATTER_RANGE_M, LEAST_DETECTIONS = (0.008, 0.08), 10
 #: An offset that was learnt is no better known than this, metres: what of it turns and bends with the body is not constant.
 LEARNT_M = 0.008
-#: What hulls of good silhouettes cost (as on rendered people), by which the weight is told; and how far it may go with what they cost.
-HULL_COST_M2, WORTH_RANGE = 1e-4, (0.5, 4.0)
+#: Keypoints weigh as much as in the first pass where hulls cost this much, half of it where they cost as little as of good silhouettes
+#: (1e-4, on rendered people), and so on, as far as these factors.
+HULL_COST_M2, WORTH_RANGE = 2e-4, (0.25, 4.0)
 #: Frames one after the other that tell as much as one.
 ALIKE = 3
 

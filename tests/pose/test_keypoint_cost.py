@@ -244,7 +244,7 @@ def test_what_lies_beside_is_learnt_and_what_is_never_seen_is_not(ring):
     assert np.abs(learnt.offset_m - beside)[told].max() < 0.006
     assert not learnt.offset_m[4].any() and learnt.deviation_m[4] == BESIDE_M[4]
     assert (learnt.deviation_m[told] < BESIDE_M[told]).all()
-    assert learnt.worth == 2 and learn_beside(found, [1.0]).worth == 4
+    assert learnt.worth == 1 and learn_beside(found, [1e-4]).worth == 0.5 and learn_beside(found, [1.0]).worth == 4
     assert not learn_beside([], []).offset_m.any()
 
 
