@@ -1,8 +1,9 @@
 """Detections that lie beside everybody: a detector that took something else for a person, or put a person where nobody is.
 
-A keypoint lies on a person, so on the camera's silhouette, but for what the silhouette has lost. A detection most of whose sure keypoints
-lie beside all silhouettes, and whose lines of sight do not meet those of other cameras either, is of nobody. Where cameras agree it is the
-silhouette that is wrong; and where no other camera has seen the person there is nothing to hold the detection against, and it stays.
+A keypoint lies on a person, so on the camera's silhouette, but for what the silhouette has lost. A detection with more than a few sure
+keypoints beside all silhouettes, most of whose lines of sight do not meet those of other cameras either, is of nobody. Where cameras agree
+it is the silhouette that is wrong; and where no other camera has seen the person there is nothing to hold the detection against, and it
+stays.
 """
 
 from __future__ import annotations
