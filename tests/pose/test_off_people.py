@@ -1,13 +1,23 @@
 """Detections of keypoints that lie beside everybody are nobody's, where silhouettes and other cameras say so both."""
 
+import shutil
+from pathlib import Path
+
 import cv2
 import numpy as np
 import pytest
 from test_keypoint_cost import detected, places, pose
 
+import hmc
 from hmc.camera.model import Rig, project
+from hmc.io.keypoints import open_keypoints
+from hmc.io.recording import open_recording
+from hmc.pose import keypoint_cues, second_pass
+from hmc.pose.keypoint_tracks import tracks_of_keypoints
 from hmc.pose.views.keypoints import see_keypoints
+from hmc.synthetic.keypoints import write_keypoints
 
+TINY = Path(__file__).resolve().parents[2] / "data" / "synthetic" / "tiny"
 STATE = pose(np.random.default_rng(21))
 #: Far enough that keypoints leave the silhouette, metres.
 ASIDE_M = 0.4
@@ -80,3 +90,22 @@ def test_keypoints_outside_of_the_image_are_not_held_against_it(ring):
     half = beside(ring, detected(ring, places(STATE)), 1)
     half[1][0, 4:, 2] = 0.2  # four that are sure are too few to judge by
     assert 1 in cameras_of(ring, half, silhouettes(ring))
+
+
+def test_both_passes_hold_detections_against_silhouettes(tmp_path, monkeypatch):
+    folder = Path(shutil.copytree(TINY, tmp_path / "clip"))
+    write_keypoints(folder, np.random.default_rng(0))
+    recording, judged = open_recording(folder, frames=5), []
+    whole = keypoint_cues.see_keypoints
+
+    def see(rig, detections, people, scatter_m, turned, masks):
+        judged.append(masks is not None)
+        return whole(rig, detections, people, scatter_m, turned, masks)
+
+    monkeypatch.setattr(keypoint_cues, "see_keypoints", see)
+    monkeypatch.setattr(second_pass.SecondPass, "recent", lambda *_: None)  # what the first pass saw is not there any more
+    tracks = tracks_of_keypoints(recording, open_keypoints(recording))
+    people = hmc.pose(recording, tracks, keypoints=open_keypoints(recording), height_m=1.75)
+    assert np.isfinite(people.positions).any()
+    # How far detections scatter is learnt before anything is segmented for poses; then each pass asks for every frame.
+    assert judged.count(True) >= 2 * len(people.frames) and judged.index(True) == judged.count(False)
