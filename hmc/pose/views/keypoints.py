@@ -1,8 +1,8 @@
 """What 2-D keypoint detectors saw of one person in one frame: lines of sight, whose they are, and where they meet.
 
 A detection is a line of sight with a width: the detector's own scatter there, in metres. Detections of several people are assigned to the
-people who are tracked, camera by camera, by where these should be; those that fit nobody are nobody's. A camera in which left and right
-are the wrong way round is turned, where the others say so. Where enough lines of a keypoint meet is a point (`SeenKeypoints.points`).
+people who are tracked (`hmc.pose.views.whose`); those that fit nobody are nobody's. A camera in which left and right are the wrong way
+round is turned, where the others say so. Where enough lines of a keypoint meet is a point (`SeenKeypoints.points`).
 """
 
 from __future__ import annotations
@@ -11,16 +11,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from hmc.body.keypoint_places import BODY_KEYPOINTS
 from hmc.camera.epipolar import undistorted_pixels
-from hmc.camera.model import Camera, Rig, project
+from hmc.camera.model import Camera, Rig
 from hmc.io.keypoints.layouts import KEYPOINTS
 from hmc.io.keypoints.source import KeypointSource
 from hmc.pose.views.exchanged_sides import sides_of_frame, with_turned
 from hmc.pose.views.line_meeting import meeting_points
 from hmc.pose.views.off_people import off_people
+from hmc.pose.views.whose import LEAST_CONFIDENCE, whose
 
 __all__ = [
     "SCATTER_M", "PersonLines", "SeenKeypoints", "body_detections", "lines_of", "lines_of_people", "see_keypoints", "sight_lines",
@@ -29,11 +29,6 @@ __all__ = [
 N_KEYPOINTS = len(BODY_KEYPOINTS)
 #: Standard deviation of a detection across its line of sight before anything was learnt, metres.
 SCATTER_M = 0.03
-#: Detections that are less sure are left out.
-LEAST_CONFIDENCE = 0.1
-#: A detection's trunk farther than this from where a person is tracked is another's, metres.
-GATE_M = 0.6
-_TRUNK = [BODY_KEYPOINTS.index(name) for name in ("l_shoulder", "r_shoulder", "l_hip", "r_hip")]
 _OF_BODY = [KEYPOINTS.index(name) for name in BODY_KEYPOINTS]
 
 
@@ -191,45 +186,20 @@ def lines_of_people(
     dict of int to PersonLines
         Of those of whom anything was seen.
     """
-    given: dict[int, list[np.ndarray | None]] = {person: [None] * len(rig) for person in people}
-    for c, (camera, detected) in enumerate(zip(rig, detections, strict=True)):
-        for person, k in _assigned(camera, detected, people).items():
-            given[person][c] = detected[k]
+    lines = [[lines_of(camera, one) for one in detected] for camera, detected in zip(rig, detections, strict=True)]
+    nothing = lines_of(rig[0], None)
+    directions = [np.array([one for one, _ in of_camera]).reshape(-1, N_KEYPOINTS, 3) for of_camera in lines]
     scatter = np.full((len(rig), N_KEYPOINTS), SCATTER_M) if scatter_m is None else scatter_m
     out = {}
-    for person, own in given.items():
-        lines = [lines_of(camera, one) for camera, one in zip(rig, own, strict=True)]
-        directions, confidence = np.array([line[0] for line in lines]), np.array([line[1] for line in lines])
+    for person, own in whose(rig, detections, directions, people).items():
+        seen = [nothing if k is None else of_camera[k] for of_camera, k in zip(lines, own, strict=True)]
+        along, confidence = np.array([one for one, _ in seen]), np.array([sure for _, sure in seen])
         if (confidence > 0).any():
-            pixels = np.array([np.full((N_KEYPOINTS, 2), np.nan) if one is None else one[:, :2] for one in own])
+            unseen = np.full((N_KEYPOINTS, 2), np.nan)
+            pixels = np.array([unseen if k is None else detected[k, :, :2] for detected, k in zip(detections, own, strict=True)])
             deviation = scatter / np.sqrt(np.maximum(confidence, LEAST_CONFIDENCE))
-            out[person] = PersonLines(directions, confidence, deviation, pixels)
+            out[person] = PersonLines(along, confidence, deviation, pixels)
     return out
-
-
-def _assigned(camera: Camera, given: np.ndarray, people: Mapping[int, np.ndarray]) -> dict[int, int]:
-    """Which detected person is whom, by how far their trunk is from where each should be."""
-    if not len(given) or not people:
-        return {}
-    places = np.array(list(people.values()))
-    expected, valid = project(camera, places)
-    depth = places @ camera.rotation[2] + camera.translation[2]
-    with np.errstate(all="ignore"):
-        trunk = np.array([_middle(one) for one in given])
-        apart = np.linalg.norm(trunk[:, None] - expected[None], axis=-1) * depth / camera.matrix[0, 0]
-    apart = np.where(np.isfinite(apart) & valid, apart, 10 * GATE_M)
-    rows, columns = linear_sum_assignment(np.minimum(apart, 10 * GATE_M))
-    persons = list(people)
-    return {persons[j]: i for i, j in zip(rows.tolist(), columns.tolist(), strict=True) if apart[i, j] < GATE_M}
-
-
-def _middle(one: np.ndarray) -> np.ndarray:
-    """The middle of a detected trunk, or of all that was detected where there is none, pixels."""
-    sure = one[:, 2] >= LEAST_CONFIDENCE
-    trunk = np.zeros(len(one), bool)
-    trunk[_TRUNK] = True
-    told = sure & trunk if (sure & trunk).sum() >= 2 else sure
-    return one[told, :2].mean(axis=0) if told.any() else np.full(2, np.nan)
 
 
 def lines_of(camera: Camera, one: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
