@@ -67,6 +67,18 @@ def test_of_two_detections_of_one_person_it_is_the_one_that_others_meet():
     assert assigned(rig, images, {7: track}) == {7: [0, 0, 1, 0]}
 
 
+def test_who_is_seen_by_no_other_camera_is_not_the_nearer_for_that():
+    rig = rig_of(3)
+    state = pose(np.random.default_rng(6))
+    images = detected(rig, places(state))
+    images[0][..., :2] += np.random.default_rng(7).normal(0, 4, images[0].shape[:-1] + (2,))  # lines do not meet to the millimetre
+    trunk = places(state)[module._TRUNK].mean(axis=0)
+    aside, away = 0.15 * rig[0].rotation[0], (trunk - rig.centres[0]) / np.linalg.norm(trunk - rig.centres[0])
+    # In the first camera's image both are as far from the detection, to its right and left; the others see one of them.
+    people = {0: trunk + aside, 1: trunk - 0.8 * aside + 0.8 * away}
+    assert assigned(rig, images, people) == {0: [0, 0, 0], 1: [None, None, None]}
+
+
 def test_what_fits_nobody_and_who_is_seen_by_none():
     rig = rig_of(3)
     rng = np.random.default_rng(5)

@@ -91,11 +91,12 @@ def _trunks_apart(camera: Camera, given: np.ndarray, people: Mapping[int, np.nda
 def _lines_apart(rig: Rig, directions: Sequence[np.ndarray], found: Sequence[Mapping[int, int]], camera: int, people: int) -> np.ndarray:
     """How far the lines of a camera's detections pass those of each person in other cameras, (n_detections, n_people), squared deviations.
 
-    The mean over keypoints that both have and over cameras, with left and right as they are or exchanged, whichever is less; a camera
-    without the person says nothing.
+    The mean over keypoints that both have and over cameras, with left and right as they are or exchanged, whichever is less; 1, which is
+    what a right match has commonly, where no other camera has the person or a keypoint with this one: who is seen by none shall not be
+    nearer than who is.
     """
     own = directions[camera]
-    out = np.zeros((len(own), people))
+    out = np.ones((len(own), people))
     for person in range(people):
         others = [c for c, one in enumerate(found) if c != camera and person in one]
         if not others:
@@ -105,8 +106,9 @@ def _lines_apart(rig: Rig, directions: Sequence[np.ndarray], found: Sequence[Map
         for order in (slice(None), MIRRORED):
             _, gap = between_lines(rig.centres[camera], own[:, None, order], rig.centres[others][:, None], lines)
             known = np.isfinite(gap)
-            squared = np.where(known, np.minimum((gap / LINES_M) ** 2, MOST), 0.0).sum(axis=-1) / np.maximum(known.sum(axis=-1), 1)
-            both_ways.append(squared.mean(axis=1))
+            squared = np.where(known, np.minimum((gap / LINES_M) ** 2, MOST), 0.0).sum(axis=-1)
+            said = known.sum(axis=-1)
+            both_ways.append(np.where(said > 0, squared / np.maximum(said, 1), 1.0).mean(axis=1))
         out[:, person] = np.minimum(*both_ways)
     return out
 
