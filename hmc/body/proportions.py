@@ -21,9 +21,8 @@ __all__ = [
     "make_body", "sole_ends", "stature", "stiff_body",
 ]  # fmt: skip
 
-#: Joint-centre lengths over stature. Trunk: hip centres' middle to the base of the neck. Sources: de Leva (1996), table 4 (upper
-#: arm and forearm: the mean of men's and women's, between centres of joints), Winter (2009), figure 4.1
-#: (legs; shoulders: half its width of .259, less some 4 cm from the tip of the shoulder to the joint's centre; ankle: .039 and a
+#: Joint-centre lengths over stature. Trunk: hip centres' middle to the base of the neck. Sources: Winter (2009), figure 4.1
+#: (limbs; shoulders: half its width of .259, less some 4 cm from the tip of the shoulder to the joint's centre; ankle: .039 and a
 #: sole of 1 cm), and the ranges that rendered and captured people show (trunk, head). The spine is behind: a standing person's
 #: last neck vertebra is behind the hip centres (Mac-Thiong et al. 2010, Spine 35: E1193), while the chest and the skull are over or
 #: before them. From the line of hips and neck the chest's middle is `chest_forward` to the front, the crown `head_forward`. The crown is
@@ -33,7 +32,7 @@ __all__ = [
 #: each shoulder turns with its collar bone about a point `collar` inward (`python -m hmc.experiments run body-bias`).
 DEFAULT_LENGTHS: dict[str, float] = {
     "trunk": 0.318, "head": 0.147, "shoulder_half_width": 0.104, "shoulder_drop": 0.060, "hip_half_width": 0.060,
-    "upper_arm": 0.160, "forearm": 0.153, "hand": 0.085, "thigh": 0.245, "shank": 0.250, "ankle_height": 0.046, "foot": 0.105,
+    "upper_arm": 0.157, "forearm": 0.150, "hand": 0.085, "thigh": 0.245, "shank": 0.250, "ankle_height": 0.046, "foot": 0.105,
     "chest_forward": 0.010, "head_forward": 0.027, "hair": 0.010,
     "shoulder_flesh_low": 0.0046, "elbow_flesh_low": 0.0034, "wrist_flesh_low": 0.0069, "arm_flesh_forward": 0.0023,
     "waist_flesh_forward": 0.0046, "hip_flesh_forward": 0.0034, "hip_flesh_inward": 0.0020,
