@@ -33,7 +33,8 @@ LIGHT = (-0.7, 0.1)
 #: The guess is no surer than this, as a logit.
 MOST_LOGIT = 4.0
 #: Deviation of what the others see (logarithms of shares of light), and the likelihood, against that of no deviation, of what is neither:
-#: a spot that a third person shades, or that is hidden.
+#: a spot that a third person shades, or that is hidden, or is on a seat and not on the floor. True silhouettes of drawn rooms ask for less
+#: of both (``python -m hmc.voxels.train_floor``), shadows on seats for so much.
 SPREAD, UNLIKE = 0.11, 0.13
 #: From this chance on it stays, as of the guess (`SegmentationSettings.least_chance`): a shadow of one camera is in no hull, but a leg that
 #: it lost is out of the hull too.
@@ -159,11 +160,11 @@ def _seen_by(cameras: Sequence[_Floor], spots: np.ndarray, scene: np.ndarray) ->
     return light, n
 
 
-def person_by_floor(evidence: FloorEvidence) -> np.ndarray:
+def person_by_floor(evidence: FloorEvidence, spread: float = SPREAD, unlike: float = UNLIKE) -> np.ndarray:
     """How likely each pixel is a person's: float32, shape (n,)."""
 
     def likelihood(expected: np.ndarray | float) -> np.ndarray:
-        return np.asarray(np.exp(-np.square(evidence.others - expected) / (2 * SPREAD**2)) + UNLIKE)
+        return np.asarray(np.exp(-np.square(evidence.others - expected) / (2 * spread**2)) + unlike)
 
     # What is brighter than the empty scene is as bright as a spot can be.
     shadow, person = likelihood(np.minimum(evidence.light, 0)), likelihood(0.0)
