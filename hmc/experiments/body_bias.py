@@ -22,10 +22,11 @@ from hmc.experiments.engine.inputs import Inputs, rendered
 from hmc.experiments.engine.intervals import decide, difference
 from hmc.experiments.markerless_runs import FRONTEND, VOXEL_M, opened
 from hmc.experiments.study import recording_bars
-from hmc.experiments.truth import all_truth, standing_state, true_silhouettes
+from hmc.experiments.truth import all_truth, standing_state
 from hmc.io.masks import MaskStep
 from hmc.io.recording import Recording
 from hmc.io.results import TrackTable
+from hmc.io.true_silhouettes import true_silhouettes
 from hmc.landmarks import LANDMARKS, landmark_index
 from hmc.pose.method import Capture, make_subject
 from hmc.pose.steps.polish import fine_objective

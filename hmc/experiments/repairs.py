@@ -19,7 +19,7 @@ from hmc.errors import InputError
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Parameters, Plan, Report, Results, Table
 from hmc.experiments.engine.inputs import Inputs, rendered
 from hmc.experiments.study import recording_bars
-from hmc.experiments.truth import true_silhouettes
+from hmc.io.true_silhouettes import true_silhouettes
 from hmc.tracking.resumable import person_grid
 from hmc.voxels.carving import carve, make_tables
 from hmc.voxels.hulls import FrontendSettings, stream_masks

@@ -1,10 +1,9 @@
-"""True poses and silhouettes of a recording, and what estimates are compared with them."""
+"""True poses of a recording, and what estimates are compared with them."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-import cv2
 import numpy as np
 
 from hmc.body.model import BodyModel, neutral_state
@@ -16,8 +15,7 @@ from hmc.landmarks import LANDMARKS
 from hmc.metrics.persons import match_persons
 
 __all__ = [
-    "HEIGHT_M", "all_truth", "estimate_of", "estimates", "first_truth", "standing_state", "stature_m", "true_silhouettes", "truth_path",
-    "truth_track",
+    "HEIGHT_M", "all_truth", "estimate_of", "estimates", "first_truth", "standing_state", "stature_m", "truth_path", "truth_track",
 ]  # fmt: skip
 
 #: Stature where a recording does not say it, metres.
@@ -48,16 +46,6 @@ def first_truth(recording: Recording) -> PoseTable:
     """True joints of a recording's first person; `all_truth` says what is refused."""
     truth = all_truth(recording)
     return truth.of(int(truth.persons[0]))
-
-
-def true_silhouettes(recording: Recording, frame: int) -> tuple[np.ndarray, ...] | None:
-    """The true silhouettes of a frame, one a camera; None where there are none."""
-    folder = recording.path / "truth" / "silhouettes"
-    paths = [folder / camera.name / f"{frame:06d}.png" for camera in recording.rig]
-    if not all(path.is_file() for path in paths):
-        return None
-    pictures = [cv2.imread(str(path), cv2.IMREAD_GRAYSCALE) for path in paths]
-    return tuple(np.asarray(picture) > 0 for picture in pictures)
 
 
 def estimate_of(truth: PoseTable, poses: PoseTable) -> np.ndarray:

@@ -21,6 +21,7 @@ from scipy.optimize import minimize
 
 from hmc.errors import InputError
 from hmc.io.recording import Recording, open_recording
+from hmc.io.true_silhouettes import true_frames, true_silhouettes
 from hmc.voxels.completion import make_completion_tables
 from hmc.voxels.floor_light import SPREAD, UNLIKE, FloorEvidence, floor_evidence, person_by_floor
 from hmc.voxels.floor_shadows import lit_views
@@ -69,22 +70,18 @@ def floor_examples(recording: Recording, rng: np.random.Generator, every: int = 
     InputError
         When the recording has no true silhouettes, or no camera tells anything of the floor.
     """
-    folder = Path(recording.path) / "truth" / "silhouettes"
-    frames = sorted(int(file.stem) for file in (folder / recording.rig.cameras[0].name).glob("*.png"))[::every]
-    if not frames:
-        raise InputError(f"{folder}: there are no true silhouettes to learn from")
+    frames = true_frames(recording)[::every]
     tables = make_completion_tables(recording.room, recording.rig)
     rows: list[tuple[np.ndarray, ...]] = []
     with ThreadPoolExecutor() as pool:
         for look in look_at(recording, {}, range(len(recording.rig)), FrontendSettings(), 0, frames[-1] + 1, 1, pool):
-            if look.index in frames:
-                views = lit_views(look.images, look.scenes, look.gains)
-                for c, found in floor_evidence(tables, views, look.chances, look.masks).items():
-                    file = folder / recording.rig.cameras[c].name / f"{look.index:06d}.png"
-                    true = cv2.imread(str(file), cv2.IMREAD_GRAYSCALE)
-                    if true is not None:
-                        person, sure = _labels(true > 0, found.pixels)
-                        rows.append((found.pixels[sure], found.guess[sure], found.light[sure], found.others[sure], person[sure]))
+            truth = true_silhouettes(recording, look.index) if look.index in frames else None
+            if truth is None:
+                continue
+            views = lit_views(look.images, look.scenes, look.gains)
+            for c, found in floor_evidence(tables, views, look.chances, look.masks).items():
+                person, sure = _labels(truth[c], found.pixels)
+                rows.append((found.pixels[sure], found.guess[sure], found.light[sure], found.others[sure], person[sure]))
     if not rows or not sum(len(row[0]) for row in rows):
         raise InputError(f"{recording.path}: no camera sees the floor behind another one's shades; nothing to learn from")
     columns = [np.concatenate(column) for column in zip(*rows, strict=True)]
@@ -136,8 +133,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         rng, examples = np.random.default_rng(args.seed), []
         for path in args.recordings:
             recording = open_recording(path)
-            n = len(list((path / "truth" / "silhouettes" / recording.rig.cameras[0].name).glob("*.png")))
-            examples.append(floor_examples(recording, rng, max(1, n // args.frames)))
+            examples.append(floor_examples(recording, rng, max(1, len(true_frames(recording)) // args.frames)))
             person = examples[-1].is_person
             logger.info("%s: %d shades, %.1f%% of them people", path.name, len(person), 100 * person.mean())
     except InputError as error:

@@ -12,7 +12,6 @@ import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
-import cv2
 import numpy as np
 
 from hmc.camera.segmentation import SegmentationSettings, segment, shades_of, train_background
@@ -20,6 +19,7 @@ from hmc.camera.shade import FEATURES, FLOOR_UNKNOWN, ShadeNet, floor_pixels, pe
 from hmc.errors import InputError
 from hmc.io.files import atomic_write
 from hmc.io.recording import Recording, background_frames, iterate_frames, open_recording
+from hmc.io.true_silhouettes import true_frames, true_silhouettes
 
 __all__ = ["main", "shade_examples", "train_shade", "write_net"]
 
@@ -54,27 +54,24 @@ def shade_examples(recording: Recording, rng: np.random.Generator, every: int = 
     InputError
         When the recording has no true silhouettes.
     """
-    folder = Path(recording.path) / "truth" / "silhouettes"
-    frames = sorted(int(file.stem) for file in (folder / recording.rig.cameras[0].name).glob("*.png"))[::every]
-    if not frames:
-        raise InputError(f"{folder}: there are no true silhouettes to learn from")
+    frames = true_frames(recording)[::every]
     models = [
         train_background(background_frames(recording, c, EMPTY_FRAMES), floor=floor_pixels(camera, recording.room))
         for c, camera in enumerate(recording.rig)
     ]
+    nobody = (None,) * len(recording.rig)
     features, people = [np.zeros((0, len(FEATURES)), np.float32)], [np.zeros(0, bool)]
     for frame in iterate_frames(recording, 0, frames[-1] + 1):
         if frame.index not in frames:
             continue
-        for c, (camera, image) in enumerate(zip(recording.rig, frame.images, strict=True)):
-            true = cv2.imread(str(folder / camera.name / f"{frame.index:06d}.png"), cv2.IMREAD_GRAYSCALE)
+        for c, (image, true) in enumerate(zip(frame.images, true_silhouettes(recording, frame.index) or nobody, strict=True)):
             mask, models[c] = segment(models[c], image, SegmentationSettings(least_chance=0))
             if image is None or mask is None or true is None:
                 continue
             pixels, found = shades_of(models[c], image)
             chosen = rng.choice(len(pixels), min(MOST_SHADES, len(pixels)), replace=False)
             features.append(found[chosen])
-            people.append(true.ravel()[pixels[chosen]] > 0)
+            people.append(true.ravel()[pixels[chosen]])
     return np.concatenate(features), np.concatenate(people)
 
 
@@ -137,8 +134,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         examples = []
         for path in args.recordings:
             recording = open_recording(path)
-            n = len(list((path / "truth" / "silhouettes" / recording.rig.cameras[0].name).glob("*.png")))
-            features, people = shade_examples(recording, rng, max(1, n // args.frames))
+            features, people = shade_examples(recording, rng, max(1, len(true_frames(recording)) // args.frames))
             chosen = rng.choice(len(people), min(args.most, len(people)), replace=False)
             examples.append((features[chosen], people[chosen]))
             logger.info("%s: %d shades, %.1f%% of them people", path.name, len(people), 100 * people.mean())
