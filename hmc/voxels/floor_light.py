@@ -6,15 +6,15 @@ as a floor scatters light all ways; behind a trouser leg they see the bare floor
 guess is multiplied by the ratio of two likelihoods, of the light that the others see if it is a shadow and if it is a person. A pixel that
 has lost next to no light tells nothing by that, and the guess stands.
 
-Two cameras look at the same spot only where the empty scene has the same color there in both. Else one of them sees a table before it, or
-the wall behind.
+Two cameras look at the same spot only where the empty scene has the same color there in both, but for what the one sees all of the floor
+brighter or in another tint than the other. Else one of them sees a table before it, or a seat, or the wall behind.
 
 Measured by ``python -m hmc.experiments run repairs``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -23,24 +23,26 @@ import numpy as np
 from hmc.voxels.completion import CompletionTables
 from hmc.voxels.floor_shadows import OTHER_COLOR, LitView, darkness
 
-__all__ = ["FloorEvidence", "floor_evidence", "person_by_floor", "tell_shades"]
+__all__ = ["FloorEvidence", "floor_balance", "floor_evidence", "person_by_floor", "tell_shades"]
 
 #: Two cameras see the same spot where the empty scene's luma differs by less than this factor (logarithm) and chroma by less than so many
-#: grey levels.
-SAME_LUMA, SAME_CHROMA = 0.25, 7.0
+#: grey levels, once their balance is taken off.
+SAME_LUMA, SAME_CHROMA = 0.09, 5.0
 #: Lights (logarithms of shares of the empty scene's) tell within these bounds.
 LIGHT = (-0.7, 0.1)
 #: The guess is no surer than this, as a logit.
 MOST_LOGIT = 4.0
 #: Deviation of what the others see (logarithms of shares of light), and the likelihood, against that of no deviation, of what is neither:
-#: a spot that a third person shades, or that is hidden, or is on a seat and not on the floor. True silhouettes of drawn rooms ask for less
-#: of both (``python -m hmc.voxels.train_floor``), shadows on seats for so much.
-SPREAD, UNLIKE = 0.11, 0.13
+#: a spot that a third person shades, or that is hidden, or is on a seat and not on the floor. Between what drawn rooms ask for and what
+#: furnished ones do (``python -m hmc.voxels.train_floor``; docs/accuracy.md).
+SPREAD, UNLIKE = 0.055, 0.04
 #: From this chance on it stays, as of the guess (`SegmentationSettings.least_chance`): a shadow of one camera is in no hull, but a leg that
 #: it lost is out of the hull too.
 LEAST_CHANCE = 0.4
 #: The floor is asked of every so manieth pixel of each row and column.
 EVERY_PX = 2
+#: Spots of the floor by which cameras' colors are compared, about, and how often their balance is made better.
+BALANCE_SPOTS, BALANCE_ROUNDS = 400, 3
 #: Side of the squares that pieces hold which come or go, pixels.
 SOLID_PX = 5
 
@@ -64,6 +66,39 @@ class FloorEvidence:
     guess: np.ndarray
     light: np.ndarray
     others: np.ndarray
+
+
+def floor_balance(tables: CompletionTables, scenes: Mapping[int, np.ndarray]) -> dict[int, np.ndarray]:
+    """How much more light and tint each camera sees of the empty floor than the rig does.
+
+    Parameters
+    ----------
+    tables : CompletionTables
+        Of the room and the rig.
+    scenes : mapping of int to ndarray of float32, shape (height, width, 3)
+        Luma and chroma of the empty scene, by camera.
+
+    Returns
+    -------
+    dict of int to ndarray of float32, shape (3, 1)
+        Luma (logarithm) and chroma (grey levels), by camera; zeros of one that sees no floor which another sees. In the median over spots,
+        so it tells nothing of those of which one camera sees a table. The rig sees each spot in the median of cameras.
+    """
+    n_cells = tables.cells[0] * tables.cells[1]
+    spots = np.arange(0, n_cells, max(1, n_cells // BALANCE_SPOTS))
+    seen = np.full((len(scenes), 3, len(spots)), np.nan, np.float32)
+    for colors, (c, scene) in zip(seen, scenes.items(), strict=True):
+        pixels = tables.cell_pixels[c].take(spots)
+        inside = pixels < scene.shape[0] * scene.shape[1]
+        colors[:, inside] = _colors(scene, pixels[inside])
+    shared = np.isfinite(seen[:, 0]).sum(axis=0) > 1
+    has = np.isfinite(seen[:, 0, shared]).any(axis=1)
+    seen = seen[has][..., shared]
+    balance, more = np.zeros((len(scenes), 3, 1), np.float32), np.zeros((1, 3, 1), np.float32)
+    for _ in range(BALANCE_ROUNDS if has.any() else 0):
+        more = np.nanmedian(seen - np.nanmedian(seen - more, axis=0), axis=-1, keepdims=True)
+    balance[has] = more
+    return dict(zip(scenes, balance, strict=True))
 
 
 def floor_evidence(
@@ -102,7 +137,8 @@ def floor_evidence(
     spots = np.flatnonzero(near[:n_cells])
     place = np.zeros(n_cells, np.intp)
     place[spots] = np.arange(len(spots))
-    floors = {c: _floor(view, mask, tables.cell_pixels[c].take(spots), asked[c][0]) for c, (view, _, mask) in known.items()}
+    balance = floor_balance(tables, {c: view.scene.mean for c, (view, _, _) in known.items()})
+    floors = {c: _floor(view, mask, tables.cell_pixels[c].take(spots), asked[c][0], balance[c]) for c, (view, _, mask) in known.items()}
     found = {}
     for c, (pixels, cells) in asked.items():
         others = [floor for other, floor in floors.items() if other != c]
@@ -124,7 +160,7 @@ class _Floor:
         Logarithms of shares of the empty scene's light; NaN where a person hides the spot, the camera does not see it, or it has another
         color.
     scene, shade_scene : ndarray of float32, shapes (3, n_spots) and (3, n_shades)
-        Luma's logarithm and chroma of the empty scene there.
+        Luma's logarithm and chroma of the empty scene there, in the colors of the whole rig.
     """
 
     light: np.ndarray
@@ -133,14 +169,20 @@ class _Floor:
     shade_scene: np.ndarray
 
 
-def _floor(view: LitView, mask: np.ndarray, spots: np.ndarray, shades: np.ndarray) -> _Floor:
+def _colors(scene: np.ndarray, pixels: np.ndarray) -> np.ndarray:
+    """Luma's logarithm and chroma of the empty scene at flat pixels, shape (3, n)."""
+    colors = np.ascontiguousarray(scene.reshape(-1, 3).take(pixels, axis=0).T)
+    np.log(colors[0], out=colors[0])
+    return colors
+
+
+def _floor(view: LitView, mask: np.ndarray, spots: np.ndarray, shades: np.ndarray, balance: np.ndarray) -> _Floor:
     """Of the flat pixels of spots, beyond the image where they are not seen, and of shades."""
     seen = spots < mask.size
     pixels = np.concatenate([spots[seen], shades])
     light = darkness(view, pixels)
     light = np.where(light == OTHER_COLOR, np.float32(np.nan), np.clip(light, *LIGHT))
-    colors = np.stack([view.scene.mean[..., k].reshape(-1).take(pixels) for k in range(3)])
-    np.log(colors[0], out=colors[0])
+    colors = _colors(view.scene.mean, pixels) - balance
     n = np.count_nonzero(seen)
     at_spots, there = np.full((4, len(spots)), np.nan, np.float32), light[:n]
     there[mask.ravel().take(pixels[:n])] = np.nan
