@@ -172,7 +172,7 @@ class _Floor:
 def _colors(scene: np.ndarray, pixels: np.ndarray) -> np.ndarray:
     """Luma's logarithm and chroma of the empty scene at flat pixels, shape (3, n)."""
     colors = np.ascontiguousarray(scene.reshape(-1, 3).take(pixels, axis=0).T)
-    np.log(colors[0], out=colors[0])
+    np.log(np.maximum(colors[0], 1), out=colors[0])  # a black scene has no logarithm
     return colors
 
 

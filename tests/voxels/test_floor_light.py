@@ -173,6 +173,13 @@ def test_a_camera_that_shares_no_floor_has_the_balance_of_the_rig(tables, ring, 
         assert all((one == 0).all() for one in floor_balance(tables, scenes).values())
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_camera_that_sees_nothing_but_black_has_a_balance(tables, floors):
+    scenes = {c: scene_of(image).mean for c, image in enumerate(empty_images(floors))}
+    scenes[1] = np.zeros_like(scenes[1])
+    assert all(np.isfinite(one).all() for one in floor_balance(tables, scenes).values())
+
+
 def test_the_evidence_is_that_of_a_loop_over_pixels(tables, ring, people, shadows, floors):
     rng = np.random.default_rng(0)
     empty = [np.clip(image + rng.normal(0, 6, image.shape[:2])[..., None], 0, 255).astype(np.uint8) for image in empty_images(floors)]
