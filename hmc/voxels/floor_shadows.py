@@ -195,10 +195,10 @@ def darkness(view: LitView, pixels: np.ndarray) -> np.ndarray:
         seen.
     """
     scene, color = view.scene, view.colors.take(pixels, axis=0).astype(np.float32)
-    luma, *chroma = (scene.mean[..., k].reshape(-1).take(pixels) for k in range(3))
-    share = np.maximum(color[:, 0], 1) / luma
+    mean = scene.mean.reshape(-1, 3).take(pixels, axis=0)  # a channel by itself would be copied whole
+    share = np.maximum(color[:, 0], 1) / mean[:, 0]
     lit = np.minimum(share, 1)  # chroma shrinks with the light
-    tint = np.maximum(*(np.abs(color[:, k] - 128 - lit * (mean - 128)) for k, mean in enumerate(chroma, start=1)))
+    tint = np.maximum(*(np.abs(color[:, k] - 128 - lit * (mean[:, k] - 128)) for k in (1, 2)))
     dark = np.where(tint < MOST_CHROMA, np.log(share), OTHER_COLOR)
     return dark if scene.unseen is None else np.where(scene.unseen.ravel().take(pixels), OTHER_COLOR, dark)
 

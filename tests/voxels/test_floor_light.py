@@ -13,6 +13,7 @@ from hmc.voxels.floor_light import (
     LEAST_CHANCE,
     SAME_CHROMA,
     SAME_LUMA,
+    UNLIKE,
     FloorEvidence,
     floor_balance,
     floor_evidence,
@@ -128,7 +129,7 @@ def test_a_seat_of_nearly_the_floors_color_tells_nothing(tables, people, shadows
     assert all(after is person for after, person in zip(done, people, strict=True))
 
 
-#: How much brighter the cameras of a rig are, and how much bluer, redder: as far apart as cameras of one make are.
+#: How much brighter the cameras of a rig are, and how much redder, bluer: as far apart as cameras of one make are.
 BRIGHTER, TINTS = (0.95, 1.1, 1.0, 1.05), ((0, 0), (6, -4), (-3, 5), (-5, -2))
 
 
@@ -236,10 +237,14 @@ def test_the_brighter_the_spot_to_others_the_likelier_a_person():
 def test_what_has_lost_next_to_no_light_is_what_the_guess_says(guess):
     """Grey trousers before a grey floor: whatever the others see, it cannot be less light than this camera sees."""
     others = np.linspace(-0.3, 0.05, 8)
+    assert chances_of(guess, 0.0, others) == pytest.approx(1 / (1 + np.exp(-guess)), abs=1e-6)
     assert chances_of(guess, -0.01, others) == pytest.approx(1 / (1 + np.exp(-guess)), abs=0.07)
 
 
 def test_a_spot_that_others_see_dark_for_another_reason_does_not_outweigh_a_sure_guess():
+    odds = np.exp(4) * UNLIKE / (1 + UNLIKE)  # the most that the floor takes of them
+    assert chances_of(4.0, -0.6, -0.6)[0] == pytest.approx(odds / (1 + odds), abs=1e-3)
+    assert chances_of(-4.0, -0.6, 0.0)[0] == pytest.approx(1 / (1 + odds), abs=1e-3)
     assert chances_of(4.0, -0.6, -0.6)[0] > 0.5 and chances_of(-4.0, -0.6, 0.0)[0] < LEAST_CHANCE
 
 
