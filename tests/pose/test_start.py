@@ -200,6 +200,28 @@ def test_an_adult_who_sits_is_no_child():
     assert start_of(acted, 1).body.height_m == pytest.approx(1.7, rel=0.1)
 
 
+@pytest.mark.slow
+def test_who_is_small_and_sits_is_no_mean_adult():
+    acted = act("seated", frames=4, height_m=1.46)
+    begun = start_of(acted, 1)
+    assert begun.body.height_m == pytest.approx(1.46, rel=0.06)
+    assert errors_of(acted, begun).mean() < 0.04
+
+
+@pytest.mark.slow
+def test_who_stood_before_sitting_down_was_as_tall_as_that():
+    stood, sat = act("stand", frames=2, height_m=1.35), act("seated", frames=8, height_m=1.35)
+    both = replace(
+        sat,
+        targets=[*stood.targets, *sat.targets],
+        landmarks=np.concatenate([stood.landmarks, sat.landmarks]),
+        velocities=np.concatenate([stood.velocities, sat.velocities]),
+    )
+    begun = start_of(both)
+    assert begun.body.height_m == pytest.approx(1.35, rel=0.05)
+    assert errors_of(both, begun).mean() < 0.025
+
+
 def test_without_any_hull_there_is_no_start():
     acted = act("walk")
     noise = replace(acted.targets[0], surface=acted.targets[0].surface[:10])

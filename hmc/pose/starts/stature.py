@@ -17,6 +17,12 @@ LEAST_START_SURFACE = 50
 ADULT_M, CHILD_M = 1.45, 0.9
 #: Stray voxels are above the top of a hull: it is at this quantile of its surface.
 TOP_QUANTILE = 0.995
+#: Who sits down or bends was before as tall as this quantile of the frames' tops.
+STOOD_QUANTILE = 0.9
+#: The top of who sits, as a share of the stature: a trunk with head of half of it, on a seat of somewhat more than a quarter.
+SITTING_SHARE = 0.78
+#: Statures nearer than this share are one to start from: the body's dimensions are fitted.
+ALIKE = 0.06
 #: An adult's mean stature, metres.
 ADULT_MEAN_M = 1.7
 
@@ -42,7 +48,7 @@ def estimate_height(targets: Sequence[HullTarget | None], floor_z: float = 0.0) 
 
 
 def possible_heights(targets: Sequence[HullTarget | None], floor_z: float = 0.0) -> tuple[float, ...]:
-    """Statures that the tracked volume allows: an adult's, and where its top is low, also that of a child who stands.
+    """Statures that the tracked volume allows: by how high its top commonly comes, and how high it came for a while.
 
     Parameters
     ----------
@@ -52,16 +58,18 @@ def possible_heights(targets: Sequence[HullTarget | None], floor_z: float = 0.0)
     Returns
     -------
     tuple of float
-        One or two, metres, the likelier first.
+        One to four, metres, the likeliest first: where the top is commonly low, that is an adult who sits and not a child who stands.
     """
     tops = [
         np.quantile(t.surface[:, 2], TOP_QUANTILE) - floor_z for t in targets if t is not None and len(t.surface) >= LEAST_START_SURFACE
     ]
     # Arms held up, hats and stray voxels reach above the crown: the median of the frames resists all that does not last.
-    top = float(np.median(tops)) if tops else 0.0
-    if top > ADULT_M:
-        return (min(top, 2.0),)
-    return (ADULT_MEAN_M, top) if top > CHILD_M else (ADULT_MEAN_M,)
+    common, stood = (min(float(np.quantile(tops, q)), 2.0) if tops else 0.0 for q in (0.5, STOOD_QUANTILE))
+    heights = [common if common > ADULT_M else ADULT_MEAN_M]
+    for height in (common, common / SITTING_SHARE, stood) if common <= ADULT_M else (stood,):
+        if height > CHILD_M and all(abs(height / other - 1) > ALIKE for other in heights):
+            heights.append(height)
+    return tuple(heights)
 
 
 def usable_frames(views: Sequence[PersonView]) -> list[int]:

@@ -38,8 +38,8 @@ __all__ = ["WindowStart"]
 _Path = dict[int, tuple[Tracked, StepInfo]]
 #: The window's frames are thinned out to about so many a second before body and first pose are decided.
 DECIDE_FPS = 30.0
-#: A child is believed where its cost is below this share of an adult's who sits, kneels or bends.
-CHILD_GAIN = 0.9
+#: Another stature is believed where its cost is below this share of that of a mean adult who sits, kneels or bends.
+OTHER_GAIN = 0.75
 
 
 @dataclass(frozen=True)
@@ -99,8 +99,9 @@ class WindowStart:
             started = StartPose(subjects[0], window.usable[0], _neutral_start(bodies[0], window))
         else:
             starts = [_best_hypothesis(one, window, preset, self.settings) for one in subjects]
-            child = int(len(starts) > 1 and starts[1][0].costs[0] < CHILD_GAIN * starts[0][0].costs[0])
-            started, known = starts[child]
+            started, known = min(starts, key=lambda start: start[0].costs[0])
+            if started.costs[0] >= OTHER_GAIN * starts[0][0].costs[0]:
+                started, known = starts[0]
         if preset.fit_body is None:
             return started
         # What the body's dimensions are fitted to need not be the last word on the poses.
