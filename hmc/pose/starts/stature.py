@@ -64,7 +64,7 @@ def possible_heights(targets: Sequence[HullTarget | None], floor_z: float = 0.0)
         np.quantile(t.surface[:, 2], TOP_QUANTILE) - floor_z for t in targets if t is not None and len(t.surface) >= LEAST_START_SURFACE
     ]
     # Arms held up, hats and stray voxels reach above the crown: the median of the frames resists all that does not last.
-    common, stood = (min(float(np.quantile(tops, q)), 2.0) if tops else 0.0 for q in (0.5, STOOD_QUANTILE))
+    common, stood = np.minimum(np.quantile(tops or [0.0], (0.5, STOOD_QUANTILE)), 2.0).tolist()
     heights = [common if common > ADULT_M else ADULT_MEAN_M]
     for height in (common, common / SITTING_SHARE, stood) if common <= ADULT_M else (stood,):
         if height > CHILD_M and all(abs(height / other - 1) > ALIKE for other in heights):

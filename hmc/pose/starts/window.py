@@ -38,7 +38,7 @@ __all__ = ["WindowStart"]
 _Path = dict[int, tuple[Tracked, StepInfo]]
 #: The window's frames are thinned out to about so many a second before body and first pose are decided.
 DECIDE_FPS = 30.0
-#: Another stature is believed where its cost is below this share of that of a mean adult who sits, kneels or bends.
+#: Another stature than the likeliest is believed where its cost is below this share of the likeliest one's.
 OTHER_GAIN = 0.75
 
 
@@ -99,9 +99,8 @@ class WindowStart:
             started = StartPose(subjects[0], window.usable[0], _neutral_start(bodies[0], window))
         else:
             starts = [_best_hypothesis(one, window, preset, self.settings) for one in subjects]
-            started, known = min(starts, key=lambda start: start[0].costs[0])
-            if started.costs[0] >= OTHER_GAIN * starts[0][0].costs[0]:
-                started, known = starts[0]
+            likeliest, cheapest = starts[0], min(starts, key=lambda start: start[0].costs[0])
+            started, known = cheapest if cheapest[0].costs[0] < OTHER_GAIN * likeliest[0].costs[0] else likeliest
         if preset.fit_body is None:
             return started
         # What the body's dimensions are fitted to need not be the last word on the poses.
