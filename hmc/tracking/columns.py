@@ -20,7 +20,7 @@ from hmc.camera.model import Camera
 from hmc.tracking.blobs import Observation
 from hmc.tracking.views import FrameViews, cell_grid, cells_of
 
-__all__ = ["Columns", "explaining", "find_columns", "missed"]
+__all__ = ["Columns", "bodies_at", "explaining", "find_columns", "missed"]
 
 #: Voxels from this height on count: heads, shoulders and trunks of people who stand or sit. Metres.
 UPPER_M = 0.9
@@ -106,6 +106,36 @@ def find_columns(observation: Observation, strict: bool = True) -> Columns:
     near = np.einsum("nkc,nkc->nk", across, across) <= BODY_M**2
     columns = Columns(centres, tuple(sure[mine] for mine in near.T))
     return columns.take(_whole(observation.points, columns, size) | (np.arange(len(columns)) < len(rounds[0])))
+
+
+def bodies_at(observation: Observation, centres: np.ndarray) -> np.ndarray:
+    """Middle of the body around each of some columns: of the strict hull's voxels that are nearer to it than to another.
+
+    Those within `BODY_M` of the column, seen from above; then those within as much of their middle, as a head is seldom over it.
+
+    Parameters
+    ----------
+    observation : Observation
+    centres : ndarray, shape (m, 2)
+        The columns, seen from above, world, metres.
+
+    Returns
+    -------
+    ndarray, shape (m, 3)
+        World, metres; nan where the strict hull has nothing.
+    """
+    bodies = np.full((len(centres), 3), np.nan)
+    if not len(centres):
+        return bodies
+    points = observation.points[observation.certain]
+    across = points[:, None, :2] - centres
+    nearest = np.einsum("nmc,nmc->nm", across, across).argmin(axis=1)
+    for j, centre in enumerate(centres):
+        mine, middle = points[nearest == j], centre
+        for _ in range(2):
+            held = mine[np.hypot(*(mine[:, :2] - middle[:2]).T) <= BODY_M]
+            middle = bodies[j] = held.mean(axis=0) if len(held) else bodies[j]
+    return bodies
 
 
 def _from_above(observation: Observation, rows: np.ndarray) -> np.ndarray:

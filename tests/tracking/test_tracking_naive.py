@@ -8,12 +8,13 @@ import pytest
 from hmc.io.results import TrackTable
 from hmc.tracking.association import assign_voxels
 from hmc.tracking.blobs import observe
-from hmc.tracking.columns import find_columns
+from hmc.tracking.columns import bodies_at, find_columns
 from hmc.tracking.following import advance, finish, init
 from hmc.tracking.naive import NaiveSettings
 from hmc.tracking.settings import FollowingSettings
 from hmc.tracking.trackers import TRACKERS
 from hmc.tracking.tracks import fill_gaps, from_rows, person_voxels, run, velocities
+from hmc.tracking.update import FilterEstimate
 from hmc.voxels.grid import VoxelGrid
 
 GRID = VoxelGrid(np.array([-2.5, -2.0, 0.0]), 0.05, (100, 80, 48))
@@ -304,3 +305,38 @@ def test_one_person_has_one_column():
         observation = observe(GRID, volume)
         assert len(observation.points) * 0.05**3 > 0.2  # as much as two people's
         assert len(find_columns(observation)) == 1
+
+
+def held_back(state, predicted, observation):
+    """A filter that sees everybody, a quarter of a metre behind where they should be."""
+    return FilterEstimate(predicted - [0.25, 0, 0], np.ones(len(predicted), bool), state.memories)
+
+
+def test_two_who_walk_arm_in_arm_are_at_their_columns_where_the_filter_is_behind():
+    a, b = line((-1.8, -0.22), (1.8, -0.22), 60), line((-1.8, 0.22), (1.8, 0.22), 60)
+    state, worst = init(FPS), 0.0
+    for frame, (p, q) in enumerate(zip(a, b, strict=True)):
+        state, _ = advance(state, frame, observe(GRID, person(*p) | person(*q)), FollowingSettings(), held_back)
+        for place in (p, q) if frame > 20 else ():
+            worst = max(worst, min(np.hypot(*(track.position[:2] - place)) for track in state.tracks))
+    assert len(state.tracks) == 2 and worst < 0.06
+
+
+def test_who_crouches_is_not_taken_for_a_column_that_comes_up_beside_them():
+    """The column is free for a moment, 60 cm away, as of somebody who was hidden, or of a ghost; she is seen all the time."""
+    n, low = 20, CENTRES[..., 2] < 0.85
+    crouching, beside = person(0, 0, radius=0.35) & low, person(0.6, 0)
+    volumes = [person(0, 0)] * n + [crouching] * n + [crouching | beside if i < 3 else crouching for i in range(n)]
+    table = follow(volumes)
+    assert set(table.persons) == {0} and len(table.frames) == len(volumes)
+    assert np.hypot(*table.positions[:, :2].T).max() < 0.1
+
+
+def test_a_body_s_middle_is_that_of_all_its_voxels():
+    bodies = [person(-0.3, 0.01), person(0.3, 0.01, height=1.6)]
+    observation = observe(GRID, bodies[0] | bodies[1])
+    measured = bodies_at(observation, np.array([[-0.25, 0.05], [0.3, 0.0], [2.4, 1.9]]))
+    for body, place in zip(bodies, measured[:2], strict=True):
+        assert np.abs(place - CENTRES[body].mean(axis=0)).max() < 0.02
+    assert np.isnan(measured[2]).all()
+    assert bodies_at(observation, np.zeros((0, 2))).shape == (0, 3)

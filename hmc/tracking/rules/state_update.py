@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hmc.tracking.association import head_centre
+from hmc.tracking.columns import TRUNK_M, bodies_at
 from hmc.tracking.likeness import is_established
 from hmc.tracking.rules.death import FORGIVEN
 from hmc.tracking.rules.upright import MATCH_M
@@ -52,11 +53,17 @@ def update_tracks(update: FrameUpdate, settings: FollowingSettings) -> FrameUpda
 
 
 def _corrections(update: FrameUpdate, settings: FollowingSettings) -> list[_Correction]:
-    """The filter's position where it knows the person, else the centroid; of one whose column is elsewhere it knows nothing."""
+    """The body at the column of who shares voxels, where it is near; else the filter's, where it knows them; else the centroid.
+
+    Of one whose column is elsewhere the filter knows nothing.
+    """
     columns = np.append(update.columns.centres, [[np.nan] * 2], axis=0)[update.matched]
     known = update.estimate.seen & ~(np.hypot(*(update.estimate.positions[:, :2] - columns).T) > MATCH_M)
     measured = np.where(known[:, None], update.estimate.positions, update.measurement.located.centroid)
     gain = np.where(update.shared, np.where(known, settings.filter_gain, settings.shared_gain), 1.0)
+    bodies = np.append(bodies_at(update.observation, update.columns.centres), [[np.nan] * 3], axis=0)[update.matched]
+    sure = update.shared & (np.hypot(*(bodies - update.predicted)[:, :2].T) <= TRUNK_M)
+    measured, gain = np.where(sure[:, None], bodies, measured), np.where(sure, 1.0, gain)
     return [_Correction(*one) for one in zip(measured, gain, known.tolist(), strict=True)]
 
 

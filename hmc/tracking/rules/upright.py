@@ -21,7 +21,8 @@ __all__ = ["match_columns", "share_columns"]
 
 #: A track's person is in a column no further away than this, seen from above; metres.
 MATCH_M = 0.4
-#: A track without a column has the nearest that no other has, up to this distance: the person was lost for a moment. Metres.
+#: A track without a column, and that nothing supported in the frame before, has the nearest that no other has, up to this distance: the
+#: person was lost for a moment. Metres.
 LOST_M = 0.8
 #: Lower ones are furniture as often as people; the rules after this one judge them by more than their height. Metres.
 LEAST_TOP_M = 1.1
@@ -48,16 +49,17 @@ def match_columns(update: FrameUpdate, settings: FollowingSettings) -> FrameUpda
     stands = [observation.points[rows, 2].max() >= STANDING_M for rows in others.voxels]
     both = Columns(np.concatenate([columns.centres, others.centres]), columns.voxels + others.voxels)
     begins = np.array([True] * len(columns) + stands, bool)
-    return replace(update, columns=both, matched=_match(update.predicted, both.centres), begins=begins)
+    return replace(update, columns=both, matched=_match(update, both.centres), begins=begins)
 
 
-def _match(predicted: np.ndarray, centres: np.ndarray) -> np.ndarray:
+def _match(update: FrameUpdate, centres: np.ndarray) -> np.ndarray:
     """Column of each track, or -1, shape (k,): the nearest, those within `MATCH_M` first."""
-    across = predicted[:, None, :2] - centres
+    across = update.predicted[:, None, :2] - centres
     distance = np.sqrt(np.einsum("kmc,kmc->km", across, across))
-    matched = np.full(len(predicted), -1)
-    for reach in (MATCH_M, LOST_M):
-        tracks, free = np.flatnonzero(matched < 0), np.setdiff1d(np.arange(len(centres)), matched)
+    matched = np.full(len(update.predicted), -1)
+    lost = np.array([track.last_frame < update.frame - 1 for track in update.state.tracks], bool)
+    for reach, may in ((MATCH_M, np.full(len(matched), True)), (LOST_M, lost)):
+        tracks, free = np.flatnonzero(may & (matched < 0)), np.setdiff1d(np.arange(len(centres)), matched)
         rows, found = linear_sum_assignment(np.minimum(distance[np.ix_(tracks, free)], 2 * reach))
         rows, found = tracks[rows], free[found]
         near = distance[rows, found] <= reach
