@@ -1,8 +1,7 @@
 """Track death: without support for too long, in another's place, unlike a person, or with a filter that hardly finds anything.
 
 Canton (2009), section 4.2.3. Shown by `tests/tracking/test_tracking_deletion.py`; two tracks in one place by
-`test_the_younger_of_two_tracks_in_one_place_ends` and the recipe `hug`, where the
-naive tracker's MOTA goes from .946 to .911 without it.
+`test_the_younger_of_two_tracks_in_one_place_ends`.
 """
 
 from __future__ import annotations
