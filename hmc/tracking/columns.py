@@ -20,7 +20,7 @@ from hmc.camera.model import Camera
 from hmc.tracking.blobs import Observation
 from hmc.tracking.views import FrameViews, cell_grid, cells_of
 
-__all__ = ["Columns", "bodies_at", "explaining", "find_columns", "missed"]
+__all__ = ["Columns", "bodies_at", "explaining", "find_columns", "missed", "nearest_column"]
 
 #: Voxels from this height on count: heads, shoulders and trunks of people who stand or sit. Metres.
 UPPER_M = 0.9
@@ -108,6 +108,28 @@ def find_columns(observation: Observation, strict: bool = True) -> Columns:
     return columns.take(_whole(observation.points, columns, size) | (np.arange(len(columns)) < len(rounds[0])))
 
 
+def nearest_column(points: np.ndarray, centres: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The column that is nearest to each point, seen from above.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3)
+        World, metres.
+    centres : ndarray, shape (m, 2)
+        The columns, one at least, seen from above, world, metres.
+
+    Returns
+    -------
+    nearest : ndarray of int, shape (n,)
+    away : ndarray, shape (n,)
+        How far it is, metres.
+    """
+    across = points[:, None, :2] - centres
+    squared = np.einsum("nmc,nmc->nm", across, across)
+    nearest = squared.argmin(axis=1)
+    return nearest, np.sqrt(squared[np.arange(len(nearest)), nearest])
+
+
 def bodies_at(observation: Observation, centres: np.ndarray) -> np.ndarray:
     """Middle of the body around each of some columns: of the strict hull's voxels that are nearer to it than to another.
 
@@ -128,8 +150,7 @@ def bodies_at(observation: Observation, centres: np.ndarray) -> np.ndarray:
     if not len(centres):
         return bodies
     points = observation.points[observation.certain]
-    across = points[:, None, :2] - centres
-    nearest = np.einsum("nmc,nmc->nm", across, across).argmin(axis=1)
+    nearest, _ = nearest_column(points, centres)
     for j, centre in enumerate(centres):
         mine, middle = points[nearest == j], centre
         for _ in range(2):

@@ -20,7 +20,8 @@ INTRODUCTION = (
     "to be had: rendered recordings, or those of the user, stand for them, so that order and shape are compared and not figures. An "
     "experiment is reproduced when everything that its paper shows holds in a run in full. Where it holds in a quick run, or in a "
     "part of the full grid, no more than that is said. Something holds where its confidence interval over clips and seeds says so, and "
-    "differs where the interval says the contrary, or what has to be so first is not; where both are in the interval it is undecided."
+    "differs where the interval says the contrary, or what has to be so first is not; where both are in the interval it is undecided. "
+    "A figure of a paper's counts as reached where it is in the interval; bounds of our own, which no paper has, are decided on the mean."
 )
 #: Tables with more rows are folded up.
 MAX_OPEN_ROWS = 16

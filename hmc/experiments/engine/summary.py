@@ -103,11 +103,11 @@ class Row:
 
     @property
     def why(self) -> str:
-        """Why it differs, as far as known, and over how much what is undecided is; empty where everything holds."""
+        """Why it differs or what has to be known of what holds, and over how much what is undecided is."""
         told = []
         if self.verdict == DIFFERS:
             told.append(f"Why it differs, as far as known: {self.entry.why or UNKNOWN}")
-        elif self.differing and self.entry.why:
+        elif self.results and self.entry.why:
             told.append(self.entry.why)
         if any(claim.undecided for claim in self.differing):
             n = len(self.results[0].recordings)

@@ -58,14 +58,19 @@ def _corrections(update: FrameUpdate, settings: FollowingSettings) -> list[_Corr
 
     Of one whose column is elsewhere the filter knows nothing.
     """
-    columns = np.append(update.columns.centres, [[np.nan] * 2], axis=0)[update.matched]
+    columns = _of_tracks(update, update.columns.centres)
     known = update.estimate.seen & ~(np.hypot(*(update.estimate.positions[:, :2] - columns).T) > MATCH_M)
     measured = np.where(known[:, None], update.estimate.positions, update.measurement.located.centroid)
     gain = np.where(update.shared, np.where(known, settings.filter_gain, settings.shared_gain), 1.0)
-    bodies = np.append(bodies_at(update.observation, update.columns.centres), [[np.nan] * 3], axis=0)[update.matched]
+    bodies = _of_tracks(update, bodies_at(update.observation, update.columns.centres))
     sure = update.shared & (np.hypot(*(bodies - update.predicted)[:, :2].T) <= TRUNK_M)
     measured, gain = np.where(sure[:, None], bodies, measured), np.where(sure, 1.0, gain)
     return [_Correction(*one) for one in zip(measured, gain, known.tolist(), strict=True)]
+
+
+def _of_tracks(update: FrameUpdate, places: np.ndarray) -> np.ndarray:
+    """The place of each track's column; nan for who has none."""
+    return np.append(places, np.full((1, places.shape[1]), np.nan), axis=0)[update.matched]
 
 
 def _measured(update: FrameUpdate, k: int, correction: _Correction, settings: FollowingSettings) -> tuple[Track, list[TrackRow]]:

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from hmc.tracking.blobs import blob_features
-from hmc.tracking.columns import BODY_M, Columns, explaining, find_columns, missed
+from hmc.tracking.columns import BODY_M, Columns, explaining, find_columns, missed, nearest_column
 from hmc.tracking.settings import FollowingSettings, LifecycleSettings
 from hmc.tracking.update import FrameUpdate
 
@@ -72,13 +72,10 @@ def share_columns(update: FrameUpdate, settings: FollowingSettings) -> FrameUpda
     columns, observation = update.columns, update.observation
     if not len(columns):
         return update
-    across = observation.points[:, None, :2] - columns.centres
-    distance = np.einsum("nmc,nmc->nm", across, across)
-    nearest = distance.argmin(axis=1)
-    inside = distance[np.arange(len(nearest)), nearest] <= BODY_M**2
+    nearest, away = nearest_column(observation.points, columns.centres)
     whose = np.full(len(columns), -1)
     whose[update.matched[update.matched >= 0]] = np.flatnonzero(update.matched >= 0)
-    return replace(update, owners=np.where(inside, whose[nearest], update.owners))
+    return replace(update, owners=np.where(away <= BODY_M, whose[nearest], update.owners))
 
 
 def _tall(update: FrameUpdate, columns: Columns, limits: LifecycleSettings) -> np.ndarray:
