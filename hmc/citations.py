@@ -11,6 +11,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from hmc import __version__
@@ -180,20 +181,26 @@ def works_of(name: str, preset: str = "default") -> list[Work]:
     raise InputError(f"{name!r} is no method, tracker or work, nor the folder of a result; {hint}")
 
 
-def works_of_run(run: Mapping[str, Any]) -> list[Work]:
+def works_of_run(run: Mapping[str, Any], file: str | Path = "run.toml") -> list[Work]:
     """The works behind a result, by its `run.toml`: method, preset, and tracker where one was used.
 
     Methods of your own are known by the works that their source names, if they are registered.
 
+    Parameters
+    ----------
+    run : mapping
+    file : str or Path
+        Where it was read from, for messages.
+
     Raises
     ------
     InputError
-        When `run.toml` names no method, or one that is not known.
+        When it names no method, or one that is not known.
     """
     from hmc.tracking.trackers import DEFAULT
 
     if "method" not in run:
-        raise InputError("run.toml: names no method; give the folder of a result of `hmc track` or `hmc pose`")
+        raise InputError(f"{file}: names no method; give the folder of a result of `hmc track` or `hmc pose`")
     options, method = run.get("options", {}), str(run["method"])
     if options.get("command") == "track":
         return works_of(method)

@@ -71,7 +71,7 @@ def _load(path: str) -> None:
         return
     spec = importlib.util.spec_from_file_location(f"_hmc_plugin_{Path(path).stem}", path)
     if not path.endswith(".py") or not Path(path).is_file() or spec is None or spec.loader is None:
-        raise InputError(f"plugin {path}: there is no such Python file")
+        raise InputError(f"plugin {path}: there is no such Python file (its name ends with .py)")
     module = importlib.util.module_from_spec(spec)
     _loaded.add(path)  # before it is run: it may ask for methods itself
     # Classes of the file may be looked up by the name of their module, as dataclasses do.

@@ -44,7 +44,7 @@ def run(args: argparse.Namespace) -> int:
         path = Path(what) / "run.toml" if Path(what).is_dir() else Path(what)
         if path.is_file() or Path(what).is_dir():
             table = read_run(path)
-            works = works_of_run(table)
+            works = works_of_run(table, path)
             detector |= "keypoints" in str(table.get("options", {}).get("cues") or table.get("parameters", {}).get("cues", ""))
             detector |= table.get("method") in ON_KEYPOINTS
         else:

@@ -290,7 +290,7 @@ def camera_names(text: str) -> list[str]:
 
 
 def recording_source(recording) -> dict[str, Any]:
-    """What a result says of the recording it was made from: where it lies, and when its files last changed."""
+    """What a result says of the recording it was made from: where it lies, and a digest of which files it has and when each changed."""
     from hmc.io.places import places_of
 
     return places_source(places_of(recording))
@@ -298,9 +298,7 @@ def recording_source(recording) -> dict[str, Any]:
 
 def places_source(places) -> dict[str, Any]:
     """As `recording_source`, of a recording that need not be opened."""
-    from datetime import UTC, datetime
-
-    source = {"recording": real_path(places.path), "recording_changed": datetime.fromtimestamp(places.changed_s(), UTC).isoformat()}
+    source = {"recording": real_path(places.path), "recording_files": places.files_digest()}
     lacks = {"calibration": places.calibration, "background": places.background, "videos": places.videos, **places.settings}
     given = {name: real_path(value) if isinstance(value, Path) else value for name, value in lacks.items() if value is not None}
     return source | ({"given": given} if given else {})
@@ -338,7 +336,7 @@ def unlike_its_run(folder: Path, names: Collection[str] = ()) -> list[str]:
 
 def note_changes(recording, source: Mapping[str, Any], problems: list[str]) -> None:
     """Add to the problems that files of a recording are not those that a run began with."""
-    if recording_source(recording)["recording_changed"] != source["recording_changed"]:
+    if recording_source(recording)["recording_files"] != source["recording_files"]:
         problems.append(f"{recording.path}: its files changed during the run, of which the result may have both; delete it and run again")
 
 

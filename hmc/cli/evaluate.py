@@ -7,11 +7,14 @@ import csv
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from hmc.cli.common import unlike_its_run, whole_number
 from hmc.errors import InputError
 from hmc.io.files import atomic_write, real_path, write_toml
+
+if TYPE_CHECKING:
+    from hmc.io.results import TrackTable
 
 __all__ = ["add_parser", "run"]
 
@@ -97,12 +100,14 @@ def run(args: argparse.Namespace) -> int:
         images = _in_images(args, estimated, true_poses, truth_images, selected)
 
     tracks: MotScores | None = None
-    tracks_note = ""
+    tracks_note, beyond = "", list[str]()
     true_tracks = None if truth_centroids is None else selected(read_centroids(truth_centroids))
     if true_tracks is None and true_poses is not None:
         true_tracks, tracks_note = pelvis_tracks(true_poses), " (against the true pelvis, as there are no true centroids)"
     if true_tracks is not None and tracks_file.exists():
-        tracks = evaluate_tracks(selected(read_tracks(tracks_file)), true_tracks)
+        found = selected(read_tracks(tracks_file))
+        tracks = evaluate_tracks(found, true_tracks)
+        beyond = _beyond_truth(found, true_tracks)
     if poses is None and tracks is None and images is None:
         raise InputError(f"{args.directory}: neither joints.csv nor tracks.csv that the truth could be compared with")
     if args.angles and poses is None and images is None:
@@ -151,12 +156,24 @@ def run(args: argparse.Namespace) -> int:
             f"positives, {tracks.mismatches} mismatches in {tracks.objects} person-frames{tracks_note}"
         )
         report["tracks"] = track_summary(tracks)
+        notes += beyond
     notes += unlike_its_run(args.directory) + made_from(args.directory, args.recording)
     for note in notes:
         print(f"note: {note}")
     report["notes"] = notes
     write_toml(args.directory / "metrics.toml", {"truth": str(args.truth or args.recording), "start": start, "frames": frames, **report})
     return 0
+
+
+def _beyond_truth(found: TrackTable, true: TrackTable) -> list[str]:
+    """What is said of rows of tracks before or after all of the truth: nobody may be there then, or the truth may be of less."""
+    if not len(true.frames):
+        return []
+    first, last = int(true.frames.min()), int(true.frames.max())
+    n = int(((found.frames < first) | (found.frames > last)).sum())
+    if not n:
+        return []
+    return [f"{n} rows of the tracks are outside the truth's frames {first} to {last} and count as false positives (--start, --frames)"]
 
 
 def _feet(args: argparse.Namespace, persons) -> dict[str, float]:

@@ -36,30 +36,47 @@ def add_result_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--person", type=whole_number, metavar="N", help="this person alone (default: all)")
     parser.add_argument("--fps", type=positive_float, metavar="F", help="frames a second (default: as run.toml says)")
     parser.add_argument("--smooth", choices=("butterworth", "polynomial"), help="smooth the trajectories first (default: as they are)")
-    parser.add_argument(
-        "--cutoff", type=positive_float, default=6.0, metavar="HZ", help="of the Butterworth filter, without delay (default: 6)"
-    )
-    parser.add_argument("--window", type=positive_float, default=0.4, metavar="S", help="of the polynomial, seconds (default: 0.4)")
+    parser.add_argument("--cutoff", type=positive_float, metavar="HZ", help="of the Butterworth filter, without delay (default: 6)")
+    parser.add_argument("--window", type=positive_float, metavar="S", help="of the polynomial, seconds (default: 0.4)")
 
 
 def read_result_asked(args: argparse.Namespace):
-    """The trajectories that the options of `add_result_options` ask for."""
+    """The trajectories that the options of `add_result_options` ask for.
+
+    Raises
+    ------
+    InputError
+        When there are none, or an option has nothing to act on.
+    """
+    import numpy as np
+
+    from hmc.errors import InputError
     from hmc.motion.smoothing import Smoothing, smooth_trajectory
     from hmc.motion.trajectory import read_trajectories
 
+    for option, value, way in (("--cutoff", args.cutoff, "butterworth"), ("--window", args.window, "polynomial")):
+        if value is not None and args.smooth != way:
+            raise InputError(f"{option} is of --smooth {way}: give that too, or take it out")
     found = read_trajectories(args.result, args.fps, args.person)
     print_problems(unlike_its_run(args.result))
     if args.smooth is None:
         return found
-    how = Smoothing(args.smooth, args.cutoff, args.window)
-    return [smooth_trajectory(one, how) for one in found]
+    given = {"cutoff_hz": args.cutoff, "window_s": args.window}
+    how = Smoothing(args.smooth, **{name: value for name, value in given.items() if value is not None})
+    smoothed = [smooth_trajectory(one, how) for one in found]
+    if all(np.array_equal(a.positions, b.positions, equal_nan=True) for a, b in zip(found, smoothed, strict=True)):
+        print_problems(["nothing was smoothed: no stretch without gaps is long enough"])
+    return smoothed
 
 
 def run(args: argparse.Namespace) -> int:
     """Read, fill, smooth, write."""
+    from hmc.errors import InputError
     from hmc.motion.export import export_trajectories
     from hmc.motion.gaps import fill_trajectory
 
+    if args.max_gap is not None and args.fill == "none":
+        raise InputError("--max-gap is of --fill linear or spline: give that too, or take it out")
     refuse_result_file(args.out, args.result)
     found = [fill_trajectory(one, args.fill, args.max_gap) for one in read_result_asked(args)]
     written = export_trajectories(found, args.out or args.result / f"motion.{args.to}", args.to)

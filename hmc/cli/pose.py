@@ -32,7 +32,7 @@ from hmc.cli.common import (
 )
 from hmc.cli.kept import MASKS, add_silhouette_options, given_silhouettes, leave_silhouettes, silhouettes_source, take_silhouettes
 from hmc.cli.option_tables import add_like_option, repeated_preset, told_options
-from hmc.cli.pose_markers import MARKERS_JOURNAL, add_marker_options, read_markers
+from hmc.cli.pose_markers import MARKERS_JOURNAL, add_marker_options, read_markers, refuse_markers
 from hmc.cli.run_bar import FIRST_POSE, FITTING, FOLLOWING, LEARNING, SECOND_PASS, TRACKING, VIEWS, RunBar
 from hmc.cli.track import JOURNAL, add_tracker_options, selected_frontend, selected_tracker
 from hmc.io.files import real_path
@@ -115,6 +115,7 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     parser.add_argument(
         "--cues",
         choices=CUES,
+        metavar="|".join(CUES),
         help="what poses are fitted to: silhouettes alone, with the keypoints that a 2-D detector left in the recording, for "
         "methods that refine (default: both where both are there), or with these keypoints alone, without any silhouette",
     )
@@ -162,6 +163,8 @@ def _run(args: argparse.Namespace, held: ExitStack) -> int:
     plugins = load_given_plugins(args)
     name = args.method or ("keypoints" if args.cues == CUES[2] else "apf")
     method = pose_method(name, args.preset, args.model, args.init, args.markers == "skin", args.passes, _settings(args, name))
+    if "detections" not in method.needs:
+        refuse_markers(args)
     if args.smooth is not None:
         method = as_found(method)
     recording = opened()

@@ -10,7 +10,7 @@ from typing import Any
 from hmc.cli.common import progress
 from hmc.io.files import real_path
 
-__all__ = ["MARKERS_JOURNAL", "Markers", "add_marker_options", "read_markers"]
+__all__ = ["MARKERS_JOURNAL", "Markers", "add_marker_options", "read_markers", "refuse_markers"]
 
 #: Found in the recording's folder where no option says otherwise.
 DETECTIONS, LABELS = Path("markers/detections.csv"), Path("markers/labels.csv")
@@ -100,6 +100,15 @@ class Markers:
                 f"{self.used}: in no frame do enough markers appear in enough views at places that agree; check the detections and the "
                 "calibration"
             )
+
+
+def refuse_markers(args: argparse.Namespace) -> None:
+    """Raise an InputError where a method that looks at no markers is given a file of them."""
+    from hmc.errors import InputError
+
+    for option, given in (("--detections", args.detections), ("--labels", args.labels)):
+        if given is not None:
+            raise InputError(f"{option} is of --method marker-apf: give that too, or take it out")
 
 
 def read_markers(args: argparse.Namespace, recording) -> Markers:

@@ -64,16 +64,23 @@ def add_parser(subparsers) -> None:
 
 
 def _distance(text: str) -> tuple[str, str, float]:
-    one, other, metres = text.split(",")
-    if not float(metres) > 0:
-        raise ValueError
-    return one, other, float(metres)
+    try:
+        one, other, metres = text.split(",")
+        distance = float(metres)
+    except ValueError:
+        distance = 0.0
+    if not 0 < distance < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text!r} is not two cameras and how many metres they are apart, such as cam_00,cam_01,2.5")
+    return one, other, distance
 
 
 def _board(text: str) -> tuple[int, int]:
-    columns, rows = (int(n) for n in text.lower().split("x"))
+    try:
+        columns, rows = (int(n) for n in text.lower().split("x"))
+    except ValueError:
+        columns = rows = 0
     if min(columns, rows) < 3:
-        raise ValueError
+        raise argparse.ArgumentTypeError(f"{text!r} is not the inner corners of a chessboard, 3 or more each way, such as 9x6")
     return columns, rows
 
 
@@ -101,6 +108,8 @@ def run(args: argparse.Namespace) -> int:
     from hmc.io.new_world import write_new_world, write_session_world
     from hmc.io.recording import background_frames, iterate_frames, open_recording
 
+    if args.square is not None and args.board is None:
+        raise InputError("--square is the side of a board's squares: give --board too, or take it out")
     places = given_places(args)
     if args.out is not None:
         refuse_own_file(args.out, places)

@@ -302,13 +302,16 @@ def _footage_of_images(path: Path, images: dict[int, Path], first_number: int = 
                 raise
             continue
         if image is not None:
-            _refuse_faint(file, image)
+            _refuse_unlike(file, image)
             return Footage(path, max(images) + 1, (image.shape[1], image.shape[0]), images)
     raise InputError(f"{path}: none of its {len(images)} images can be read; copy or convert them again")
 
 
-def _refuse_faint(path: Path, image: np.ndarray) -> None:
-    """Refuse what has 16 bits a value and uses no more than 12 of them: read as 8 bits it is black. What is all black may be so."""
+def _refuse_unlike(path: Path, image: np.ndarray) -> None:
+    """Refuse what has no whole numbers of 8 or 16 bits, and what has 16 and uses no more than 12 of them: read as 8 bits it is black.
+    What is all black may be so."""
+    if image.dtype not in (np.uint8, np.uint16):
+        raise InputError(f"{path}: its values are {image.dtype}, as no camera has them; convert its images to 8 or 16 bits a value")
     if image.dtype == np.uint16 and 0 < image.max() <= MOST_OF_12_BITS:
         raise InputError(
             f"{path}: 16 bits a value, but none above {image.max()}, which is as good as black (a camera of 10 or 12 bits?); stretch its "

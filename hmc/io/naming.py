@@ -65,13 +65,17 @@ def find_files(recording: Path, kind: str, names: Sequence[str], settings: Mappi
     Raises
     ------
     InputError
-        When recording.toml names a camera or file that is not there, it is not clear which file is meant, or the folder is none.
+        When recording.toml names a camera or file that is not there, or its pattern fits no file at all, it is not clear which file is
+        meant, or the folder is none.
     """
     said = settings.get(kind, {})
     if isinstance(said, Path):
         return Found({name: _in_place(Path(str(said).replace(PLACE, name))) for name in names}, {})
     if isinstance(said, str):
-        return Found({name: _by_pattern(recording, kind, said, name) for name in names}, {})
+        files = {name: _by_pattern(recording, kind, said, name) for name in names}
+        if not any(files.values()):
+            raise InputError(f'{recording / "recording.toml"}: `{kind}` = "{said}" fits no file of any camera; correct or remove it')
+        return Found(files, {})
     strangers = [name for name in said if name not in names]
     if strangers:
         raise InputError(

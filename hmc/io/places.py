@@ -6,14 +6,19 @@ goes before.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
+from hashlib import sha256
+from os.path import relpath
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from hmc.errors import InputError
 from hmc.io.calibration import CalibrationEntry, find_calibration, read_entries
 from hmc.io.calibration.read import PATTERNS
-from hmc.io.files import real_path
+from hmc.io.files import matching, real_path
+from hmc.io.naming import FILES
 from hmc.io.settings import read_settings
 
 if TYPE_CHECKING:
@@ -25,18 +30,20 @@ __all__ = ["AnyPlaces", "RecordingPlaces", "places_of", "to_places"]
 CAMERA = "{camera}"
 #: So many of the patterns of calibrations match nothing else: a camera's own .xml or .yml beside a trial's videos is none.
 OF_RIGS = 10
-#: Files of a recording on which its results depend.
+#: Files of a recording on which its results depend, besides the calibration and what recording.toml names.
 SOURCES = (
-    "calibration*",
     "recording.toml",
     "videos/*",
+    "videos/*/*",
     "images/*/*",
     "images/*",
+    "silhouettes/*",
     "silhouettes/*/*",
     "background/*",
     "background/*/*",
     "keypoints/*",
     "keypoints/*/*",
+    "markers/*",
     "times/*",
     "pose/*/*",
 )
@@ -99,9 +106,13 @@ class RecordingPlaces:
         own = self.path / "background"
         return own if self.background is None or own.is_dir() else self.background
 
-    def changed_s(self) -> float:
-        """When a file on which results depend last changed, seconds since 1970; 0 where there is none."""
-        return max((file.stat().st_mtime for file in self._sources()), default=0.0)
+    def files_digest(self) -> str:
+        """Digest of the files on which results depend: which there are, how long they are and when each last changed."""
+        told = sha256()
+        for name, file in sorted({relpath(file, self.path): file for file in self._sources() if file.is_file()}.items()):
+            status = file.stat()
+            told.update(f"{name}\0{status.st_size}\0{status.st_mtime_ns}\0".encode("utf-8", "surrogateescape"))
+        return told.hexdigest()[:16]
 
     def has(self, path: Path) -> bool:
         """Whether a file is one of the recording's, or would lie among those of its cameras."""
@@ -111,14 +122,31 @@ class RecordingPlaces:
 
     def _sources(self) -> list[Path]:
         files = [file for pattern in SOURCES for file in self.path.glob(pattern)]
-        if self.calibration is not None and self.calibration_place == self.calibration:
-            files += find_calibration(self.calibration)
+        with suppress(InputError):  # told where it is read
+            files += [both for file in find_calibration(self.calibration_place) for both in (file, *_other_of_pair(file))]
+        files += self._named_files()
         if self.background is not None and self.background_folder == self.background:
             files += [*self.background.glob("*"), *self.background.glob("*/*")]
         if self.videos is not None:
             pattern = Path(self.videos.replace(CAMERA, "*"))
             files += pattern.parent.glob(pattern.name)
         return files
+
+    def _named_files(self) -> Iterator[Path]:
+        """What recording.toml names as cameras' files, and what is in folders that it names."""
+        with suppress(InputError):
+            settings = self.read_settings()
+            for said in (settings.get(kind, {}) for kind in FILES):
+                named = matching(self.path, said.replace(CAMERA, "*")) if isinstance(said, str) else ()
+                named = [self.path / file for file in said.values()] if isinstance(said, dict) else named
+                for file in named:
+                    yield file
+                    yield from file.glob("*")
+
+
+def _other_of_pair(file: Path) -> list[Path]:
+    """EasyMocap's calibration is two files, of which the first is found."""
+    return [file.with_stem("extri")] if file.stem.lower() == "intri" else []
 
 
 #: A recording's folder, or where its parts lie.

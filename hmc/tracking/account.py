@@ -93,6 +93,8 @@ def remarks(account: Account, table: TrackTable, fps: float, most: int | None) -
     lines += [
         f"persons {a} and {b} are in one place for {seconds:.1f} s: they may be one person" for a, b, seconds in _in_one_place(table, fps)
     ]
+    if most == 0:
+        return [*lines, "recording.toml says persons = 0, so nobody was looked for; correct it, or take it out"]
     if not len(table.frames):
         return [*lines, "nobody was found in any frame: hmc check tells whether calibration, room and silhouettes fit each other"]
     there = np.bincount(table.frames - table.frames.min())

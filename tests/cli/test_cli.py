@@ -79,6 +79,29 @@ def test_no_export_takes_the_place_of_a_result_s_file(tmp_path, capsys, words):
     assert "is the result's own file; choose another name" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["export", "rec", "--to", "csv", "--cutoff", "3"], "--cutoff is of --smooth butterworth"),
+        (["export", "rec", "--to", "csv", "--smooth", "butterworth", "--window", "1"], "--window is of --smooth polynomial"),
+        (["angles", "rec", "--window", "1"], "--window is of --smooth polynomial"),
+        (["export", "rec", "--to", "csv", "--max-gap", "1"], "--max-gap is of --fill linear or spline"),
+        (["world", "rec", "--square", "0.05"], "give --board too"),
+        (["world", "rec", "--board", "2x9"], "'2x9' is not the inner corners of a chessboard, 3 or more each way"),
+        (["world", "rec", "--distance", "cam_00,cam_01"], "'cam_00,cam_01' is not two cameras and how many metres they are apart"),
+        (["pose", "rec", "--out", "res", "--detections", "points.csv"], "--detections is of --method marker-apf"),
+        (["pose", "rec", "--out", "res", "--labels", "points.csv"], "--labels is of --method marker-apf"),
+        (["pose", "rec", "--out", "res", "--cues", "all"], "choose from 'silhouettes', 'silhouettes,keypoints', 'keypoints'"),
+    ],
+)
+def test_options_without_anything_to_act_on_are_refused(recording_folder, tmp_path, monkeypatch, capsys, words, says):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "rec").symlink_to(recording_folder)
+    with suppress(SystemExit):
+        assert main(words) == 2
+    assert says in capsys.readouterr().err and not (tmp_path / "res").exists()
+
+
 def test_check_default_picture_and_all_frames(recording_folder, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["check", str(recording_folder), "--all", "--cameras", "cam_00,cam_01,cam_02"]) == 0

@@ -50,6 +50,34 @@ def test_a_camera_folder_may_hold_its_one_video(bare):
     assert_each_its_own(open_recording(bare[0]))
 
 
+@pytest.mark.parametrize("kind", ["videos", "silhouettes"])
+def test_a_pattern_that_fits_nothing_is_told(bare, kind):
+    folder, rig = bare
+    videos_at(folder, rig, "videos/{}.avi")
+    (folder / "recording.toml").write_text(f'{kind} = "other/{{camera}}_*.avi"\n')
+    with pytest.raises(InputError, match=rf'recording.toml: `{kind}` = "other/.*" fits no file of any camera; correct or remove it'):
+        open_recording(folder)
+
+
+def test_an_empty_scene_whose_pattern_fits_nothing_is_told(bare):
+    folder, rig = bare
+    for place in ("videos/{}.avi", "background/{}.avi"):
+        videos_at(folder, rig, place)
+    (folder / "recording.toml").write_text('background = "empty/{camera}.avi"\n')
+    (problem,) = (one for one in open_recording(folder).problems if "background" in one)
+    assert "fits no file of any camera" in problem and problem.endswith("going on without background")
+
+
+def test_images_of_floating_point_are_refused(bare):
+    folder, rig = bare
+    for camera in rig:
+        (folder / "images" / camera.name).mkdir(parents=True)
+        width, height = camera.size
+        cv2.imwrite(str(folder / "images" / camera.name / "0000.tif"), np.full((height, width, 3), 0.5, np.float32))
+    with pytest.raises(InputError, match="its values are float32, as no camera has them; convert its images to 8 or 16 bits"):
+        open_recording(folder)
+
+
 def test_two_videos_in_a_camera_folder_are_told(bare):
     for name in ("one", "two"):
         videos_at(*bare, f"videos/{{}}/{name}.avi")

@@ -146,6 +146,14 @@ def test_a_reference_elsewhere_and_tracks_without_centroids(result, truth, tmp_p
     assert "MOTP 60.0 mm" in out and "poses" not in out
 
 
+def test_tracks_beyond_the_truth_are_told(result, truth, tmp_path, capsys):
+    for last, told in ((truth.frames.max(), False), (12, True)):
+        write_joints(tmp_path / "reference.csv", truth.where(truth.frames <= last))
+        assert main(["evaluate", str(result), "--truth", str(tmp_path / "reference.csv")]) == 0
+        out = capsys.readouterr().out
+        assert ("rows of the tracks are outside the truth's frames 0 to 12 and count as false positives" in out) == told
+
+
 def test_a_result_of_another_recording_is_told(result, recording, tmp_path, capsys):
     for made, told in ((tmp_path / "elsewhere" / recording.name, False), (tmp_path / "other_take", True)):
         write_run(result / "run.toml", "apf", {}, 0, recording=made)

@@ -47,6 +47,12 @@ def test_two_tracks_on_one_person_are_told():
     assert remarks(Account(), table((0, 0, 60), (0.1, 0.1, 20)), 25.0, None) == []
 
 
+def test_nobody_to_look_for_is_told_as_such():
+    empty = TrackTable(np.zeros(0, int), np.zeros(0, int), np.zeros((0, 3)))
+    (line,) = remarks(Account(15), empty, 25.0, 0)
+    assert line.startswith("recording.toml says persons = 0")
+
+
 def test_an_empty_result_says_where_to_look():
     empty = TrackTable(np.zeros(0, int), np.zeros(0, int), np.zeros((0, 3)))
     (line,) = remarks(Account(15), empty, 25.0, 2)

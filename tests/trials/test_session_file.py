@@ -1,5 +1,7 @@
 """session.toml: what each trial gets, and all that is wrong with a file in one line."""
 
+from pathlib import Path
+
 import pytest
 
 from hmc.errors import InputError
@@ -81,23 +83,60 @@ def test_changes_are_noticed_wherever_they_are(lab):
     import os
 
     places = read_session(lab).trials[2].places
-    before = places.changed_s()
+    seen = {places.files_digest()}
     for file in (lab / "rig" / "calibration.toml", lab / "empty" / "cam_01.avi", lab / "raw" / "three_cam_01.avi"):
-        os.utime(file, (before + 10, before + 10))
-        assert places.changed_s() == before + 10
-        before += 10
+        os.utime(file, (10, 10))  # an older one than it was
+        seen.add(places.files_digest())
+    assert len(seen) == 4 and places.files_digest() in seen
 
 
 def test_times_that_were_found_are_noticed(lab):
     """What `hmc sync` writes makes a run that was finished another."""
+    places = read_session(lab).trials[0].places
+    before, times = places.files_digest(), lab / "trials" / "one" / "times"
+    times.mkdir()
+    assert places.files_digest() == before
+    (times / "cam_01.csv").write_text("frame,time_s\n0,0\n")
+    assert places.files_digest() != before
+
+
+@pytest.mark.parametrize(
+    ("settings", "file"),
+    [
+        ("", "Calib_scene.toml"),
+        ("", "calibration/cam_00.yml"),
+        ("", "intri.yml"),
+        ("", "extri.yml"),
+        ("", "videos/cam_00/clip.mp4"),
+        ("", "silhouettes/cam_00_0001.png"),
+        ("", "markers/detections.csv"),
+        ('videos = "trial/{camera}.mp4"', "trial/cam_00.mp4"),
+        ('videos = "{camera}/clip.mp4"', "cam_00/clip.mp4"),
+        ('images = { cam_00 = "left" }', "left/0001.png"),
+    ],
+)
+def test_each_file_that_counts_is_noticed_when_it_changes_is_older_or_goes(tmp_path, settings, file):
+    """A result was said to be finished though its calibration was another: only some names, and only newer files, were noticed."""
     import os
 
-    places = read_session(lab).trials[0].places
-    before, times = places.changed_s(), lab / "trials" / "one" / "times"
-    times.mkdir()
-    (times / "cam_01.csv").write_text("frame,time_s\n0,0\n")
-    os.utime(times / "cam_01.csv", (before + 10, before + 10))
-    assert places.changed_s() == before + 10
+    (tmp_path / "recording.toml").write_text(settings)
+    other, counts = tmp_path / "result" / "joints.csv", tmp_path / file
+    for one in (tmp_path / "intri.yml", counts) if file == "extri.yml" else (counts,):
+        one.parent.mkdir(parents=True, exist_ok=True)
+        one.write_text("%YAML:1.0\n")
+    places = RecordingPlaces(tmp_path)
+    seen = [places.files_digest()]
+    os.utime(counts, (10, 10))
+    seen.append(places.files_digest())
+    counts.write_text("%YAML:1.0\n\n")
+    seen.append(places.files_digest())
+    counts.unlink()
+    seen.append(places.files_digest())
+    assert len(set(seen)) == 4
+    other.parent.mkdir()
+    other.write_text("a result in the recording's folder")
+    assert places.files_digest() == seen[-1]
+    assert RecordingPlaces(Path(os.path.relpath(tmp_path))).files_digest() == seen[-1]
 
 
 def test_a_recording_by_its_folder_in_a_session(lab):

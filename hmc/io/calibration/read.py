@@ -82,9 +82,10 @@ def read_calibration(path: str | Path, sizes: Mapping[str, tuple[int, int]] | No
 
 def read_entries(path: str | Path) -> list[CalibrationEntry]:
     """Read what a calibration states, without judging it: what `check` looks at. Arguments and errors as `read_calibration`."""
-    entries = [entry for file in find_calibration(path) for entry in _read_file(file)]
+    files = find_calibration(path)
+    entries = [entry for file in files for entry in _read_file(file)]
     if not entries:
-        raise InputError(f"{path}: no camera in this calibration")
+        raise InputError(f"{files[0]}: no camera in this calibration; export it again, or remove it")
     return entries
 
 

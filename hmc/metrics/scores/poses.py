@@ -111,7 +111,7 @@ def evaluate_pose(estimate: PoseTable, truth: PoseTable, thresholds_m: Sequence[
         When the truth is empty, or a threshold cannot be chosen.
     """
     if not len(truth.frames):
-        raise InputError("the truth has no row in these frames; nothing can be scored")
+        raise InputError("the truth has no row in these frames, so nothing can be scored; choose others, or another truth")
     names = match_persons(truth.frames, truth.persons, truth.positions, estimate.frames, estimate.persons, estimate.positions)
     persons = tuple(_person_errors(estimate, truth, int(person), names) for person in np.unique(truth.persons))
     groups = {"all": np.concatenate([person.errors for person in persons])}
