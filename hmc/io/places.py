@@ -109,7 +109,8 @@ class RecordingPlaces:
     def files_digest(self) -> str:
         """Digest of the files on which results depend: which there are, how long they are and when each last changed."""
         told = sha256()
-        for name, file in sorted({relpath(file, self.path): file for file in self._sources() if file.is_file()}.items()):
+        shown = (file for file in self._sources() if file.is_file() and not file.name.startswith("."))
+        for name, file in sorted({relpath(file, self.path): file for file in shown}.items()):
             status = file.stat()
             told.update(f"{name}\0{status.st_size}\0{status.st_mtime_ns}\0".encode("utf-8", "surrogateescape"))
         return told.hexdigest()[:16]

@@ -135,6 +135,7 @@ def test_each_file_that_counts_is_noticed_when_it_changes_is_older_or_goes(tmp_p
     assert len(set(seen)) == 4
     other.parent.mkdir()
     other.write_text("a result in the recording's folder")
+    (counts.parent / ".DS_Store").write_text("what a Mac leaves beside files")
     assert places.files_digest() == seen[-1]
     assert RecordingPlaces(Path(os.path.relpath(tmp_path))).files_digest() == seen[-1]
 
