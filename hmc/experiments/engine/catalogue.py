@@ -187,8 +187,8 @@ CATALOGUE = (
         "fig-7.15", CANTON, "DDM-APF against APF behind a table", "DDM drops the hidden limbs and takes them back; APF loses the track",
         _OWN_VIDEOS,
         "Measured limb by limb, where the thesis has pictures. The printed filters do not follow these people, with hidden limbs or "
-        "without, and their DDM drops nothing. The preset `default` drops and takes back, but its thresholds were found on these two "
-        "recordings, which are therefore no test of them; its APF does not lose the track, it only invents the hidden limbs.",
+        "without, and their DDM drops nothing. The preset `default` drops and takes back, also on counter_unseen; its thresholds were "
+        "found on counter and workbench. Its APF does not lose the track, it only invents the hidden limbs.",
     ),
     Entry(
         "table-8.1", CANTON, "all methods together, with table 8.2",
