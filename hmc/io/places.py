@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any
 from hmc.errors import InputError
 from hmc.io.calibration import CalibrationEntry, find_calibration, read_entries
 from hmc.io.calibration.read import PATTERNS
-from hmc.io.files import matching, real_path
-from hmc.io.naming import FILES
+from hmc.io.files import real_path
+from hmc.io.naming import FILES, find_files
 from hmc.io.settings import read_settings
 
 if TYPE_CHECKING:
@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 
 __all__ = ["AnyPlaces", "RecordingPlaces", "places_of", "to_places"]
 
-#: In the pattern of videos, where a camera's name goes.
-CAMERA = "{camera}"
 #: So many of the patterns of calibrations match nothing else: a camera's own .xml or .yml beside a trial's videos is none.
 OF_RIGS = 10
 #: Files of a recording on which its results depend, besides the calibration and what recording.toml names.
@@ -128,19 +126,17 @@ class RecordingPlaces:
         files += self._named_files()
         if self.background is not None and self.background_folder == self.background:
             files += [*self.background.glob("*"), *self.background.glob("*/*")]
-        if self.videos is not None:
-            pattern = Path(self.videos.replace(CAMERA, "*"))
-            files += pattern.parent.glob(pattern.name)
         return files
 
     def _named_files(self) -> Iterator[Path]:
-        """What recording.toml names as cameras' files, and what is in folders that it names."""
-        with suppress(InputError):
-            settings = self.read_settings()
-            for said in (settings.get(kind, {}) for kind in FILES):
-                named = matching(self.path, said.replace(CAMERA, "*")) if isinstance(said, str) else ()
-                named = [self.path / file for file in said.values()] if isinstance(said, dict) else named
-                for file in named:
+        """What recording.toml or the session says is the cameras', and what is in folders of theirs."""
+        try:
+            settings, names = self.read_settings(), [entry.name for entry in self.read_entries()]
+        except InputError:  # told where they are read
+            return
+        for kind in FILES:
+            with suppress(InputError):
+                for file in (file for own in find_files(self.path, kind, names, settings).files.values() for file in own):
                     yield file
                     yield from file.glob("*")
 

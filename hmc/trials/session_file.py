@@ -16,7 +16,8 @@ from hmc.errors import InputError
 from hmc.io.calibration import find_calibration
 from hmc.io.door import read_toml_file
 from hmc.io.files import matching, real_path
-from hmc.io.places import CAMERA, RecordingPlaces
+from hmc.io.naming import PLACE
+from hmc.io.places import RecordingPlaces
 from hmc.io.settings import check_settings
 
 __all__ = ["Session", "SessionPerson", "Trial", "chosen_trials", "places_in_session", "read_session"]
@@ -201,7 +202,7 @@ class _Reading:
         if "folder" in table and not folder.is_dir():
             self.faults.append(f"{where} `folder`: {folder} is no folder")
         elif not folder.is_dir() and pattern is None:
-            self.faults.append(f"{where}: {folder} is no folder; give `folder`, or `videos` with {CAMERA} in it")
+            self.faults.append(f"{where}: {folder} is no folder; give `folder`, or `videos` with {PLACE} in it")
         names = table.get("persons")
         if names is not None and not (isinstance(names, list) and all(isinstance(one, str) for one in names)):
             self.faults.append(f"{where} `persons` must be a list of names; got {names!r}")
@@ -278,8 +279,8 @@ class _Reading:
         return None if value is None else self.path.parent / value
 
     def pattern(self, value: Any, where: str) -> str | None:
-        if value is not None and not (isinstance(value, str) and CAMERA in value):
-            self.faults.append(f'{where} must be a path with {CAMERA} in it, as "raw/{TRIAL}_{CAMERA}.mp4"; got {value!r}')
+        if value is not None and not (isinstance(value, str) and PLACE in value):
+            self.faults.append(f'{where} must be a path with {PLACE} in it, as "raw/{TRIAL}_{PLACE}.mp4"; got {value!r}')
             return None
         return value
 

@@ -112,15 +112,19 @@ def test_times_that_were_found_are_noticed(lab):
         ("", "markers/detections.csv"),
         ('videos = "trial/{camera}.mp4"', "trial/cam_00.mp4"),
         ('videos = "{camera}/clip.mp4"', "cam_00/clip.mp4"),
+        ('videos = "*{camera}*"', "take_cam_00.mp4"),
+        ('images = "{camera}/*.png"', "cam_00/0001.png"),
         ('images = { cam_00 = "left" }', "left/0001.png"),
     ],
 )
-def test_each_file_that_counts_is_noticed_when_it_changes_is_older_or_goes(tmp_path, settings, file):
+def test_each_file_that_counts_is_noticed_when_it_changes_is_older_or_goes(tmp_path, ring, settings, file):
     """A result was said to be finished though its calibration was another: only some names, and only newer files, were noticed."""
     import os
 
     (tmp_path / "recording.toml").write_text(settings)
-    other, counts = tmp_path / "result" / "joints.csv", tmp_path / file
+    if settings:
+        write_calibration(tmp_path / "calibration.toml", ring)
+    other, counts = tmp_path / "result" / "overlay.png", tmp_path / file
     for one in (tmp_path / "intri.yml", counts) if file == "extri.yml" else (counts,):
         one.parent.mkdir(parents=True, exist_ok=True)
         one.write_text("%YAML:1.0\n")
