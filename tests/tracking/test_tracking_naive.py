@@ -312,6 +312,11 @@ def held_back(state, predicted, observation):
     return FilterEstimate(predicted - [0.25, 0, 0], np.ones(len(predicted), bool), state.memories)
 
 
+def sees_all(state, predicted, observation):
+    """A filter that sees everybody where they should be."""
+    return FilterEstimate(predicted, np.ones(len(predicted), bool), state.memories)
+
+
 def test_two_who_walk_arm_in_arm_are_at_their_columns_where_the_filter_is_behind():
     a, b = line((-1.8, -0.22), (1.8, -0.22), 60), line((-1.8, 0.22), (1.8, 0.22), 60)
     state, worst = init(FPS), 0.0
@@ -320,6 +325,16 @@ def test_two_who_walk_arm_in_arm_are_at_their_columns_where_the_filter_is_behind
         for place in (p, q) if frame > 20 else ():
             worst = max(worst, min(np.hypot(*(track.position[:2] - place)) for track in state.tracks))
     assert len(state.tracks) == 2 and worst < 0.06
+
+
+def test_two_who_come_together_in_one_column_are_not_both_at_its_middle():
+    """Of the two there is one column; what lies around it is the body of neither, and the filter still knows both."""
+    state, apart = init(FPS), [*np.linspace(0.93, 0.13, 30), 0.13, 0.13]
+    for frame, x in enumerate(apart):
+        observation = observe(GRID, person(-x, 0, radius=0.22) | person(x, 0, radius=0.22))
+        state, _ = advance(state, frame, observation, FollowingSettings(), sees_all)
+    assert len(find_columns(observation)) == 1
+    assert sorted(round(float(track.position[0]), 1) for track in state.tracks) == [-0.1, 0.1]
 
 
 def test_who_crouches_is_not_taken_for_a_column_that_comes_up_beside_them():

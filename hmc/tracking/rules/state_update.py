@@ -62,10 +62,16 @@ def _corrections(update: FrameUpdate, settings: FollowingSettings) -> list[_Corr
     known = update.estimate.seen & ~(np.hypot(*(update.estimate.positions[:, :2] - columns).T) > MATCH_M)
     measured = np.where(known[:, None], update.estimate.positions, update.measurement.located.centroid)
     gain = np.where(update.shared, np.where(known, settings.filter_gain, settings.shared_gain), 1.0)
-    bodies = _of_tracks(update, bodies_at(update.observation, update.columns.centres))
+    bodies = _of_tracks(update, _bodies(update))
     sure = update.shared & (np.hypot(*(bodies - update.predicted)[:, :2].T) <= TRUNK_M)
     measured, gain = np.where(sure[:, None], bodies, measured), np.where(sure, 1.0, gain)
     return [_Correction(*one) for one in zip(measured, gain, known.tolist(), strict=True)]
+
+
+def _bodies(update: FrameUpdate) -> np.ndarray:
+    """The body at each column, shape (m, 3). Of two who embrace there may be one column: voxels nearer to who has none are not its."""
+    without = update.predicted[update.matched < 0, :2]
+    return bodies_at(update.observation, np.concatenate([update.columns.centres, without]))[: len(update.columns)]
 
 
 def _of_tracks(update: FrameUpdate, places: np.ndarray) -> np.ndarray:
