@@ -139,7 +139,7 @@ def bodies_at(observation: Observation, centres: np.ndarray) -> np.ndarray:
     ----------
     observation : Observation
     centres : ndarray, shape (m, 2)
-        The columns, seen from above, world, metres.
+        The columns, and where people without one should be, seen from above, world, metres.
 
     Returns
     -------

@@ -1,6 +1,7 @@
 """The update of each track by its measurement: position, velocity and volume, and which rows are told.
 
-Among others a person is at their own column's body: `test_two_who_walk_arm_in_arm_are_at_their_columns_where_the_filter_is_behind`. The
+Among others a person is at their own column's body: `test_two_who_walk_arm_in_arm_are_at_their_columns_where_the_filter_is_behind`, and at
+no body of two: `test_two_who_come_together_in_one_column_are_not_both_at_its_middle`. The
 gain in a shared component is shown by the recipe `meeting_unseen`, where the naive tracker exchanges 3 identities without it and 1 with it;
 withheld rows by `test_where_a_thing_was_taken_for_a_person_nothing_begins_while_it_stands_there`.
 """
