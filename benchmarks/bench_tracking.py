@@ -27,7 +27,7 @@ from hmc.tracking.surroundings import Surroundings, look_around
 from hmc.tracking.trackers import make_tracker
 from hmc.tracking.views import FrameViews
 from hmc.voxels.carving import carve_levels, make_tables
-from hmc.voxels.completion import complete_masks, doubtful_hull, make_completion_tables
+from hmc.voxels.completion import complete_masks, doubtful_hulls, make_completion_tables
 from hmc.voxels.grid import VoxelGrid
 
 PLACES = np.array([[0.0, 0.0], [1.2, 0.4], [-1.1, 0.9]])
@@ -147,7 +147,7 @@ def whole_chain(rng: np.random.Generator) -> list[bool]:
     def hulls(masks, doubtful):
         levels = carve_levels(tables, masks, (0, 1, 2))
         if any(doubt is not None for doubt in doubtful):
-            levels[2][doubtful_hull(tables, masks, doubtful)] = True
+            levels[2][doubtful_hulls(tables, masks, doubtful, (2,))[0]] = True
         return levels
 
     begun = time.perf_counter()
@@ -155,11 +155,9 @@ def whole_chain(rng: np.random.Generator) -> list[bool]:
         for frame, images in enumerate(frames):
             masks, models = timed("segmentation", segment_views, models, images, settings, pool)
             doubtful = tuple(model.doubtful for model in models)
-            whole, much = timed("completion", complete_masks, completion, masks, doubtful)
-            if not much:
-                doubtful = (None,) * len(masks)
-            strict, tolerant, _ = timed("carving", hulls, whole, doubtful)
-            observation = timed("components", observe, grid, tolerant, strict, FrameViews(rig, whole, tuple(images)))
+            done = timed("completion", complete_masks, completion, masks, doubtful)
+            strict, tolerant, _ = timed("carving", hulls, done.masks, doubtful if done.much else done.left)
+            observation = timed("components", observe, grid, tolerant, strict, FrameViews(rig, done.masks, tuple(images)))
             state, info = timed("life cycle", tracker.step, rng, state, frame, observation)
             for stage, seconds in (("color", info.color_s), ("filter", info.filter_s)):
                 spent[stage] += seconds

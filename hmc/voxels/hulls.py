@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import dataclass, replace
@@ -28,7 +28,7 @@ from hmc.io.masks import MaskStep, Report
 from hmc.io.recording import Recording, background_frames
 from hmc.voxels.background_initialisation import UnseenPlaces, learn_from_people, with_unseen_places
 from hmc.voxels.carving import CarvingTables, carve_levels, shared_tables
-from hmc.voxels.completion import CompletionTables, complete_masks, doubtful_hull, make_completion_tables
+from hmc.voxels.completion import Completion, CompletionTables, complete_masks, doubtful_hulls, make_completion_tables
 from hmc.voxels.floor_light import tell_shades
 from hmc.voxels.floor_shadows import cut_filled_shadows, cut_floor_shadows, lit_views
 from hmc.voxels.frontend_settings import FrontendSettings
@@ -57,12 +57,15 @@ class HullStep(MaskStep):
     strict, tolerant, loose : ndarray of bool, shape (nx, ny, nz)
         The visual hull of all cameras, the one in which a camera may be wrong, and, of four cameras or more, the one in which one
         more may be: what furniture hides from two cameras is still in it, and so is what most cameras only doubt
-        (`hmc.voxels.completion.doubtful_hull`). Empty where the frame is not `usable`.
+        (`hmc.voxels.completion.doubtful_hulls`). Empty where the frame is not `usable`.
+    doubted : ndarray of bool, shape (nx, ny, nz), or None
+        What three cameras see, and the others see or doubt. None where nobody doubts.
     """
 
     strict: np.ndarray
     tolerant: np.ndarray
     loose: np.ndarray
+    doubted: np.ndarray | None = None
 
 
 def stream_hulls(
@@ -261,24 +264,26 @@ def carve_step(tables: CarvingTables, step: MaskStep, settings: FrontendSettings
     step : MaskStep
     settings : FrontendSettings
     """
-    hulls = _hulls(tables, step, settings)
-    return HullStep(step.index, step.images, step.masks, step.doubtful, *hulls, faults=step.faults)
+    strict, tolerant, loose = _hulls(tables, step, settings)
+    doubted = None
+    if step.usable and any(doubt is not None for doubt in step.doubtful):
+        maybe, doubted = doubtful_hulls(tables, step.masks, step.doubtful)
+        loose[maybe] = True
+    return HullStep(step.index, step.images, step.masks, step.doubtful, strict, tolerant, loose, doubted, faults=step.faults)
 
 
-def _hulls(tables: CarvingTables, step: MaskStep, settings: FrontendSettings) -> tuple[np.ndarray, ...]:
+def _hulls(tables: CarvingTables, step: MaskStep, settings: FrontendSettings) -> Sequence[np.ndarray]:
+    """Of all cameras, and where one and two more may be wrong."""
     if not step.usable:
         return tuple(np.zeros(tables.grid.shape, bool) for _ in range(3))
     n_masks = sum(mask is not None for mask in step.masks)
     tolerance = settings.tolerance if n_masks >= 4 else 0
     levels = (0, tolerance, tolerance + 1 if n_masks >= 4 else tolerance)
-    hulls = carve_levels(tables, step.masks, levels, outside=settings.outside, min_views=settings.min_views)
-    if any(doubt is not None for doubt in step.doubtful):
-        hulls[2][doubtful_hull(tables, step.masks, step.doubtful)] = True
-    return hulls
+    return carve_levels(tables, step.masks, levels, outside=settings.outside, min_views=settings.min_views)
 
 
 def settle(tables: CompletionTables | None, look: Look, settings: FrontendSettings) -> tuple[tuple, tuple]:
-    """Silhouettes after the cameras settled one another's doubts, and the doubts of frames in which much is left to doubt.
+    """Silhouettes after the cameras settled one another's doubts, and the doubts that are left.
 
     Parameters
     ----------
@@ -292,7 +297,7 @@ def settle(tables: CompletionTables | None, look: Look, settings: FrontendSettin
     masks, doubtful : tuples of ndarray of bool, shape (h, w), or None; one a camera
     """
     masks, doubtful = look.masks, look.doubtful
-    none, much = (None,) * len(masks), False
+    none: tuple[None, ...] = (None,) * len(masks)
     if tables is None:
         return masks, none
     views = lit_views(look.images, look.scenes, look.gains) if settings.ask_floor or settings.cut_shadows else none
@@ -300,14 +305,13 @@ def settle(tables: CompletionTables | None, look: Look, settings: FrontendSettin
         masks = tell_shades(tables, views, look.chances, masks)
     if settings.cut_shadows:
         masks = cut_filled_shadows(tables, masks, look.filled, doubtful)
-    if settings.complete:
-        masks, much = complete_masks(tables, masks, doubtful)
-    if much:  # people who look like what is around them: what is dark on the floor there may be their shoes
-        return masks, doubtful
-    if settings.cut_shadows:
-        cut = cut_floor_shadows(tables, views, masks)
-        masks = tuple(map(_with_sure_shades, cut, masks, look.chances)) if settings.ask_floor else cut
-    return masks, none
+    done = complete_masks(tables, masks, doubtful) if settings.complete else Completion(masks, none, False)
+    if done.much:  # people who look like what is around them: what is dark on the floor there may be their shoes
+        return done.masks, doubtful
+    if not settings.cut_shadows:
+        return done.masks, done.left
+    cut = cut_floor_shadows(tables, views, done.masks)
+    return tuple(map(_with_sure_shades, cut, done.masks, look.chances)) if settings.ask_floor else cut, done.left
 
 
 def _with_sure_shades(cut: np.ndarray | None, mask: np.ndarray | None, chance: np.ndarray | None) -> np.ndarray | None:

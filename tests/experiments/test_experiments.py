@@ -18,13 +18,15 @@ from hmc.errors import InputError
 from hmc.experiments import EXPERIMENTS, Inputs, Plan, Source, Table, find_experiment, plan_of, run_experiment
 from hmc.experiments.__main__ import main
 from hmc.experiments.ellipsoid import RADII_M, VOXEL_M, person_voxels
-from hmc.experiments.engine.inputs import _told, once, rendered, source_of
+from hmc.experiments.engine.inputs import _told, once, read_hulls, rendered, source_of, write_hulls
 from hmc.experiments.engine.selection import changed_plan
 from hmc.experiments.engine.store import cell_key, cell_rng, cell_text, digest, read_cell, write_text
 from hmc.experiments.engine.style import house_style
 from hmc.experiments.engine.sweep import plan_for
 from hmc.experiments.engine.writing import to_latex, write_report
 from hmc.io.recording import open_recording
+from hmc.voxels.grid import VoxelGrid
+from hmc.voxels.hulls import FrontendSettings, HullStep, stream_hulls
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -351,9 +353,6 @@ def test_hulls_are_stored_and_come_back(recording_folder, tmp_path):
             cv2.imwrite(str(path), mask)
     source = source_of(recording_folder)
     inputs = Inputs(tmp_path / "inputs", {source.label: source.folder})
-    from hmc.voxels.grid import VoxelGrid
-    from hmc.voxels.hulls import FrontendSettings, stream_hulls
-
     recording = open_recording(recording_folder)
     grid = VoxelGrid.from_room(recording.room, 0.1, 5)
     straight = list(stream_hulls(recording, grid, FrontendSettings(threads=1)))
@@ -368,6 +367,20 @@ def test_hulls_are_stored_and_come_back(recording_folder, tmp_path):
         inputs.truth(source.label)
     with pytest.raises(InputError, match="neither among"):
         inputs.recording("tiny@00000000")
+
+
+def test_hulls_are_kept_with_their_doubts(tmp_path, recording_folder):
+    recording = open_recording(recording_folder)
+    grid = VoxelGrid.from_room(recording.room, 0.1, 5)
+    nothing = (None,) * len(recording.rig)
+    loose = np.random.default_rng(0).random((3, *grid.shape)) < 0.5
+    hulls = loose.all(axis=0), loose[:2].all(axis=0), loose[0]
+    steps = [HullStep(k, nothing, nothing, nothing, *hulls, doubted) for k, doubted in enumerate((None, hulls[2] & (loose[1] | loose[2])))]
+    write_hulls(tmp_path / "hulls", steps)
+    first, second = read_hulls(tmp_path / "hulls", grid, recording)
+    assert first.doubted is None and (second.doubted == steps[1].doubted).all()
+    for kept in (first, second):
+        assert all((getattr(kept, kind) == one).all() for kind, one in zip(("strict", "tolerant", "loose"), hulls, strict=True))
 
 
 def test_what_is_made_once_replaces_what_a_kill_left(tmp_path):

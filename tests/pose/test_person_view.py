@@ -9,12 +9,15 @@ from methods import VOXEL_M, tiny_clip, true_tracks
 from numpy.testing import assert_array_equal
 
 from hmc.errors import InputError
+from hmc.io.masks import MaskStep
 from hmc.io.recording import open_recording
 from hmc.io.results import TrackTable
 from hmc.pose.views import person_view
+from hmc.pose.views.hull_target import distance_at
 from hmc.pose.views.person_view import EVIDENCE, check_needs, views_of
 from hmc.tracking.resumable import person_grid
-from hmc.voxels.hulls import stream_hulls
+from hmc.voxels.carving import shared_tables
+from hmc.voxels.hulls import FrontendSettings, carve_step, stream_hulls
 
 OF_HULLS = ("hulls", "skin", "voxels")
 
@@ -98,6 +101,25 @@ def test_a_piece_that_is_nobodys_may_be_anybodys(frame, monkeypatch):
     at = tuple(np.rint((heads - view.target.origin) / view.target.voxel_size_m).astype(int).T)
     assert len(heads) > 20 and view.target.loose[at].all() and not view.target.tolerant[at].any()
     assert (view.target.rays[:, 2] > above).sum() > 0.5 * (whole.target.rays[:, 2] > above).sum()
+
+
+def test_a_body_may_be_where_a_camera_only_doubts_what_the_others_show(pair):
+    """Between people one camera's loss is in the tolerant hull at a price. Where it only doubts, the price is that of a hidden place."""
+    clip, grid, tracks, hull = pair
+    rows = np.flatnonzero(hull.masks[1].any(axis=1))
+    lost = hull.masks[1].copy()
+    lost[: rows[len(rows) // 2]] = False  # trunks and heads
+    gone = hull.masks[1] & ~lost
+    masks = (hull.masks[0], lost, *hull.masks[2:])
+    steps = [MaskStep(0, hull.images, masks, (None, doubt, *(None,) * (len(masks) - 2))) for doubt in (None, gone)]
+    denied, doubted = (carve_step(shared_tables(grid, clip.rig), step, FrontendSettings()) for step in steps)
+    assert denied.doubted is None
+    assert_array_equal(doubted.doubted, hull.strict)
+    inside = grid.centres(np.argwhere(hull.strict & ~denied.strict))
+    off = [
+        np.minimum(*(distance_at(view.target, inside) for view in views_of(clip, grid, tracks, one).values())) for one in (denied, doubted)
+    ]
+    assert off[0].max() > 0.015 and off[1].max() < 0.011
 
 
 def test_people_who_are_not_in_the_frame_and_those_whom_nothing_shows(frame):

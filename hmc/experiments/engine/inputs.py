@@ -43,6 +43,8 @@ __all__ = ["Inputs", "once", "read_hulls", "recipe_of", "rendered", "source_of",
 _CONTENT = ("calibration*", "recording.toml", "videos/*", "images/*/*", "silhouettes/*/*", "background/*", "background/*/*", "truth/*.csv")
 #: The person tracker's input is computed with one thread: workers share the cores.
 _FRONTEND = FrontendSettings(threads=1)
+#: Of the levels of a voxel that are kept, 1 to 3 by the hulls that hold it: added where people may be (`HullStep.doubted`).
+DOUBTED = 4
 
 
 def rendered(recipe: str) -> Source:
@@ -223,7 +225,9 @@ def read_hulls(folder: Path, grid: VoxelGrid, recording: Recording, first: int =
             levels.ravel()[data["voxels"]] = data["levels"]
             masks = tuple(_unpack(data[f"mask_{c}"], size) if f"mask_{c}" in data else None for c, size in enumerate(sizes))
         nothing = (None,) * len(sizes)
-        yield HullStep(int(path.stem), nothing, masks, nothing, levels == 3, levels >= 2, levels >= 1)
+        doubted, levels = levels >= DOUBTED, levels % DOUBTED
+        hulls = levels == 3, levels >= 2, levels >= 1
+        yield HullStep(int(path.stem), nothing, masks, nothing, *hulls, doubted if doubted.any() else None)
 
 
 def write_hulls(folder: Path, steps: Iterable[HullStep]) -> None:
@@ -231,6 +235,8 @@ def write_hulls(folder: Path, steps: Iterable[HullStep]) -> None:
     folder.mkdir()
     for step in steps:
         levels = step.strict.astype(np.uint8) + step.tolerant + step.loose
+        if step.doubted is not None:
+            levels[step.doubted] += DOUBTED
         voxels = np.flatnonzero(levels).astype(np.int64 if levels.size > np.iinfo(np.int32).max else np.int32)
         masks = {f"mask_{c}": np.packbits(mask) for c, mask in enumerate(step.masks) if mask is not None}
         np.savez_compressed(folder / f"{step.index:08d}.npz", voxels=voxels, levels=levels.ravel()[voxels], **masks)  # type: ignore[arg-type]

@@ -109,8 +109,8 @@ def make_target(
         Which of some points, shape (n, 3), world, metres, show on silhouettes where the strict hull does not
         (`hmc.pose.views.uncovered`). What else is in the tolerant and in the loose hull is no place for a body then.
     unseen : ndarray of int, shape (k, 3), optional
-        Voxels (i, j, k) that something hides from all cameras that do not show the person there (`hmc.pose.occluders`). A body may be
-        there at a small price.
+        Voxels (i, j, k) of which all cameras that do not show the person there know nothing: something hides them (`hmc.pose.occluders`),
+        or it may be a person (`HullStep.doubted`). A body may be there at a small price.
 
     Returns
     -------

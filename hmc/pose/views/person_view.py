@@ -156,6 +156,8 @@ def _targets(recording, grid, hull, strict, tolerant, unseen) -> list[HullTarget
     if sum(mask is not None for mask in hull.masks) <= FEW_CAMERAS:
         all_strict = grid.centres(np.concatenate([nothing, *strict]))
         new = partial(on_uncovered_pixels, recording.rig, hull.masks, all_strict, spacing_m=grid.voxel_size_m)
+    if hull.doubted is not None:  # a camera that only doubts a place knows as little of it as one from which it is hidden
+        unseen = np.concatenate([nothing if unseen is None else unseen, np.argwhere(hull.doubted & ~hull.strict)])
     targets = []
     for k in range(len(strict)):
         target = make_target(grid, strict[k], tolerant[k], spare, floor_z, new, unseen)
