@@ -21,7 +21,7 @@ Measured by ``python -m hmc.experiments run repairs``.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -175,25 +175,28 @@ def complete_masks(tables: CompletionTables, masks: Sequence[np.ndarray | None],
     points, pixels = grid.centres(voxels), pixels_at(tables.carving, voxels).astype(np.int64)  # as gathers want them
     before = {c: np.ascontiguousarray(mask).view(np.uint8) for c, mask in given.items()}
     seeing = _votes({c: np.ones_like(mask) for c, mask in before.items()}, pixels)
-    done, gaps, much, telling = before, dict[int, _Gap | None](), False, [c for c in given if doubtful[c] is not None]
+    done, gaps, much, telling = before, dict[int, _Gap](), False, [c for c in given if doubtful[c] is not None]
     for turn in range(ROUNDS):
         votes = _votes(done, pixels)
         agreed = np.flatnonzero(votes >= LEAST_VIEWS)
-        if not len(agreed):
+        shapes = _images(tables, telling, points, pixels, agreed)
+        maybe = {c: _gap(*shapes[c], done[c], possible[c], grid.voxel_size_m) for c in telling}
+        gaps = {c: gap for c, gap in maybe.items() if gap is not None}
+        if not gaps:
             break
         hull = _images(tables, done, points, pixels, agreed[votes[agreed] == seeing[agreed]])
         bare = {c: _bare(mask, *hull[c], grid.voxel_size_m) for c, mask in done.items()}
-        asked = _images(tables, telling, points, pixels, agreed[_votes(bare, pixels[:, agreed]) > 0])
-        shapes = _images(tables, telling, points, pixels, agreed)
-        gaps = {c: _gap(*shapes[c], asked[c][0], done[c], possible[c], grid.voxel_size_m) for c in telling}
-        joined = {c: _join(gap, done[c]) for c, gap in gaps.items()}
+        asked = _images(tables, gaps, points, pixels, agreed[_votes(bare, pixels[:, agreed]) > 0])
+        wanted = {c: _wanted(gap, asked[c][0], shapes[c][1], grid.voxel_size_m) for c, gap in gaps.items()}
+        joined = {c: _join(gap, wanted[c], done[c]) for c, gap in gaps.items() if wanted[c].any()}
+        gaps = {c: replace(gap, pieces=gap.pieces - wanted[c]) for c, gap in gaps.items()}
         if turn == 0:
             much = sum(share > MUCH_SHARE for _, share in joined.values()) >= MUCH_CAMERAS
-        last, done = done, done | {c: mask for c, (mask, _) in joined.items()}
-        if all(done[c] is last[c] for c in given):  # another round would find the same
+        done = done | {c: mask for c, (mask, _) in joined.items()}
+        if not joined:  # another round would find the same
             break
     completed = tuple(mask if mask is None or done[c] is before[c] else done[c].view(bool) for c, mask in enumerate(masks))
-    return Completion(completed, tuple(_left(gaps.get(c), done[c]) if c in given else None for c in range(len(masks))), much)
+    return Completion(completed, tuple(_left(gaps[c], done[c]) if c in gaps else None for c in range(len(masks))), much)
 
 
 def doubtful_hulls(
@@ -312,7 +315,14 @@ def _images(
 
 def _bare(mask: np.ndarray, hull: np.ndarray, scale: float, voxel_m: float) -> np.ndarray:
     """What of a mask the hull's image leaves bare, at so many pixels a metre; the hull reaches half a voxel beyond its voxels' centres."""
-    return cv2.morphologyEx(mask & (1 - _closed(hull, scale, voxel_m)), cv2.MORPH_OPEN, _square(voxel_m / 2 * scale))
+    left, top, columns, rows = cv2.boundingRect(mask)
+    margin = round(voxel_m * scale) + 3  # of the kernel that closes, so that a border of the box is none
+    box = slice(max(0, top - margin), top + rows + margin), slice(max(0, left - margin), left + columns + margin)
+    out = np.zeros_like(mask)
+    if rows:
+        bare = mask[box] & (1 - _closed(hull[box], scale, voxel_m))
+        out[box] = cv2.morphologyEx(bare, cv2.MORPH_OPEN, _square(voxel_m / 2 * scale))
+    return out
 
 
 def _closed(image: np.ndarray, scale: float, voxel_m: float) -> np.ndarray:
@@ -329,8 +339,8 @@ class _Gap:
     box : tuple of slice
     old, free : ndarray of uint8
         The mask, and where it is free to grow: possible, and in that image.
-    asked, unasked : ndarray of uint8
-        Pieces of what is free that lie deep in that image: those that some silhouette asks for, and the others.
+    pieces : ndarray of uint8
+        What of that lies deep in the image.
     near : ndarray of uint8
         A square: what is free goes with a piece as near to it.
     """
@@ -338,48 +348,51 @@ class _Gap:
     box: tuple[slice, slice]
     old: np.ndarray
     free: np.ndarray
-    asked: np.ndarray
-    unasked: np.ndarray
+    pieces: np.ndarray
     near: np.ndarray
 
 
-def _gap(shape: np.ndarray, scale: float, asked: np.ndarray, mask: np.ndarray, possible: np.ndarray, voxel_m: float) -> _Gap | None:
-    """What the image of agreed voxels leaves to a mask, at so many pixels a metre; None where it shows none of them.
-
-    `asked` is the image of those of them that some silhouette asks for.
-    """
+def _gap(shape: np.ndarray, scale: float, mask: np.ndarray, possible: np.ndarray, voxel_m: float) -> _Gap | None:
+    """What the image of agreed voxels leaves to a mask, at so many pixels a metre; None where no piece of that lies deep in it."""
     left, top, columns, rows = cv2.boundingRect(shape)
     if not rows:
         return None
     margin = round((voxel_m + NEAR_M) * scale) + 4
     box = slice(max(0, top - margin), top + rows - 1 + margin), slice(max(0, left - margin), left + columns - 1 + margin)
-    shape, asked = _closed(shape[box], scale, voxel_m), _closed(asked[box], scale, voxel_m)
+    shape = _closed(shape[box], scale, voxel_m)
     old = np.ascontiguousarray(mask[box])
     free = shape & possible[box].view(np.uint8) & (1 - old)
     pieces = cv2.morphologyEx(free & cv2.erode(shape, _square(DEEP_M * scale)), cv2.MORPH_OPEN, _square(1))
-    n, label = cv2.connectedComponents(pieces)
-    share = np.bincount(label.ravel(), asked.ravel(), n) / np.maximum(1, np.bincount(label.ravel(), minlength=n))
-    wanted = pieces & (share >= LEAST_ASKED)[label].view(np.uint8)
-    return _Gap(box, old, free, wanted, pieces - wanted, _square(NEAR_M * scale))
+    return _Gap(box, old, free, pieces, _square(NEAR_M * scale)) if cv2.countNonZero(pieces) else None
 
 
-def _join(gap: _Gap | None, mask: np.ndarray) -> tuple[np.ndarray, float]:
-    """A mask with the pieces that are asked for and what is near, and the share of it that they are; the mask itself and 0 without any."""
-    if gap is None or not gap.asked.any():
-        return mask, 0.0
-    grown = cv2.dilate(gap.asked, gap.near) & gap.free | gap.old
+def _wanted(gap: _Gap, asked: np.ndarray, scale: float, voxel_m: float) -> np.ndarray:
+    """The pieces of a gap that lie in the image of voxels that some silhouette asks for, at so many pixels a metre."""
+    asked = _closed(asked[gap.box], scale, voxel_m)
+    n, label = cv2.connectedComponents(gap.pieces)
+    inside = np.flatnonzero(gap.pieces)
+    own: np.ndarray = label.ravel().take(inside)
+    share = np.bincount(own, asked.ravel().take(inside), n) / np.maximum(1, np.bincount(own, minlength=n))
+    out = np.zeros_like(gap.pieces)
+    out.ravel()[inside] = share.take(own) >= LEAST_ASKED
+    return out
+
+
+def _join(gap: _Gap, wanted: np.ndarray, mask: np.ndarray) -> tuple[np.ndarray, float]:
+    """A mask with the pieces that are asked for and what is near, and the share of it that they are."""
+    grown = cv2.dilate(wanted, gap.near) & gap.free | gap.old
     grown = cv2.morphologyEx(grown, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)) | gap.old
     out = mask.copy()
     out[gap.box] |= cv2.morphologyEx(grown, cv2.MORPH_CLOSE, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (5, 5)))
-    return out, cv2.countNonZero(gap.asked) / max(1, cv2.countNonZero(gap.old))
+    return out, cv2.countNonZero(wanted) / max(1, cv2.countNonZero(gap.old))
 
 
-def _left(gap: _Gap | None, mask: np.ndarray) -> np.ndarray | None:
+def _left(gap: _Gap, mask: np.ndarray) -> np.ndarray | None:
     """The pieces that nobody asks for and what is near them, beside a mask; None without any."""
-    if gap is None or not gap.unasked.any():
+    if not cv2.countNonZero(gap.pieces):
         return None
     out = np.zeros(mask.shape, bool)
-    out[gap.box] = cv2.dilate(gap.unasked, gap.near) & gap.free
+    out[gap.box] = cv2.dilate(gap.pieces, gap.near) & gap.free
     return out & ~mask.view(bool)
 
 
