@@ -40,8 +40,8 @@ class TurnedSettings:
     frames : int
         Frames of a stretch in which both ways are compared, evenly spread.
     first, sure : int, float
-        After so many of them, also spread, nothing more is looked at of whom the mean evidence is below minus this; of fewer nothing
-        is said.
+        After so many of them, also spread, nothing more is looked at of whom the mean evidence is below minus this; fewer turn nobody
+        about, but may say that who was followed so is right.
     gap_s : float
         A person who was not followed for so long may have turned, seconds: nothing follows from the way round before.
     about : float
@@ -158,7 +158,7 @@ def followed_wrongly(
     dict of int to list of int
         By person, rising; those of whom no frame is wrong are not in it. Stretch by stretch it is as the evidence has it in sum, with
         `TurnedSettings.about` against two stretches that are right, or wrong, on both sides of a moment of turning about. A stretch of
-        which fewer than `TurnedSettings.first` frames tell is as its neighbors have it.
+        which fewer than `TurnedSettings.first` frames tell is as its neighbors have it, unless those say that it is right.
     """
     parts = [(person, stretch) for person, of in followed.items() for stretch in of]
     chosen = [spread_frames(stretch.frames, settings.frames) for _, stretch in parts]
@@ -172,7 +172,7 @@ def followed_wrongly(
         for frame, told in zip(by_frame, evidence_in(by_frame), strict=True):
             for person, evidence in told.items():
                 found[part_of[frame, person]].append(evidence)
-    sums = iter([sum(told) if len(told) >= settings.first else 0.0 for told in found])
+    sums = iter([sum(told) if len(told) >= settings.first else min(0.0, sum(told)) for told in found])
     wrong: dict[int, list[int]] = {}
     for person, of in followed.items():
         turned = _wrong_ones([next(sums) for _ in of], [stretch.about for stretch in of], settings.about)

@@ -133,7 +133,10 @@ def test_a_stretch_too_short_to_tell_is_as_its_neighbors_have_it():
 
 
 def test_a_short_stretch_that_is_surely_right_tells_so():
+    """As who was followed round while they were lost, and turned about again in the last frames: what is wrong there is before it."""
     assert found_by([50, 56], lambda frame: -0.6) == set()
+    assert found_by([87], lambda frame: -0.6) == set()
+    assert found_by([87], lambda frame: -0.2) == {87, 88, 89}
 
 
 def test_the_best_way_is_that_of_all_ways():
