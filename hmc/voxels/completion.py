@@ -163,9 +163,8 @@ def complete_masks(tables: CompletionTables, masks: Sequence[np.ndarray | None],
         With fewer than four masks the masks as they are.
     """
     given = {c: mask for c, mask in enumerate(masks) if mask is not None}
-    as_given = Completion(tuple(masks), (None,) * len(masks), False)
     if len(given) < LEAST_MASKS or all(doubtful[c] is None for c in given):
-        return as_given
+        return Completion(tuple(masks), (None,) * len(masks), False)
     shadow = np.append(floor_shadows(tables, masks, doubtful), False)
     possible = {c: _possible(mask, doubtful[c], shadow, tables.pixel_cells[c]) for c, mask in given.items()}
     grid = tables.carving.grid

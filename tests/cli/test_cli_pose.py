@@ -79,7 +79,8 @@ def test_a_run_leaves_its_files_and_its_silhouettes_and_nothing_else(finished):
         assert_array_equal(table.frames, joints.frames)
         assert_array_equal(table.persons, joints.persons)
     assert run["method"] == "apf" and run["seed"] == 0
-    assert all("by their trust" in line for line in run["problems"])  # of five coarse frames, with little work
+    # Of five coarse frames, with little work, the one or the other landmark is not trusted; nothing else is odd.
+    assert len(run["problems"]) <= 1 and all("by their trust" in line for line in run["problems"])
     assert run["parameters"]["voxel_size_m"] == 0.05 and run["parameters"]["preset"]["name"] == "default"
     truth = read_joints(TINY / "truth" / "joints.csv")
     error = np.linalg.norm(joints.positions - truth.where(truth.frames < 5).positions, axis=-1)

@@ -74,6 +74,15 @@ def test_limbs_come_back_and_rims_do_not(tables, truth):
     assert not done.much and all(after is before for after, before in zip(done.masks, thin, strict=True))
 
 
+def test_a_gap_too_short_to_be_asked_for_stays_a_doubt(tables, truth):
+    """A hand's breadth of the shins, which the hull's image, closed, covers."""
+    shins = [lose(mask, (0.85, 0.91)) for mask in truth[:2]]
+    done = complete_masks(tables, [*shins, *truth[2:]], truth)
+    for before, after, left, true in zip(shins, done.masks, done.left, truth, strict=False):
+        assert after is before and not (left & (before | ~true)).any()
+        assert left.sum() > 0.8 * (true & ~before).sum()
+
+
 @pytest.mark.parametrize("seed", range(8))
 def test_nobody_is_added_where_each_camera_sees_another_person(tables, ring, seed):
     """Four people whose silhouettes are whole, and doubts all about them: in the places where they cross nobody is asked for."""
