@@ -21,7 +21,7 @@ import cv2
 import numpy as np
 
 from hmc.voxels.completion import CompletionTables
-from hmc.voxels.floor_shadows import OTHER_COLOR, LitView, darkness
+from hmc.voxels.floor_shadows import OTHER_COLOR, LitView, channels_at, darkness
 
 __all__ = ["FloorEvidence", "floor_balance", "floor_evidence", "person_by_floor", "tell_shades"]
 
@@ -171,7 +171,7 @@ class _Floor:
 
 def _colors(scene: np.ndarray, pixels: np.ndarray) -> np.ndarray:
     """Luma's logarithm and chroma of the empty scene at flat pixels, shape (3, n)."""
-    colors = np.ascontiguousarray(scene.reshape(-1, 3).take(pixels, axis=0).T)
+    colors = channels_at(scene, pixels)
     np.log(np.maximum(colors[0], 1), out=colors[0])  # a black scene has no logarithm
     return colors
 

@@ -27,7 +27,7 @@ from hmc.camera.light import brought_back
 from hmc.voxels.carving import carve, pixels_at
 from hmc.voxels.completion import CompletionTables, doubted_floor, shown
 
-__all__ = ["OTHER_COLOR", "LitView", "Scene", "cut_filled_shadows", "cut_floor_shadows", "darkness", "lit_views"]
+__all__ = ["OTHER_COLOR", "LitView", "Scene", "channels_at", "cut_filled_shadows", "cut_floor_shadows", "darkness", "lit_views"]
 
 #: Shares of the empty floor's light: from the first on a spot is bare, below the second it is no shadow but something dark.
 BARE, DARKEST = 0.93, 0.5
@@ -179,6 +179,14 @@ def cut_floor_shadows(
     return tuple(cut)
 
 
+def channels_at(scene: np.ndarray, pixels: np.ndarray) -> np.ndarray:
+    """Luma and chroma of the empty scene at flat pixels, shape (3, n).
+
+    Each channel's values lie in one piece (`hmc.camera.silhouettes.in_planes`): pixel by pixel, the whole image would be copied first.
+    """
+    return np.moveaxis(scene, -1, 0).reshape(3, -1).take(pixels, axis=1)
+
+
 def darkness(view: LitView, pixels: np.ndarray) -> np.ndarray:
     """How dark some pixels are against the empty scene.
 
@@ -194,11 +202,10 @@ def darkness(view: LitView, pixels: np.ndarray) -> np.ndarray:
         Logarithms of the shares of that scene's light; `OTHER_COLOR` of pixels that have another color as well, or whose scene was never
         seen.
     """
-    scene, color = view.scene, view.colors.take(pixels, axis=0).astype(np.float32)
-    mean = scene.mean.reshape(-1, 3).take(pixels, axis=0)  # a channel by itself would be copied whole
-    share = np.maximum(color[:, 0], 1) / mean[:, 0]
+    scene, color, mean = view.scene, view.colors.take(pixels, axis=0).astype(np.float32), channels_at(view.scene.mean, pixels)
+    share = np.maximum(color[:, 0], 1) / mean[0]
     lit = np.minimum(share, 1)  # chroma shrinks with the light
-    tint = np.maximum(*(np.abs(color[:, k] - 128 - lit * (mean[:, k] - 128)) for k in (1, 2)))
+    tint = np.maximum(*(np.abs(color[:, k] - 128 - lit * (mean[k] - 128)) for k in (1, 2)))
     dark = np.where(tint < MOST_CHROMA, np.log(share), OTHER_COLOR)
     return dark if scene.unseen is None else np.where(scene.unseen.ravel().take(pixels), OTHER_COLOR, dark)
 
