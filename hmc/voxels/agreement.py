@@ -14,6 +14,7 @@ import numpy as np
 from hmc.camera.model import Camera, project
 from hmc.voxels.carving import CarvingTables, carve_levels
 from hmc.voxels.components import components
+from hmc.voxels.grid import voxels_of
 
 __all__ = ["agreed_views", "bodies", "hull_view"]
 
@@ -51,7 +52,7 @@ def agreed_views(
     lowest = tolerant.argmax(axis=2)
     down = tolerant.any(axis=2) & (lowest * size < LEGS_M)
     tolerant |= down[..., None] & (np.arange(tolerant.shape[2]) < lowest[..., None])
-    points = [tables.grid.centres(np.argwhere(hull)) for hull in (strict, tolerant)]
+    points = [tables.grid.centres(voxels_of(hull)) for hull in (strict, tolerant)]
     surely, possibly = (
         [None if mask is None else hull_view(camera, centres, radius) for camera, mask in zip(tables.rig, masks, strict=True)]
         for centres, radius in zip(points, (0.65 * size, 0.65 * size + REACH_M), strict=True)

@@ -29,7 +29,7 @@ import numpy as np
 from hmc.camera.coverage import floor_points
 from hmc.camera.model import Camera, Rig
 from hmc.voxels.carving import CarvingTables, carve, make_tables, pixel_of_voxel, pixels_at
-from hmc.voxels.grid import VoxelGrid
+from hmc.voxels.grid import VoxelGrid, voxels_of
 
 __all__ = [
     "Completion",
@@ -168,9 +168,7 @@ def complete_masks(tables: CompletionTables, masks: Sequence[np.ndarray | None],
     shadow = np.append(floor_shadows(tables, masks, doubtful), False)
     possible = {c: _possible(mask, doubtful[c], shadow, tables.pixel_cells[c]) for c, mask in given.items()}
     grid = tables.carving.grid
-    # Of a flat array: much quicker than of a volume.
-    voxels = np.flatnonzero(carve(tables.carving, [possible.get(c) for c in range(len(masks))]))
-    voxels = np.stack(np.unravel_index(voxels, grid.shape), axis=-1)
+    voxels = voxels_of(carve(tables.carving, [possible.get(c) for c in range(len(masks))]))
     points, pixels = grid.centres(voxels), pixels_at(tables.carving, voxels).astype(np.int64)  # as gathers want them
     before = {c: np.ascontiguousarray(mask).view(np.uint8) for c, mask in given.items()}
     seeing = _votes({c: np.ones_like(mask) for c, mask in before.items()}, pixels)

@@ -17,7 +17,7 @@ import numpy as np
 from hmc.camera.model import Rig
 from hmc.voxels.agreement import hull_view
 from hmc.voxels.carving import CarvingTables, carve_levels, make_tables, pixels_at
-from hmc.voxels.grid import VoxelGrid
+from hmc.voxels.grid import VoxelGrid, voxels_of
 
 __all__ = ["LEAST_LEFT", "Fit", "fit_of_cameras", "fitting_tables", "missed_share"]
 
@@ -85,7 +85,7 @@ def fit_of_cameras(tables: CarvingTables, masks: Sequence[np.ndarray | None]) ->
     most = min(MOST_OUT, len(there) - LEAST_LEFT)
     if most < 1:
         return None
-    voxels = np.argwhere(carve_levels(tables, masks, (most,))[0])
+    voxels = voxels_of(carve_levels(tables, masks, (most,))[0])
     if not len(voxels):
         return None
     votes = _votes(masks, pixels_at(tables, voxels))
@@ -116,7 +116,7 @@ def missed_share(tables: CarvingTables, masks: Sequence[np.ndarray | None], came
         The cameras to judge it by.
     """
     chosen = [mask if c in others else None for c, mask in enumerate(masks)]
-    voxels = np.argwhere(carve_levels(tables, chosen, (0,), min_views=LEAST_HITS)[0])
+    voxels = voxels_of(carve_levels(tables, chosen, (0,), min_views=LEAST_HITS)[0])
     if masks[camera] is None or not len(voxels):
         return float("nan")
     patterns = _counted(_votes(masks, pixels_at(tables, voxels)))

@@ -26,6 +26,7 @@ import numpy as np
 from hmc.camera.light import brought_back
 from hmc.voxels.carving import carve, pixels_at
 from hmc.voxels.completion import CompletionTables, doubted_floor, shown
+from hmc.voxels.grid import voxels_of
 
 __all__ = ["OTHER_COLOR", "LitView", "Scene", "channels_at", "cut_filled_shadows", "cut_floor_shadows", "darkness", "lit_views"]
 
@@ -258,7 +259,7 @@ def _shadowed(tables: CompletionTables, floors: dict[int, LitView], asked: dict[
 def _beside_people(tables: CompletionTables, masks: Sequence[np.ndarray | None], asked: dict[int, np.ndarray]) -> dict[int, np.ndarray]:
     """By camera, those of some flat pixels that do not look at a place above the floor at which all cameras see people."""
     grid = tables.carving.grid
-    voxels = np.stack(np.unravel_index(np.flatnonzero(carve(tables.carving, masks)), grid.shape), axis=-1)
+    voxels = voxels_of(carve(tables.carving, masks))
     voxels = voxels[voxels[:, 2] >= int(np.ceil(ABOVE_M / grid.voxel_size_m))]
     points, shown_at = grid.centres(voxels), pixels_at(tables.carving, voxels).astype(np.int64)
     beside = {}

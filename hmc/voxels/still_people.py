@@ -21,6 +21,7 @@ from hmc.camera.standing_cut import BodyColors, Figure, cut_body, figure, learn_
 from hmc.camera.stirring import stirring
 from hmc.voxels.agreement import bodies, hull_view
 from hmc.voxels.carving import CarvingTables, carve_levels
+from hmc.voxels.grid import voxels_of
 
 __all__ = ["StillPerson", "cut_still_people", "find_still_people"]
 
@@ -147,7 +148,7 @@ def _measure(tables: CarvingTables, place: Standing, cuts, others, figures: Sequ
     """Litres of the hull of what was cut out, its lowest and highest point, its middle in x and y, and how well each view agrees."""
     grid = tables.grid
     filled = [cut | (mask & one.reach) for cut, mask, one in zip(cuts, others, figures, strict=True)]
-    points = grid.centres(np.argwhere(carve_levels(tables, filled, (0,))[0]))
+    points = grid.centres(voxels_of(carve_levels(tables, filled, (0,))[0]))
     points = points[np.hypot(points[:, 0] - place.x, points[:, 1] - place.y) <= REACH_M]
     if len(points) == 0:
         return [0.0, np.inf, 0.0, place.x, place.y, *([0.0] * len(cuts))]
@@ -162,7 +163,7 @@ def _measure(tables: CarvingTables, place: Standing, cuts, others, figures: Sequ
 
 def _others(tables: CarvingTables, hull: np.ndarray, place: Standing) -> list[np.ndarray]:
     """Where in each view people are who stand elsewhere."""
-    points = tables.grid.centres(np.argwhere(hull))
+    points = tables.grid.centres(voxels_of(hull))
     points = points[np.hypot(points[:, 0] - place.x, points[:, 1] - place.y) > 0.8 * REACH_M]
     return [hull_view(camera, points, 0.65 * tables.grid.voxel_size_m) for camera in tables.rig]
 

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from hypothesis.extra.numpy import array_shapes, arrays
 
 from hmc.errors import InputError
-from hmc.voxels.grid import BYTES_PER_CAMERA, BYTES_PER_VOXEL, MEMORY_SHARE, VoxelGrid, available_memory, check_memory
+from hmc.voxels.grid import BYTES_PER_CAMERA, BYTES_PER_VOXEL, MEMORY_SHARE, VoxelGrid, available_memory, check_memory, voxels_of
 
 
 def test_first_centre_lies_half_a_voxel_inside_the_room():
@@ -88,3 +89,8 @@ def test_grids_do_not_change():
     grid = VoxelGrid(np.zeros(3), 0.1, (1, 1, 1))
     with pytest.raises(ValueError, match="read-only"):
         grid.origin[0] = 1
+
+
+@given(arrays(bool, array_shapes(min_dims=3, max_dims=3, max_side=6)))
+def test_the_voxels_of_a_volume_are_those_of_numpy(volume):
+    np.testing.assert_array_equal(voxels_of(volume), np.argwhere(volume))

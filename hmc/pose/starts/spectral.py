@@ -23,6 +23,7 @@ from hmc.pose.steps.swarm.heading import heading_of
 from hmc.pose.steps.swarm.temporal import SwarmSettings, start_fits
 from hmc.pose.views.hull_target import HullTarget
 from hmc.pose.views.rays import points_to_cover
+from hmc.voxels.grid import voxels_of
 
 __all__ = ["body_state", "spectral_poses", "strict_voxels"]
 
@@ -33,7 +34,7 @@ SAME_M = 0.05
 def strict_voxels(target: HullTarget) -> tuple[np.ndarray, np.ndarray]:
     """A target's strict hull: voxels of the crop, (n, 3), and their centres, metres."""
     inside = target.tolerant & (target.distance <= 0)
-    voxels = np.argwhere(inside if inside.any() else target.tolerant)
+    voxels = voxels_of(inside if inside.any() else target.tolerant)
     return voxels, target.origin + target.voxel_size_m * voxels
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hmc.pose.views.near_distance import distances_of_squares, look_up, near_squares
-from hmc.voxels.grid import VoxelGrid
+from hmc.voxels.grid import VoxelGrid, voxels_of
 from hmc.voxels.surface import surface
 
 __all__ = ["FAR_M", "HullTarget", "distance_at", "distance_gradient", "make_target", "sample_points", "sound_hull"]
@@ -138,7 +138,7 @@ def make_target(
     needed = np.ones(shape, bool)
     if new is not None:
         needed[:] = core
-        beyond = np.argwhere((occupied | maybe) & ~core)
+        beyond = voxels_of((occupied | maybe) & ~core)
         needed[tuple(beyond[new(grid.centres(beyond + low))].T)] = True
     reach = int(np.ceil(FAR_M / grid.voxel_size_m))
     far = _surface_distances(reach, grid.voxel_size_m)

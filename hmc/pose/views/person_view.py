@@ -24,7 +24,7 @@ from hmc.pose.views.skin import Skin, observe_voxels
 from hmc.pose.views.uncovered import on_uncovered_pixels
 from hmc.tracking.resumable import observe_step
 from hmc.tracking.tracks import person_voxels
-from hmc.voxels.grid import VoxelGrid
+from hmc.voxels.grid import VoxelGrid, voxels_of
 from hmc.voxels.hulls import HullStep
 
 __all__ = ["EVIDENCE", "HULLS_FOR", "IMAGES_FOR", "PersonView", "VoxelView", "check_needs", "views_of"]
@@ -157,7 +157,7 @@ def _targets(recording, grid, hull, strict, tolerant, unseen) -> list[HullTarget
         all_strict = grid.centres(np.concatenate([nothing, *strict]))
         new = partial(on_uncovered_pixels, recording.rig, hull.masks, all_strict, spacing_m=grid.voxel_size_m)
     if hull.doubted is not None:  # a camera that only doubts a place knows as little of it as one from which it is hidden
-        unseen = np.concatenate([nothing if unseen is None else unseen, np.argwhere(hull.doubted & ~hull.strict)])
+        unseen = np.concatenate([nothing if unseen is None else unseen, voxels_of(hull.doubted & ~hull.strict)])
     targets = []
     for k in range(len(strict)):
         target = make_target(grid, strict[k], tolerant[k], spare, floor_z, new, unseen)
