@@ -3,7 +3,8 @@
 Who was lost among others may be fitted wrongly ever after: the filter knows no other pose, and by the time that nobody is near, its own
 high cost is what is usual for it (`hmc.pose.recovery`). When the recording is over, a person's costs tell where that was: far above those
 of the same person's better frames, or of the best fitted person's. There a pose is found as a first one is, from the hulls of one frame,
-and the second pass (`hmc.pose.backward`) follows it back if it fits far better.
+or with other trunks and arms on the legs that are there (`upper_bodies`), and the second pass (`hmc.pose.backward`) follows it back if
+it fits far better.
 """
 
 from __future__ import annotations
@@ -14,14 +15,20 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import median_filter
 
+from hmc.body.joints import N_DOF
+from hmc.body.limbs import LIMBS
+from hmc.body.model import BodyModel
 from hmc.pose.method import Subject
 from hmc.pose.objectives.objective import Objective
-from hmc.pose.starts.templates import first_poses
+from hmc.pose.starts.templates import first_poses, template_states
 from hmc.pose.steps.polish import PolishSettings
-from hmc.pose.steps.refine import refine
+from hmc.pose.steps.refine import refine_all
 from hmc.pose.views.hull_target import HullTarget
 
-__all__ = ["AnewSettings", "doubtful_frames", "pose_anew"]
+__all__ = ["AnewSettings", "doubtful_frames", "pose_anew", "upper_bodies"]
+
+#: Angles above the hips.
+UPPER = np.setdiff1d(np.arange(6, N_DOF), [k for limb in LIMBS.values() if not limb.is_arm for k in (*limb.dofs, *limb.end_dofs)])
 
 
 @dataclass(frozen=True)
@@ -81,11 +88,11 @@ def pose_anew(
     subject: Subject,
     target: HullTarget,
     objective: Objective,
-    cost: float,
+    present: tuple[np.ndarray, float],
     polish: PolishSettings,
     settings: AnewSettings,
 ) -> list[np.ndarray]:
-    """The best pose that a start from one frame's hulls finds, if it costs far less than the present one; else none.
+    """The best pose that a start from one frame's hulls, or from the present legs, finds, if it costs far less than the present one.
 
     Parameters
     ----------
@@ -94,8 +101,8 @@ def pose_anew(
     target : HullTarget
     objective : Objective
         Of the frame.
-    cost : float
-        Of the present pose, square metres.
+    present : tuple of (ndarray, float)
+        The present pose, shape (37,), and its cost, square metres.
     polish : PolishSettings
     settings : AnewSettings
 
@@ -104,7 +111,21 @@ def pose_anew(
     list of ndarray, shape (37,)
         One, or none.
     """
+    pose, cost = present
     states, _ = first_poses(rng, subject, target, polish.symmetric, subject.capture.floor_z)
-    trials = [refine(objective, state, polish.refine) for state in states]
+    trials = refine_all(objective, [*states, *upper_bodies(subject.body, pose)], polish.refine)
     best, info = min(trials, key=lambda trial: trial[1].cost_after)
     return [best] if info.cost_after < settings.gain * cost else []
+
+
+def upper_bodies(body: BodyModel, state: np.ndarray) -> np.ndarray:
+    """A pose with the trunk, head and arms of each typical pose in place of its own, shape (n, 37).
+
+    An arm that stands for a head, which is bent into the chest, explains the hulls nearly as well as the head does, and no search for
+    one limb alone undoes both.
+    """
+    typical = template_states(body, state[:2], 0.0, state[3:4])[0]
+    others = np.unique(typical[:, UPPER], axis=0)
+    states = np.repeat(state[None], len(others), axis=0)
+    states[:, UPPER] = others
+    return states

@@ -325,7 +325,9 @@ def _own(rng: np.random.Generator, person: _Person, view: PersonView, settings: 
     own, info = refine(objective, person.own[person.row_of[view.frame]], settings.polish.refine)
     found = [own, *keypoint_pose(person.subject.body, view.keypoints, own)]
     if view.frame in person.anew and settings.anew is not None and view.target is not None:
-        found += pose_anew(other_rng(rng, ANEW), person.subject, view.target, objective, info.cost_after, settings.polish, settings.anew)
+        found += pose_anew(
+            other_rng(rng, ANEW), person.subject, view.target, objective, (own, info.cost_after), settings.polish, settings.anew
+        )
     return found
 
 

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from methods import HEIGHT_M, VOXEL_M, followed, tiny_clip, true_joints, true_tracks
 
+from hmc.body.joints import N_DOF, dof_index
 from hmc.body.kinematics import landmarks
 from hmc.body.proportions import make_bodies
 from hmc.pose.anew import AnewSettings, doubtful_frames
@@ -34,12 +35,24 @@ def gone_astray(people):
     states[ASTRAY, :2] += [0.3, -0.2]
     states[ASTRAY, 3] += np.pi
     states[ASTRAY, 6:] = states[ASTRAY, 6:] * 0.3 + 0.4
+    return with_states(people, states)
+
+
+def with_states(people, states):
+    """Other poses of the same people, at six times the cost where they go astray."""
     (body,) = make_bodies(people.states.bodies).values()
     states = np.clip(states, body.limits.low, body.limits.high)
     costs = people.costs.copy()
     costs[ASTRAY] *= 6
     poses = replace(people.poses, positions=landmarks(body, states))
     return replace(people, poses=poses, states=replace(people.states, states=states), costs=costs)
+
+
+def with_an_arm_for_a_head(people):
+    """The same, but from a frame on the head is bent into the chest, and an arm is where it was."""
+    states = people.states.states.copy()
+    states[ASTRAY, dof_index("torso_y", "neck_y", "r_shoulder_x")] += np.radians([50, 60, -140])
+    return with_states(people, states)
 
 
 def errors(people):
@@ -59,6 +72,15 @@ def test_a_body_that_went_astray_is_found_anew(one_pass):
     without, found = (errors(second(astray, run, anew))[ASTRAY] for anew in (None, AnewSettings()))
     assert without[3:].min() > 0.15  # no frame near these knows better
     assert found[-1] < 0.05 and found[0] < 0.05 and found.mean() < 0.1
+
+
+def test_an_arm_in_the_place_of_a_head_is_undone(one_pass, monkeypatch):
+    """By typical trunks and arms on the legs that are there, where a start from the hulls finds nothing, as among others."""
+    people, run = one_pass
+    astray = with_an_arm_for_a_head(people)
+    monkeypatch.setattr("hmc.pose.anew.first_poses", lambda *given: (np.zeros((0, N_DOF)), np.zeros(0)))
+    without, found = (errors(second(astray, run, anew))[ASTRAY] for anew in (None, AnewSettings()))
+    assert without[-1] > 0.1 and found[-1] < 0.05 and found.mean() < 0.05
 
 
 def test_where_nothing_was_lost_nothing_changes(one_pass, monkeypatch):

@@ -275,8 +275,9 @@ OWN_REASONS = {
     ),
     "repairs": (
         "Filling of gaps is older than the chances of shades, which find most of what it found: it adds .015 to .02 to the strict hulls "
-        "of five of the twelve recordings. Chances of shades take .015 of meeting_moved's silhouettes; why is not known. The floor as "
-        "others see it adds .03 to slate's silhouettes and .01 to .06 to four recordings' hulls, and takes .09 of the hulls of tan."
+        "of four of the twelve recordings. The floor as others see it adds .03 to slate's silhouettes and .01 to .06 to four recordings' "
+        "hulls, and takes .09 of the hulls of tan. Of meeting_moved's strict hulls completion takes .04: chairs that were pushed about are "
+        "completed as people would be."
     ),
     "body-bias": (
         "The joints of our own actors lie in the middle of their flesh. On people of another program's surface (r1 to r4, the run beside "
