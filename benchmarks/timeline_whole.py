@@ -22,7 +22,6 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from profile_whole import Clock, watch
 
 #: Module and function of each phase; what is in none is the first line.
@@ -91,6 +90,8 @@ def watch_helpers(log: Path, turns: Turns) -> None:
 
 def table(rows: list[tuple[float, float, str]], log: Path, processors: int) -> dict[str, list[float]]:
     """By phase: seconds by the clock, processor time of this process, of the others, and the least."""
+    import numpy as np  # not before the command is there, which says how many threads linear algebra has
+
     helpers = defaultdict(list)
     for line in log.read_text().splitlines() if log.is_file() else ():
         pid, at, seconds = json.loads(line)
