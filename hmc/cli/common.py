@@ -29,6 +29,7 @@ __all__ = [
     "given_places",
     "image_parameters",
     "load_given_plugins",
+    "made_from",
     "note_changes",
     "open_given_keypoints",
     "open_meanwhile",
@@ -332,6 +333,17 @@ def unlike_its_run(folder: Path, names: Collection[str] = ()) -> list[str]:
     digests = {folder / name: said[name] for name in names or said if name in said}
     changed = [path for path, digest in digests.items() if path.is_file() and digest != file_digest(path)]
     return [f"{path}: is not as its run wrote it (changed, or damaged)" for path in changed]
+
+
+def made_from(directory: Path, recording: Path | None) -> list[str]:
+    """A sentence where the result says that it was made from a recording of another name."""
+    from hmc.io.results import read_run
+
+    run = directory / "run.toml"
+    made = read_run(run).get("recording") if run.is_file() else None
+    if recording is None or not isinstance(made, str) or Path(made).name == real_path(recording).name:
+        return []
+    return [f"{run}: the result was made from {made}, not from {recording}; are they the same recording?"]
 
 
 def note_changes(recording, source: Mapping[str, Any], problems: list[str]) -> None:

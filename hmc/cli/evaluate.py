@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from hmc.cli.common import unlike_its_run, whole_number
+from hmc.cli.common import made_from, unlike_its_run, whole_number
 from hmc.errors import InputError
-from hmc.io.files import atomic_write, real_path, write_toml
+from hmc.io.files import atomic_write, write_toml
 
 if TYPE_CHECKING:
     from hmc.io.results import TrackTable
@@ -231,17 +231,6 @@ def find_truth(recording: Path | None, truth: Path | None) -> tuple[Path | None,
     if not joints.exists() and not centroids.exists():
         raise InputError(f"{recording}: no truth/joints.csv and no truth/centroids.csv to compare with; give another table by --truth FILE")
     return (joints if joints.exists() else None), (centroids if centroids.exists() else None), None
-
-
-def made_from(directory: Path, recording: Path | None) -> list[str]:
-    """A sentence where the result says that it was made from a recording of another name."""
-    from hmc.io.results import read_run
-
-    run = directory / "run.toml"
-    made = read_run(run).get("recording") if run.is_file() else None
-    if recording is None or not isinstance(made, str) or Path(made).name == real_path(recording).name:
-        return []
-    return [f"{run}: the result was made from {made}, not from {recording}; are they the same recording?"]
 
 
 def print_pose(poses, quiet: bool) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from hmc.cli.common import (
     add_selection_options,
+    made_from,
     open_selected,
     output_path,
     positive_float,
@@ -60,7 +61,7 @@ def run(args: argparse.Namespace) -> int:
         args.start, args.frames = run_selection(args.directory)
     recording = open_selected(args)
     refuse_own_file(args.out, places_of(recording))
-    problems = [*recording.problems, *unlike_its_run(args.directory)]
+    problems = [*recording.problems, *unlike_its_run(args.directory), *made_from(args.directory, args.recording)]
     write_view(
         args.out,
         recording,

@@ -330,6 +330,15 @@ def test_a_video_shows_the_frames_of_the_run(recording, result, tmp_path):
     video.release()
 
 
+def test_a_result_of_another_recording_is_told(recording, result, tmp_path, capsys):
+    for path in result.iterdir():
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+    for made, told in ((tmp_path / "elsewhere" / recording.name, False), (tmp_path / "other_take", True)):
+        write_run(tmp_path / "run.toml", "x", {}, 0, recording=made)
+        assert main(["view", str(tmp_path), str(recording), "--quiet", "--no-voxels", "--out", str(tmp_path / "x.png")]) == 0
+        assert (f"the result was made from {made}" in capsys.readouterr().err) == told
+
+
 def test_a_result_of_nobody_shows_the_room(recording, tmp_path):
     write_joints(tmp_path / "joints.csv", PoseTable(np.zeros(0, int), np.zeros(0, int), np.zeros((0, 15, 3))))
     assert main(["view", str(tmp_path), str(recording), "--quiet", "--no-voxels", "--out", str(tmp_path / "x.png")]) == 0
