@@ -76,9 +76,12 @@ def export_trajectories(found: Sequence[Trajectory], out: str | Path, kind: str 
     Raises
     ------
     InputError
-        When there is no such format, it needs angles and the result has none, or a package is missing.
+        When there is no such format, the suffix is another's, it needs angles and the result has none, or a package is missing.
     """
     out = Path(out)
+    suffix = out.suffix.lower().removeprefix(".")
+    if kind and suffix != kind and suffix in FORMATS:
+        raise InputError(f"{out}: ends as {suffix} does, and {kind} is asked for: other programs go by the ending; change one of them")
     kind = kind or format_of(out)
     chosen = FORMATS[kind]
     if chosen.states and any(one.states is None for one in found):

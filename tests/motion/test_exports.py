@@ -207,6 +207,10 @@ def test_command_line(tmp_path, capsys):
     assert "needs the body's angles" in capsys.readouterr().err
     assert main(["export", str(tmp_path / "result"), "--to", "csv"]) == 0
     assert main(["export", str(tmp_path / "none"), "--to", "csv"]) == 2
+    capsys.readouterr()
+    assert main(["export", str(tmp_path / "result"), "--to", "trc", "--out", str(tmp_path / "walk.csv")]) == 2
+    assert "ends as csv does, and trc is asked for" in capsys.readouterr().err and not (tmp_path / "walk.csv").exists()
+    assert main(["export", str(tmp_path / "result"), "--to", "trc", "--out", str(tmp_path / "walk.txt")]) == 0
 
 
 def test_tables_have_the_trust_of_landmarks_where_it_is_known(tmp_path):
