@@ -32,6 +32,8 @@ TRACK_COLUMNS = ("frame", "person", "x", "y", "z")
 HEAD_COLUMNS = ("head_x", "head_y", "head_z")
 #: No coordinate is farther off, metres.
 MAX_METRES = 1e9
+#: Nobody's landmarks are farther apart, metres.
+LARGEST_M = 20.0
 
 
 @dataclass(frozen=True)
@@ -214,7 +216,8 @@ def read_joints(path: str | Path, names: Sequence[str] = LANDMARKS) -> PoseTable
     Raises
     ------
     InputError
-        When the file is missing, a column is missing, a value is no number, a joint is unknown or given twice.
+        When the file is missing, a column is missing, a value is no number, a joint is unknown or given twice, or people are larger than
+        metres make them.
     """
     path = Path(path)
     columns, lines = read_columns(path, JOINT_COLUMNS)
@@ -231,12 +234,21 @@ def read_joints(path: str | Path, names: Sequence[str] = LANDMARKS) -> PoseTable
     _refuse_twice(path, cells, lines, "this frame, person and joint")
     positions = np.full((len(keys) * len(names), 3), np.nan)
     positions[cells] = xyz
+    _refuse_other_units(path, positions.reshape(len(keys), len(names), 3))
     more: dict[str, np.ndarray] = {}
     for name, what in ((VIEWS_COLUMN, "a number of cameras"), (TRUST_COLUMN, "a number from 0 to 1")):
         if name in columns:
             more[name] = np.full((len(keys), len(names)), np.nan)
             more[name].flat[cells] = _numbers(path, name, columns[name], lines, what)
     return PoseTable(keys[:, 0], keys[:, 1], positions.reshape(len(keys), len(names), 3), names=tuple(names), **more)
+
+
+def _refuse_other_units(path: Path, positions: np.ndarray) -> None:
+    """A person's landmarks are not farther apart than `LARGEST_M` in most frames: else they are in millimetres, say."""
+    known = positions[np.isfinite(positions).all(axis=2).any(axis=1)]
+    apart = float(np.median(np.linalg.norm(np.nanmax(known, axis=1) - np.nanmin(known, axis=1), axis=1))) if len(known) else 0.0
+    if apart > LARGEST_M:
+        raise InputError(f"{path}: a person's landmarks are {apart:.4g} apart; they are to be metres: divide millimetres by 1000")
 
 
 def write_joints(path: str | Path, table: PoseTable) -> None:

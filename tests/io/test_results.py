@@ -312,3 +312,14 @@ def test_what_a_killed_process_left_half_written_is_removed_by_the_next(tmp_path
     with atomic_write(work / "u.csv") as file:
         file.write("y")
     assert {one.name for one in work.iterdir()} == {"u.csv", mine.name, elsewhere.name}
+
+
+def test_landmarks_in_millimetres_are_refused(tmp_path):
+    people = PoseTable(np.arange(4), np.zeros(4, int), np.random.default_rng(0).uniform(0, 1.8, (4, len(LANDMARKS), 3)))
+    people.positions[1, 3] = np.nan
+    people.positions[2, 5] += 500  # one that is astray makes no other unit
+    write_joints(tmp_path / "metres.csv", people)
+    assert read_joints(tmp_path / "metres.csv").positions.shape == people.positions.shape
+    write_joints(tmp_path / "millimetres.csv", replace(people, positions=1000 * people.positions))
+    with pytest.raises(InputError, match=r"millimetres\.csv: a person's landmarks are .* apart; they are to be metres"):
+        read_joints(tmp_path / "millimetres.csv")
