@@ -185,7 +185,7 @@ def _draw(rows: Sequence[dict[str, Any]]) -> plt.Figure:
     axes.set_yticks(places, [f"{row['recording']}, {row['cameras']} cameras, {_of_people(row['people'])}" for row in rows])
     axes.set(xlabel="mean error (mm); points: seeds", xlim=(0, None))
     axes.invert_yaxis()
-    axes.legend()
+    axes.legend(loc="center left", bbox_to_anchor=(1, 0.5))
     return figure
 
 
