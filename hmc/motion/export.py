@@ -51,10 +51,14 @@ def format_of(path: str | Path) -> str:
     InputError
         When there is none.
     """
-    suffix = Path(path).suffix.lower().removeprefix(".")
+    suffix = _suffix(Path(path))
     if suffix not in FORMATS:
         raise InputError(f"{path}: no format of that suffix; there are {', '.join(FORMATS)}")
     return suffix
+
+
+def _suffix(path: Path) -> str:
+    return path.suffix.lower().removeprefix(".")
 
 
 def export_trajectories(found: Sequence[Trajectory], out: str | Path, kind: str | None = None) -> Exported:
@@ -79,8 +83,8 @@ def export_trajectories(found: Sequence[Trajectory], out: str | Path, kind: str 
         When there is no such format, the suffix is another's, it needs angles and the result has none, or a package is missing.
     """
     out = Path(out)
-    suffix = out.suffix.lower().removeprefix(".")
-    if kind and suffix != kind and suffix in FORMATS:
+    suffix = _suffix(out)
+    if kind and suffix in FORMATS and suffix != kind:
         raise InputError(f"{out}: ends as {suffix} does, and {kind} is asked for: other programs go by the ending; change one of them")
     kind = kind or format_of(out)
     chosen = FORMATS[kind]

@@ -119,10 +119,19 @@ def pose_anew(
 
 
 def upper_bodies(body: BodyModel, state: np.ndarray) -> np.ndarray:
-    """A pose with the trunk, head and arms of each typical pose in place of its own, shape (n, 37).
+    """A pose with the trunk, head and arms of each typical pose in place of its own.
 
     An arm that stands for a head, which is bent into the chest, explains the hulls nearly as well as the head does, and no search for
     one limb alone undoes both.
+
+    Parameters
+    ----------
+    body : BodyModel
+    state : ndarray, shape (37,)
+
+    Returns
+    -------
+    ndarray, shape (n, 37)
     """
     typical = template_states(body, state[:2], 0.0, state[3:4])[0]
     others = np.unique(typical[:, UPPER], axis=0)

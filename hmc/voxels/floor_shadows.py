@@ -53,7 +53,7 @@ class Scene:
     Parameters
     ----------
     mean : ndarray of float32, shape (height, width, 3)
-        Luma and chroma (`hmc.camera.segmentation.BackgroundModel`).
+        Luma and chroma (`hmc.camera.segmentation.BackgroundModel`), quickest in planes (`hmc.camera.silhouettes.in_planes`).
     unseen : ndarray of bool, shape (height, width), or None
         Where it was never seen.
     """
@@ -181,9 +181,18 @@ def cut_floor_shadows(
 
 
 def channels_at(scene: np.ndarray, pixels: np.ndarray) -> np.ndarray:
-    """Luma and chroma of the empty scene at flat pixels, shape (3, n).
+    """Luma and chroma of the empty scene at some pixels.
 
-    Each channel's values lie in one piece (`hmc.camera.silhouettes.in_planes`): pixel by pixel, the whole image would be copied first.
+    Parameters
+    ----------
+    scene : ndarray of float32, shape (height, width, 3)
+        As `Scene.mean`; where its channels do not lie in one piece each, the whole of it is copied first.
+    pixels : ndarray of int, shape (n,)
+        Flat.
+
+    Returns
+    -------
+    ndarray of float32, shape (3, n)
     """
     return np.moveaxis(scene, -1, 0).reshape(3, -1).take(pixels, axis=1)
 

@@ -125,7 +125,16 @@ class VoxelGrid:
 
 
 def voxels_of(volume: np.ndarray) -> np.ndarray:
-    """Which voxels of a volume are set, shape (n, 3): as `numpy.argwhere`, in a tenth of its time."""
+    """Which voxels of a volume are set: as `numpy.argwhere`, in a tenth of its time.
+
+    Parameters
+    ----------
+    volume : ndarray of bool, shape (nx, ny, nz)
+
+    Returns
+    -------
+    ndarray of int, shape (n, 3)
+    """
     return np.stack(np.unravel_index(np.flatnonzero(volume), volume.shape), axis=-1)
 
 
