@@ -36,6 +36,7 @@ PHASES = {
     "what furniture hides": (("hmc.pose.occluders", "learn_hidden_places"),),
     "bodies of the whole run": (("hmc.pose.backward", "_bodies"), ("hmc.pose.backward", "_with_beside")),
     "second pass": (("hmc.pose.backward", "_sweep"),),
+    "limbs by their colors": (("hmc.pose.backward", "limbs_by_color"),),
     "trust": (("hmc.pose.trust", "with_trust"),),
 }
 REST = "all else, with imports"

@@ -292,9 +292,18 @@ def gains(rig: Rig, colors: PartColors, frame: FrameColors, rest: Mapping[int, S
         behind, without = np.full(n_patches, np.inf), np.zeros(n_patches, np.float32)
         behind[others.patch], without[others.patch] = others.depth, colors.said(camera, others.kind, bins[others.patch])
         patch, depth, seen = _patches(rig[camera], side, points)
-        nearest = np.flatnonzero(seen & (depth < behind[patch]))
-        nearest = nearest[np.argsort(depth.ravel()[nearest], kind="stable")]
-        place_and_patch, first = np.unique(nearest // k * n_patches + patch.ravel()[nearest], return_index=True)
-        place, patch = np.divmod(place_and_patch, n_patches)
-        gained += np.bincount(place, colors.said(camera, kind[nearest[first] % k], bins[patch]) - without[patch], minlength=n)
+        before = np.flatnonzero(seen & (depth < behind[patch]))
+        cell = before // k * n_patches + patch.ravel()[before]
+        first = _first_of(cell, depth.ravel()[before], n * n_patches)
+        place, patch = np.divmod(cell[first], n_patches)
+        gained += np.bincount(place, colors.said(camera, kind[before[first] % k], bins[patch]) - without[patch], minlength=n)
     return gained / max(1, len(rest))
+
+
+def _first_of(cell: np.ndarray, depth: np.ndarray, n_cells: int) -> np.ndarray:
+    """The nearest of the points in each cell that has one, the first of equals, cell by cell; both of shape (m,)."""
+    least = np.full(n_cells, np.inf)
+    np.minimum.at(least, cell, depth)
+    nearest = np.flatnonzero(depth == least[cell])
+    _, first = np.unique(cell[nearest], return_index=True)
+    return nearest[first]
