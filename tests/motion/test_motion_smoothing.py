@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.signal import butter, sosfiltfilt
+from scipy.signal import butter, savgol_filter, sosfiltfilt
 
 from hmc.body.joints import dof_index
 from hmc.body.kinematics import landmarks
 from hmc.errors import InputError
-from hmc.motion.smoothing import Smoothing, butterworth, smooth_positions, smooth_trajectory, stretches
+from hmc.motion.smoothing import DEGREE, Smoothing, butterworth, local_polynomial, smooth_positions, smooth_trajectory, stretches
 from hmc.motion.trajectory import Trajectory
 
 
@@ -30,6 +30,15 @@ def test_the_filter_is_that_of_scipy_in_another_form():
     raised = 5.0 / (np.sqrt(2) - 1) ** 0.25
     other = sosfiltfilt(butter(2, raised, fs=60, output="sos"), values, axis=0, padlen=9)
     assert np.allclose(butterworth(values, 60, 5.0), other)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(5, 60), st.floats(0.17, 0.6))
+@settings(max_examples=25, deadline=None)
+def test_the_polynomial_is_that_of_scipy(seed, n, window_s):
+    values = np.random.default_rng(seed).normal(size=(n, 2, 3))
+    window = 2 * round(window_s * 30 / 2) + 1
+    other = savgol_filter(values, window, DEGREE, axis=0) if n >= window else values
+    assert np.allclose(local_polynomial(values, 30, window_s), other, atol=1e-12)
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(9, 40))
