@@ -16,16 +16,19 @@ import numpy as np
 
 from hmc.camera.local_color import Palette, learn_palette, looks_like_people, looks_like_surroundings
 
-__all__ = ["PeopleColors", "View", "cut_people", "disc", "learn_colors"]
+__all__ = ["PeopleColors", "View", "color_mixture", "cut_people", "disc", "learn_colors"]
 
 #: Widths in pixels of an image whose longer side is 320: how deep in a person is surely inside, gaps that may be a person's, how thick a
-#: limb is at least, and the surroundings of people in which the graph cut works.
+#: limb is at least, and the surroundings that decide about a place: of 20, a black panel beside a person became hers.
 CORE_PX = 5
 LIMB_PX = 9
 THIN_PX = 3
-AROUND_PX = 20
-#: Fewer pixels than this do not tell what colors people or the scene have.
-FEWEST_PX = 50
+AROUND_PX = 32
+#: Fewer pixels than this do not tell what colors people or the scene have; more than that tell no more.
+FEWEST_PX, MOST_PX = 50, 20_000
+#: Gaussians of each mixture, how often and how long their clusters are looked for, and grey levels, squared, that any color varies.
+N_GAUSSIANS, BEGINNINGS, ROUNDS, LEAST_STEP, LEAST_VARIANCE = 5, 8, 30, 0.1, 0.01
+SEED = 0
 
 
 @dataclass(frozen=True)
@@ -87,43 +90,73 @@ def learn_colors(views: Sequence[View]) -> PeopleColors | None:
     palette = learn_palette([view.image[_near(labels) & telling] for view, (labels, telling) in zip(views, hints, strict=True)])
     if palette is None:
         return None
-    hints = [_hints(view, _limbs(view, labels, palette)) for view, (labels, _) in zip(views, hints, strict=True)]
+    hints = [_hints(view, _limbs(view, labels, palette, view.possibly)) for view, (labels, _) in zip(views, hints, strict=True)]
     pixels = np.concatenate([view.image[telling] for view, (_, telling) in zip(views, hints, strict=True)])
     labels = np.concatenate([labels[telling] for labels, telling in hints])
-    if min(np.count_nonzero(_near(labels)), np.count_nonzero(~_near(labels))) < FEWEST_PX:
+    theirs = _near(labels)
+    if min(np.count_nonzero(theirs), np.count_nonzero(~theirs)) < FEWEST_PX:
         return None
-    cv2.setRNGSeed(0)  # the colors are clustered with OpenCV's own generator
-    models = np.zeros((1, 65)), np.zeros((1, 65))
-    cv2.grabCut(pixels[None], labels[None], None, *models, 0, cv2.GC_INIT_WITH_MASK)  # type: ignore[call-overload]
-    scene, people = models
-    return PeopleColors(palette, people, scene)
+    cv2.setRNGSeed(SEED)  # the colors are clustered with OpenCV's own generator
+    return PeopleColors(palette, color_mixture(pixels[theirs]), color_mixture(pixels[~theirs]))
 
 
-def cut_people(view: View, colors: PeopleColors) -> np.ndarray:
+def color_mixture(pixels: np.ndarray) -> np.ndarray:
+    """A mixture of Gaussians, those of the clusters of some colors.
+
+    `cv2.grabCut` makes its own of clusters that it begins once: they differ from one beginning to another, by so much that a thigh became
+    floor or not.
+
+    Parameters
+    ----------
+    pixels : ndarray of uint8, shape (n, 3)
+
+    Returns
+    -------
+    ndarray, shape (1, 65)
+        As OpenCV writes it: 5 weights, means and covariances.
+    """
+    some = pixels[np.linspace(0, len(pixels) - 1, min(len(pixels), MOST_PX)).astype(int)].astype(np.float32)
+    criteria = (cv2.TERM_CRITERIA_MAX_ITER + cv2.TERM_CRITERIA_EPS, ROUNDS, LEAST_STEP)
+    _, cluster, _ = cv2.kmeans(some, N_GAUSSIANS, None, criteria, BEGINNINGS, cv2.KMEANS_PP_CENTERS)  # type: ignore[call-overload]
+    own = [some[cluster[:, 0] == k] for k in range(N_GAUSSIANS)]
+    means = np.array([one.mean(axis=0) for one in own], float)
+    spreads = np.array([np.cov(one.T, bias=True) + LEAST_VARIANCE * np.eye(3) for one in own])
+    return np.concatenate([[len(one) / len(some) for one in own], means.ravel(), spreads.ravel()])[None]
+
+
+def cut_people(view: View, colors: PeopleColors, where: np.ndarray | None = None) -> np.ndarray:
     """Where people are in an image.
 
     Parameters
     ----------
     view : View
     colors : PeopleColors
+    where : ndarray of bool, shape (height, width), optional
+        Pixels that are asked for; by default all.
 
     Returns
     -------
     ndarray of bool, shape (height, width)
+        True at pixels that are asked for alone.
     """
     people = np.zeros(view.possibly.shape, bool)
-    left, top, width, height = cv2.boundingRect(cv2.dilate(view.possibly.view(np.uint8), disc(people, AROUND_PX)))
-    if width == 0:
+    asked = view.possibly if where is None else view.possibly & where
+    if not asked.any():
         return people
+    # A cut is decided by what is around it: not by all of the image.
+    around = cv2.dilate(asked.view(np.uint8), disc(people, AROUND_PX))
+    possibly = view.possibly & around.view(bool)
     labels, _ = _hints(view)
-    labels, _ = _hints(view, _limbs(view, labels, colors.palette))
-    labels[_ground(view, colors.palette) & (labels != cv2.GC_FGD)] = cv2.GC_BGD
-    box = np.s_[top : top + height, left : left + width]
-    part = np.ascontiguousarray(labels[box])
-    scene, theirs = colors.scene.copy(), colors.people.copy()
-    cv2.grabCut(np.ascontiguousarray(view.image[box]), part, None, scene, theirs, 1, cv2.GC_EVAL_FREEZE_MODEL)  # type: ignore[call-overload]
-    people[box] = _near(part)
-    return people
+    labels, _ = _hints(view, _limbs(view, labels, colors.palette, possibly))
+    labels[_ground(view, colors.palette, possibly) & (labels != cv2.GC_FGD)] = cv2.GC_BGD
+    labels[~around.view(bool)] &= 1
+    for left, top, width, height, _ in cv2.connectedComponentsWithStats(around)[2][1:].tolist():
+        box = np.s_[top : top + height, left : left + width]
+        part = np.ascontiguousarray(labels[box])
+        scene, theirs = colors.scene.copy(), colors.people.copy()
+        cv2.grabCut(np.ascontiguousarray(view.image[box]), part, None, scene, theirs, 1, cv2.GC_EVAL_FREEZE_MODEL)  # type: ignore[call-overload]
+        people[box] |= _near(part)
+    return people & asked
 
 
 def _near(labels: np.ndarray) -> np.ndarray:
@@ -131,23 +164,23 @@ def _near(labels: np.ndarray) -> np.ndarray:
     return np.isin(labels, (cv2.GC_FGD, cv2.GC_PR_FGD))
 
 
-def _limbs(view: View, labels: np.ndarray, palette: Palette) -> np.ndarray:
-    """Solid parts that look like people where they are, and touch people."""
+def _limbs(view: View, labels: np.ndarray, palette: Palette, asked: np.ndarray) -> np.ndarray:
+    """Solid parts that look like people where they may be and are asked for, and touch people."""
     people = _near(labels)
-    found = looks_like_people(view.image, people, palette, view.possibly)
+    found = looks_like_people(view.image, people, palette, asked)
     solid = cv2.morphologyEx(found.view(np.uint8), cv2.MORPH_OPEN, disc(found, THIN_PX))
     _, pieces = cv2.connectedComponents(solid | people.view(np.uint8), connectivity=8)
     return (solid > 0) & np.isin(pieces, np.unique(pieces[people]))
 
 
-def _ground(view: View, palette: Palette) -> np.ndarray:
+def _ground(view: View, palette: Palette, possibly: np.ndarray) -> np.ndarray:
     """Solid parts that do not differ from the scene and look like what is around all places where people may be: floor, and walls.
 
     The cut's mixtures are of the whole image and too coarse for that: the floor between two people was people's.
     """
     thin = disc(view.possibly, THIN_PX)
     # Elsewhere it is scene anyway; what is thin is told with what is around it.
-    asked = cv2.dilate(view.possibly.view(np.uint8), thin, iterations=2).view(bool) & ~view.differs
+    asked = cv2.dilate(possibly.view(np.uint8), thin, iterations=2).view(bool) & ~view.differs
     found = looks_like_surroundings(view.image, view.possibly, palette, asked)
     return cv2.morphologyEx(found.view(np.uint8), cv2.MORPH_OPEN, thin).view(bool)
 

@@ -54,6 +54,8 @@ class UnseenPlaces:
         In full size.
     small_unseen : tuple of ndarray of bool
         The same in the size of the small cameras.
+    asked : tuple of ndarray of bool
+        Pixels of the small cameras that make out those of full size where the scene is unseen.
     colors : tuple of PeopleColors or None
     still : tuple of StillPerson
         People who were there all the time and hardly moved (`hmc.voxels.still_people`).
@@ -65,6 +67,7 @@ class UnseenPlaces:
     tables: CarvingTables
     unseen: tuple[np.ndarray, ...]
     small_unseen: tuple[np.ndarray, ...]
+    asked: tuple[np.ndarray, ...]
     colors: tuple[PeopleColors | None, ...]
     still: tuple[StillPerson, ...] = ()
     doubted: tuple[Standing, ...] = ()
@@ -113,8 +116,9 @@ def learn_from_people(
         models[c] = train_background(images, settings, scenes[i].unseen, floor_pixels(recording.rig.cameras[c], recording.room))
     unseen = tuple(scene.unseen for scene in scenes)
     small_unseen = tuple(_resize(mask, camera.size) for mask, camera in zip(unseen, rig, strict=True))
+    asked = tuple(_asked(mask, camera.size) for mask, camera in zip(unseen, rig, strict=True))
     colors = tuple(scene.colors for scene in scenes)
-    return models, UnseenPlaces(tuple(cameras), tables, unseen, small_unseen, colors, still, doubted)
+    return models, UnseenPlaces(tuple(cameras), tables, unseen, small_unseen, asked, colors, still, doubted)
 
 
 def with_unseen_places(
@@ -151,7 +155,7 @@ def with_unseen_places(
         body = cut_still_people(places.still, i, small)
         if body is not None:
             hidden, differ = hidden & ~body, differ | body
-        people = cut_people(View(small, differ, sure, possible, hidden), colors)
+        people = cut_people(View(small, differ, sure, possible, hidden), colors, places.asked[i])
         if body is not None:
             people |= body & possible
         whole = np.where(places.unseen[i], _resize(people, mask.shape[::-1]), mask)
@@ -163,6 +167,12 @@ def with_unseen_places(
     for c, mask in zip(places.cameras, done, strict=True):
         result[c] = mask
     return tuple(result)
+
+
+def _asked(mask: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    """Pixels of a smaller image that a mask has a part in, and those beside them, which count where it is made large again."""
+    part = cv2.resize(mask.astype(np.float32), size, interpolation=cv2.INTER_AREA) > 0
+    return cv2.dilate(part.view(np.uint8), np.ones((3, 3), np.uint8)).view(bool)
 
 
 def _resize(mask: np.ndarray, size: tuple[int, int]) -> np.ndarray:
@@ -179,8 +189,8 @@ def _samples(recording: Recording, cameras: Sequence[int], n_samples: int, span:
     first = max(0, recording.start + recording.n_frames // 2 - span // 2)
     last = min(first + span, whole.n_frames)
     wanted = set(np.unique(np.linspace(first, last - 1, n_samples).round().astype(int)).tolist())
-    frames = iterate_frames(whole, first, last, on_problem=lambda line: None)  # the run itself reports them
-    samples = [[frame.images[c] for c in cameras] for frame in frames if frame.index in wanted]
+    frames = iterate_frames(whole, first, last, on_problem=lambda line: None, only=wanted)  # the run itself reports what it cannot read
+    samples = [[frame.images[c] for c in cameras] for frame in frames]
     for c, images in zip(cameras, zip(*samples, strict=True), strict=True):
         if all(image is None for image in images):
             raise InputError(f"{recording.path}: camera '{recording.rig[c].name}' has no readable image; leave it out: --cameras")

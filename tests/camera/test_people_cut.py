@@ -2,10 +2,11 @@
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
-from hmc.camera.people_cut import View, cut_people, learn_colors
+from hmc.camera.people_cut import View, color_mixture, cut_people, learn_colors
 
 FLOOR, SHIRT, TROUSERS = (66, 70, 68), (60, 60, 190), (150, 60, 50)
 #: Rows and columns of two people, who stand still from the hips down, and of where the cameras say that people may be.
@@ -43,3 +44,42 @@ def test_the_floor_between_people_is_not_theirs_though_the_mixtures_say_so(view)
     colors = learn_colors([view])
     people = cut_people(view, replace(colors, people=colors.scene, scene=colors.people))
     assert people[BETWEEN].mean() < 0.05
+
+
+@pytest.mark.parametrize("asked", [np.s_[150:200, 90:115], np.s_[190:210, 165:200]])
+def test_of_a_part_of_the_image_as_of_all_of_it(view, asked):
+    where = np.zeros(view.possibly.shape, bool)
+    where[asked] = True
+    colors = learn_colors([view])
+    assert np.array_equal(cut_people(view, colors, where), cut_people(view, colors) & where)
+    assert not cut_people(view, colors, where & ~view.possibly).any()
+
+
+def test_mixtures_are_written_as_opencv_writes_its_own(view):
+    truth = np.zeros(view.possibly.shape, bool)
+    for part in PEOPLE:
+        truth[part] = True
+    mixtures = np.zeros((2, 1, 65))
+    labels = np.where(truth, cv2.GC_FGD, cv2.GC_BGD).astype(np.uint8)
+    cv2.grabCut(view.image, labels, None, *mixtures, 0, cv2.GC_INIT_WITH_MASK)
+    for kind, theirs in zip((~truth, truth), mixtures, strict=True):
+        # Clusters may be others; the moments of the mixture are not.
+        for one, other in zip(_moments(color_mixture(view.image[kind])), _moments(theirs), strict=True):
+            assert one == pytest.approx(other, abs=0.03 * np.abs(other).max())
+
+
+def test_colors_do_not_hang_on_where_clusters_begin(view, monkeypatch):
+    found = []
+    for seed in range(3):
+        monkeypatch.setattr("hmc.camera.people_cut.SEED", seed)
+        found.append(learn_colors([view]))
+    for one in found[1:]:
+        assert np.array_equal(cut_people(view, one), cut_people(view, found[0]))
+
+
+def _moments(mixture):
+    """Mean (3,) and covariance (3, 3) of all of a mixture."""
+    weights, means, spreads = mixture[0, :5], mixture[0, 5:20].reshape(5, 3), mixture[0, 20:].reshape(5, 3, 3)
+    mean = weights @ means
+    apart = means - mean
+    return mean, np.einsum("k,kij->ij", weights, spreads) + np.einsum("k,ki,kj->ij", weights, apart, apart)
