@@ -29,8 +29,8 @@ __all__ = ["StillPerson", "cut_still_people", "find_still_people"]
 JUDGES = 7
 #: A person's voxels are no further than this from their axis, metres.
 REACH_M = 0.5
-#: Somebody who fills more than this share of a figure in the samples is known already.
-KNOWN = 0.1
+#: Who has a whole hull about a place in so large a share of the samples is known already.
+KNOWN = 0.25
 #: Hulls of a person: litres, where they begin at most and end at least above the floor, metres, and the share of what is cut out in each
 #: view, or in the hull there, that both have.
 LITRES = (25.0, 220.0)
@@ -90,7 +90,7 @@ def find_still_people(
     found: list[StillPerson] = []
     doubted: list[Standing] = []
     for place in places:
-        if _share(tables, hulls, place) > KNOWN:
+        if _is_known(tables, hulls, place):
             continue
         person = _examine(tables, images, hulls, place)
         if person is None:
@@ -168,10 +168,12 @@ def _others(tables: CarvingTables, hull: np.ndarray, place: Standing) -> list[np
     return [hull_view(camera, points, 0.65 * tables.grid.voxel_size_m) for camera in tables.rig]
 
 
-def _share(tables: CarvingTables, hulls: Sequence[np.ndarray], place: Standing) -> float:
-    """Share of a place's column, as high as the person, that known people fill on the mean."""
+def _is_known(tables: CarvingTables, hulls: Sequence[np.ndarray], place: Standing) -> bool:
+    """Whether enough samples have the whole body of a known person about a place: one who steps from side to side is not still."""
     grid = tables.grid
-    near = grid.centres(np.argwhere(np.ones((*grid.shape[:2], 1), bool)))[:, :2].reshape(*grid.shape[:2], 2)
-    column = np.hypot(near[..., 0] - place.x, near[..., 1] - place.y) <= 0.1 * place.stature_m
-    high = round(place.stature_m / grid.voxel_size_m)
-    return float(np.mean([hull[column][:, :high].mean() for hull in hulls]))
+    near = [
+        points[np.hypot(points[:, 0] - place.x, points[:, 1] - place.y) <= REACH_M] for points in map(grid.centres, map(voxels_of, hulls))
+    ]
+    litres = 1000 * grid.voxel_size_m**3 * np.array([len(points) for points in near])
+    whole = [bool(len(z)) and z.min() <= LOWEST_M and z.max() >= TOP_M for z in (points[:, 2] for points in near)]
+    return bool(np.mean((litres >= LITRES[0]) & whole) >= KNOWN)

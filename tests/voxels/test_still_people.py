@@ -9,7 +9,7 @@ from hmc.camera.model import Rig
 from hmc.camera.standing import Standing
 from hmc.camera.standing_cut import figure
 from hmc.voxels import still_people
-from hmc.voxels.carving import make_tables
+from hmc.voxels.carving import carve_levels, make_tables
 from hmc.voxels.grid import VoxelGrid
 from hmc.voxels.still_people import cut_still_people, find_still_people
 
@@ -66,6 +66,17 @@ def test_who_is_known_already_is_not_found_once_more(ring):
     tables, samples, nobody = drawn(ring, 0.03)
     people = [[figure(camera, PLACE).body for camera in tables.rig] if k % 2 else masks for k, masks in enumerate(nobody)]
     assert find_still_people(tables, samples, people)[0] == ()
+
+
+def test_who_steps_from_side_to_side_and_is_known_beside_a_place_is_not_still(ring):
+    tables, _, nobody = drawn(ring, 0.03)
+    beside = [replace(PLACE, x=PLACE.x + side) for side in (-0.22, 0.22)]
+    people = [[figure(camera, beside[k % 2]).body for camera in tables.rig] for k in range(len(nobody))]
+    hulls = [still_people.bodies(carve_levels(tables, masks, (0,))[0], tables) for masks in people]
+    assert still_people._is_known(tables, hulls, PLACE)
+    assert not still_people._is_known(tables, hulls, replace(PLACE, x=PLACE.x + 1.0))
+    trunks = [hull & (np.arange(hull.shape[2]) > 18) for hull in hulls]  # nothing below .9 m
+    assert not still_people._is_known(tables, trunks, PLACE)
 
 
 def test_too_few_samples_tell_nothing(ring):
