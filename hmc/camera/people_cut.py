@@ -28,6 +28,7 @@ AROUND_PX = 32
 FEWEST_PX, MOST_PX = 50, 20_000
 #: Gaussians of each mixture, how often and how long their clusters are looked for, and grey levels, squared, that any color varies.
 N_GAUSSIANS, BEGINNINGS, ROUNDS, LEAST_STEP, LEAST_VARIANCE = 5, 8, 30, 0.1, 0.01
+#: Of their beginnings.
 SEED = 0
 
 
@@ -149,13 +150,14 @@ def cut_people(view: View, colors: PeopleColors, where: np.ndarray | None = None
     labels, _ = _hints(view)
     labels, _ = _hints(view, _limbs(view, labels, colors.palette, possibly))
     labels[_ground(view, colors.palette, possibly) & (labels != cv2.GC_FGD)] = cv2.GC_BGD
-    labels[~around.view(bool)] &= 1
-    for left, top, width, height, _ in cv2.connectedComponentsWithStats(around)[2][1:].tolist():
+    labels[~around.view(bool)] &= 1  # surely what they probably are
+    _, pieces, stats, _ = cv2.connectedComponentsWithStats(around)
+    for piece, (left, top, width, height, _) in enumerate(stats[1:].tolist(), 1):
         box = np.s_[top : top + height, left : left + width]
         part = np.ascontiguousarray(labels[box])
         scene, theirs = colors.scene.copy(), colors.people.copy()
         cv2.grabCut(np.ascontiguousarray(view.image[box]), part, None, scene, theirs, 1, cv2.GC_EVAL_FREEZE_MODEL)  # type: ignore[call-overload]
-        people[box] |= _near(part)
+        people[box] |= _near(part) & (pieces[box] == piece)
     return people & asked
 
 
