@@ -24,11 +24,11 @@ def silhouette(camera: Camera, x: float, y: float) -> np.ndarray:
     return mask.view(bool)
 
 
-def post(camera: Camera, x: float, y: float) -> np.ndarray:
+def post(camera: Camera, x: float, y: float, height_m: float = HEIGHT_M) -> np.ndarray:
     """As `silhouette`, of an upright cylinder that stands on the floor with its whole sole, (h, w) bool."""
     angle = np.linspace(0, 2 * np.pi, 48)
     circle = np.column_stack([0.8 * RADIUS_M * np.cos(angle) + x, 0.8 * RADIUS_M * np.sin(angle) + y])
-    points = np.vstack([np.column_stack([circle, np.full(48, z)]) for z in np.linspace(0, HEIGHT_M, 12)])
+    points = np.vstack([np.column_stack([circle, np.full(48, z)]) for z in np.linspace(0, height_m, 12)])
     uv, valid = project(camera, points)
     mask = np.zeros(camera.size[::-1], np.uint8)
     cv2.fillConvexPoly(mask, cv2.convexHull(np.rint(uv[valid]).astype(np.int32)), 1)

@@ -36,7 +36,7 @@ __all__ = [
 
 Masks = Sequence[np.ndarray | None]
 #: From the masks of all cameras to what the cameras agree on in each view: surely people, and possibly people.
-Views = Callable[[Masks], tuple[Masks, Masks]]
+Views = Callable[[Masks], tuple[Masks, Masks, Masks]]
 
 #: A pixel further than this from the scene, in grey levels, may be a person's.
 DISTANCE = 25
@@ -163,13 +163,13 @@ def _find_people(small, known, views: Views, run, bodies: Sequence[Masks] | None
     ]
     agreed = list(run(views, masks))
     cases: list[list[View]] = [[] for _ in known]
-    for images, differs, (surely, possibly), body in zip(small, masks, agreed, bodies, strict=True):
+    for images, differs, (surely, possibly, below), body in zip(small, masks, agreed, bodies, strict=True):
         for c, (image, differ, more) in enumerate(zip(images, differs, body, strict=True)):
             if image is not None and differ is not None:
                 unseen = known[c][1] if more is None else known[c][1] & ~more
                 # At first, what changes all the time is people; later, where the scene is not known, colors decide.
                 differ = differ if n_round == 0 else differ & ~unseen
-                cases[c].append(View(image, differ, surely[c], possibly[c], unseen))
+                cases[c].append(View(image, differ, surely[c], possibly[c], unseen, below[c]))
     colors = list(run(learn_colors, cases))
     cut = [iter(found) for found in run(_cut_all, cases, colors)]
     people = [

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-__all__ = ["Palette", "learn_palette", "looks_like_people", "looks_like_surroundings"]
+__all__ = ["Palette", "learn_palette", "looks_like_people", "looks_like_surroundings", "looks_unlike_surroundings"]
 
 #: Spread of the kernels, grey levels, and the density that any color has.
 SPREAD = 12.0
@@ -107,6 +107,23 @@ def looks_like_surroundings(
     """
     theirs, here = _densities(image, people, palette, where, PERSON_RINGS)
     return _at(where, here > np.exp(log_ratio) * theirs)
+
+
+def looks_unlike_surroundings(image: np.ndarray, people: np.ndarray, where: np.ndarray, most: float = 0.05) -> np.ndarray:
+    """Where a pixel has a color that hardly anything around the people has, whatever colors people have.
+
+    Parameters
+    ----------
+    image, people, where
+        As of `looks_like_people`; `people` holds all that may be a part of them.
+    most : float
+        Density of the pixel's color among its surroundings, 1 where all are of just this color, up to which it counts.
+
+    Returns
+    -------
+    ndarray of bool, shape (height, width)
+    """
+    return _at(where, _surroundings(image, people, where, PERSON_RINGS) < most)
 
 
 def _at(where: np.ndarray, answers: np.ndarray) -> np.ndarray:

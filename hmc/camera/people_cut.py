@@ -3,7 +3,8 @@
 Colors of people and of the scene are learnt from pixels of which it is known what they show (`learn_colors`). Then a graph cut (Rother
 et al. (2004), "GrabCut") decides between the two, pixel by pixel and with its neighbours. Limbs that never move do not differ from the
 scene as it is known; those are found by their color, which is that of the people and not that of what surrounds them
-(`hmc.camera.local_color`), and held in the cut. So is, on the other side, what looks like the floor and the walls around.
+(`hmc.camera.local_color`), and held in the cut. So are legs in trousers of a color of their own: under a body that seems to hang in the
+air, what has no color of the surroundings. And so is, on the other side, what looks like the floor and the walls around.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from hmc.camera.local_color import Palette, learn_palette, looks_like_people, looks_like_surroundings
+from hmc.camera.local_color import Palette, learn_palette, looks_like_people, looks_like_surroundings, looks_unlike_surroundings
 
 __all__ = ["PeopleColors", "View", "color_mixture", "cut_people", "disc", "learn_colors"]
 
@@ -46,6 +47,8 @@ class View:
         Where all cameras, and nearly all, agree that a person is (`hmc.voxels.agreement`).
     unseen : ndarray of bool, shape (height, width)
         Where the scene is not known.
+    below : ndarray of bool, shape (height, width)
+        What is under a body that nothing seems to hold up: its legs are there, though they may not differ from the scene.
     """
 
     image: np.ndarray
@@ -53,6 +56,7 @@ class View:
     surely: np.ndarray
     possibly: np.ndarray
     unseen: np.ndarray
+    below: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -167,9 +171,11 @@ def _near(labels: np.ndarray) -> np.ndarray:
 
 
 def _limbs(view: View, labels: np.ndarray, palette: Palette, asked: np.ndarray) -> np.ndarray:
-    """Solid parts that look like people where they may be and are asked for, and touch people."""
+    """Solid parts that touch people, and look like them where they may be and are asked for, or below them like nothing else."""
     people = _near(labels)
     found = looks_like_people(view.image, people, palette, asked)
+    if view.below.any():
+        found |= looks_unlike_surroundings(view.image, people | view.below, asked & view.below & ~view.differs)
     solid = cv2.morphologyEx(found.view(np.uint8), cv2.MORPH_OPEN, disc(found, THIN_PX))
     _, pieces = cv2.connectedComponents(solid | people.view(np.uint8), connectivity=8)
     return (solid > 0) & np.isin(pieces, np.unique(pieces[people]))

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 import cv2
 import numpy as np
+from scipy.ndimage import distance_transform_edt, label
 
 from hmc.camera.model import Camera, project
 from hmc.voxels.carving import CarvingTables, carve_levels
@@ -24,12 +25,14 @@ LEAST_VOLUME = 0.01
 REACH_M = 0.1
 #: A hull that ends this near above the floor goes on to it: legs hold people up. Metres.
 LEGS_M = 1.2
+#: One that ends so high hangs in the air, and its legs are within this of what is above them, seen from above. Metres.
+HANGING_M, SPREAD_M = 0.4, 0.2
 
 
 def agreed_views(
     tables: CarvingTables, masks: Sequence[np.ndarray | None], tolerance: int = 1
-) -> tuple[list[np.ndarray | None], list[np.ndarray | None]]:
-    """Where in each image people surely are, and where they may be, as all cameras together tell.
+) -> tuple[list[np.ndarray | None], list[np.ndarray | None], list[np.ndarray | None]]:
+    """Where in each image people surely are, where they may be, and where legs are if nothing else holds them up, as all cameras tell.
 
     Parameters
     ----------
@@ -42,9 +45,9 @@ def agreed_views(
 
     Returns
     -------
-    surely, possibly : lists of ndarray of bool, shape (height, width), or None
-        The hull of all cameras in each view, and the one in which `tolerance` cameras may be wrong, down to the floor and a little
-        further all around. ``None`` where there is no mask.
+    surely, possibly, below : lists of ndarray of bool, shape (height, width), or None
+        The hull of all cameras in each view; the one in which `tolerance` cameras may be wrong, down to the floor and a little
+        further all around; and what is under those parts of the first that end in the air. ``None`` where there is no mask.
     """
     n_masks = sum(mask is not None for mask in masks)
     strict, tolerant = (bodies(hull, tables) for hull in carve_levels(tables, masks, (0, tolerance if n_masks >= 4 else 0)))
@@ -52,12 +55,23 @@ def agreed_views(
     lowest = tolerant.argmax(axis=2)
     down = tolerant.any(axis=2) & (lowest * size < LEGS_M)
     tolerant |= down[..., None] & (np.arange(tolerant.shape[2]) < lowest[..., None])
-    points = [tables.grid.centres(voxels_of(hull)) for hull in (strict, tolerant)]
-    surely, possibly = (
+    points = [tables.grid.centres(voxels_of(hull)) for hull in (strict, tolerant, _below(strict, size))]
+    surely, possibly, below = (
         [None if mask is None else hull_view(camera, centres, radius) for camera, mask in zip(tables.rig, masks, strict=True)]
-        for centres, radius in zip(points, (0.65 * size, 0.65 * size + REACH_M), strict=True)
+        for centres, radius in zip(points, (0.65 * size, 0.65 * size + REACH_M, 0.65 * size), strict=True)
     )
-    return surely, possibly
+    return surely, possibly, below
+
+
+def _below(hull: np.ndarray, size_m: float) -> np.ndarray:
+    """What is under those parts of a hull that end in the air, down to the floor."""
+    below = np.zeros_like(hull)
+    parts, n = label(hull.any(axis=2), np.ones((3, 3)))
+    for part in range(1, n + 1):
+        lowest = int(hull[parts == part].any(axis=0).argmax())
+        if HANGING_M < lowest * size_m < LEGS_M:
+            below[distance_transform_edt(parts != part) * size_m <= SPREAD_M, :lowest] = True
+    return below
 
 
 def bodies(hull: np.ndarray, tables: CarvingTables) -> np.ndarray:

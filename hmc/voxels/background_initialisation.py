@@ -143,19 +143,19 @@ def with_unseen_places(
     given = [masks[c] for c in places.cameras]
     differs = [None if mask is None else _resize(mask, size) for mask, size in zip(given, sizes, strict=True)]
     maybe = [None if differ is None else differ | hidden for differ, hidden in zip(differs, unseen, strict=True)]
-    surely, possibly = agreed_views(places.tables, maybe)
+    surely, possibly, below = agreed_views(places.tables, maybe)
 
     def complete(i: int) -> np.ndarray | None:
         image, mask = images[places.cameras[i]], given[i]
-        differ, sure, possible, colors = differs[i], surely[i], possibly[i], places.colors[i]
-        if image is None or mask is None or differ is None or sure is None or possible is None or colors is None:
+        differ, sure, possible, under, colors = differs[i], surely[i], possibly[i], below[i], places.colors[i]
+        if image is None or mask is None or differ is None or sure is None or possible is None or under is None or colors is None:
             return mask
         small = cv2.resize(image, sizes[i], interpolation=cv2.INTER_AREA)
         hidden, differ = unseen[i], differ & ~unseen[i]
         body = cut_still_people(places.still, i, small)
         if body is not None:
             hidden, differ = hidden & ~body, differ | body
-        people = cut_people(View(small, differ, sure, possible, hidden), colors, places.asked[i])
+        people = cut_people(View(small, differ, sure, possible, hidden, under), colors, places.asked[i])
         if body is not None:
             people |= body & possible
         whole = np.where(places.unseen[i], _resize(people, mask.shape[::-1]), mask)

@@ -6,7 +6,7 @@ No difference from the scene tells of them: they are in all that is known of it.
 - they are cut out by their colors, camera by camera, head to foot (`hmc.camera.standing_cut`);
 - what is cut out in the views is one body: a hull of a person's size from near the floor up, which fills what was cut out.
 
-Who was found by difference from the scene is not looked for again.
+Who was found by difference from the scene is not looked for again; who was in some samples alone is, at the place where they were.
 """
 
 from __future__ import annotations
@@ -15,8 +15,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.ndimage import label
 
-from hmc.camera.standing import APART_M, Standing, find_standing
+from hmc.camera.standing import APART_M, STATURES_M, Standing, find_standing
 from hmc.camera.standing_cut import BodyColors, Figure, cut_body, figure, learn_body
 from hmc.camera.stirring import stirring
 from hmc.voxels.agreement import bodies, hull_view
@@ -29,8 +30,8 @@ __all__ = ["StillPerson", "cut_still_people", "find_still_people"]
 JUDGES = 7
 #: A person's voxels are no further than this from their axis, metres.
 REACH_M = 0.5
-#: Who has a whole hull about a place in so large a share of the samples is known already.
-KNOWN = 0.25
+#: Who has a whole hull about a place in more than this share of the samples is known already.
+KNOWN = 0.5
 #: Hulls of a person: litres, where they begin at most and end at least above the floor, metres, and the share of what is cut out in each
 #: view, or in the hull there, that both have.
 LITRES = (25.0, 220.0)
@@ -82,20 +83,19 @@ def find_still_people(
     grid = tables.grid
     room = np.array([grid.origin, grid.origin + np.array(grid.shape) * grid.voxel_size_m])
     places = find_standing(tables.rig, room, [amount for amount, _ in stirred], [known for _, known in stirred])
-    if not places:
-        return (), ()
     judges = np.unique(np.linspace(0, len(images) - 1, JUDGES).round().astype(int))
     images = [images[k] for k in judges]
     hulls = [bodies(carve_levels(tables, masks[k], (0,))[0], tables) for k in judges]
     found: list[StillPerson] = []
     doubted: list[Standing] = []
-    for place in places:
-        if _is_known(tables, hulls, place):
+    for place in [*places, *_at_times(tables, hulls)]:
+        if not _apart(place, found) or _is_known(tables, hulls, place):
             continue
         person = _examine(tables, images, hulls, place)
         if person is None:
-            doubted.append(place)
-        elif all(np.hypot(person.place.x - one.place.x, person.place.y - one.place.y) > APART_M for one in found):
+            if place.score > 0:  # else nothing speaks for it but that somebody was there
+                doubted.append(place)
+        elif _apart(person.place, found):
             found.append(person)
     return tuple(found), tuple(doubted)
 
@@ -168,6 +168,30 @@ def _others(tables: CarvingTables, hull: np.ndarray, place: Standing) -> list[np
     return [hull_view(camera, points, 0.65 * tables.grid.voxel_size_m) for camera in tables.rig]
 
 
+def _apart(place: Standing, found: Sequence[StillPerson]) -> bool:
+    return all(np.hypot(place.x - one.place.x, place.y - one.place.y) > APART_M for one in found)
+
+
+def _at_times(tables: CarvingTables, hulls: Sequence[np.ndarray]) -> list[Standing]:
+    """Places at which two samples or more have a whole body: who stands still in the others is scene there."""
+    grid = tables.grid
+    seen: list[Standing] = []
+    for hull in hulls:
+        parts, n = label(hull.any(axis=2), np.ones((3, 3)))
+        for part in range(1, n + 1):
+            points = grid.centres(voxels_of(hull & (parts == part)[..., None]))
+            litres, top = 1000 * len(points) * grid.voxel_size_m**3, float(points[:, 2].max()) + grid.voxel_size_m / 2
+            if LITRES[0] <= litres <= LITRES[1] and points[:, 2].min() <= LOWEST_M and top >= TOP_M:
+                x, y = points[:, :2].mean(axis=0).tolist()
+                seen.append(Standing(x, y, min(top, STATURES_M[-1]), 0.0))
+    beside = [[np.hypot(one.x - other.x, one.y - other.y) <= APART_M / 2 for other in seen] for one in seen]
+    places: list[Standing] = []
+    for place, near in zip(seen, beside, strict=True):
+        if sum(near) >= 2 and all(np.hypot(place.x - one.x, place.y - one.y) > APART_M for one in places):
+            places.append(place)
+    return places
+
+
 def _is_known(tables: CarvingTables, hulls: Sequence[np.ndarray], place: Standing) -> bool:
     """Whether enough samples have the whole body of a known person about a place: one who steps from side to side is not still."""
     grid = tables.grid
@@ -176,4 +200,4 @@ def _is_known(tables: CarvingTables, hulls: Sequence[np.ndarray], place: Standin
     ]
     litres = 1000 * grid.voxel_size_m**3 * np.array([len(points) for points in near])
     whole = [bool(len(z)) and z.min() <= LOWEST_M and z.max() >= TOP_M for z in (points[:, 2] for points in near)]
-    return bool(np.mean((litres >= LITRES[0]) & whole) >= KNOWN)
+    return bool(np.mean((litres >= LITRES[0]) & whole) > KNOWN)

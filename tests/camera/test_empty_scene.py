@@ -76,7 +76,7 @@ def test_an_empty_room_and_a_single_image_stay_what_they_are():
     scene = np.random.default_rng(0).integers(0, 256, (60, 80, 3)).astype(np.uint8)
 
     def nobody(masks):
-        return [[np.zeros_like(mask) for mask in masks]] * 2
+        return [[np.zeros_like(mask) for mask in masks]] * 3
 
     for n in (1, 3):
         (found,) = empty_scenes([[scene]] * n, [(80, 60)], nobody)

@@ -30,7 +30,8 @@ def view():
         differs[top.stop : rows.stop, columns.start : columns.start + 6] = True
     maybe[MAYBE] = True
     image = np.clip(image + np.random.default_rng(0).normal(0, 3, image.shape), 0, 255).astype(np.uint8)
-    return View(image, differs, surely, maybe, np.zeros_like(differs))
+    nowhere = np.zeros_like(differs)
+    return View(image, differs, surely, maybe, nowhere, nowhere)
 
 
 def test_people_are_cut_out_with_the_limbs_that_never_move(view):
@@ -38,6 +39,22 @@ def test_people_are_cut_out_with_the_limbs_that_never_move(view):
     assert not people[BETWEEN].any()
     for part in PEOPLE:
         assert people[part].mean() > 0.95
+
+
+def test_legs_in_a_color_of_their_own_are_what_the_floor_around_is_not(view):
+    """Nothing of the trousers has moved; they hold up what has."""
+    differs, below = view.differs.copy(), np.zeros_like(view.differs)
+    for rows, columns in PEOPLE:
+        legs = slice(rows.start + 70, rows.stop)
+        differs[legs, columns] = False
+        below[legs, columns.start - 10 : columns.stop + 10] = True
+    lost = replace(view, differs=differs)
+    held = replace(lost, below=below)
+    for rows, columns in PEOPLE:
+        legs = np.s_[rows.start + 74 : rows.stop, columns]
+        assert cut_people(lost, learn_colors([lost]))[legs].mean() < 0.1
+        people = cut_people(held, learn_colors([held]))
+        assert people[legs].mean() > 0.95 and not people[BETWEEN].any()
 
 
 def test_the_floor_between_people_is_not_theirs_though_the_mixtures_say_so(view):
