@@ -42,7 +42,7 @@ class Standing:
         World, metres.
     stature_m : float
     score : float
-        How much more the images stir within the figure than beside it, 0 to 1.
+        How much more the images stir within the figure than beside it, 0 to 1; 0 of a place that something else tells.
     """
 
     x: float
