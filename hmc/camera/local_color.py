@@ -122,8 +122,10 @@ def looks_unlike_surroundings(image: np.ndarray, people: np.ndarray, where: np.n
     Returns
     -------
     ndarray of bool, shape (height, width)
+        False also where people hide all of the surroundings.
     """
-    return _at(where, _surroundings(image, people, where, PERSON_RINGS) < most)
+    density, seen = _surroundings(image, people, where, PERSON_RINGS)
+    return _at(where, (seen > 0) & (density < most))
 
 
 def _at(where: np.ndarray, answers: np.ndarray) -> np.ndarray:
@@ -140,11 +142,14 @@ def _densities(
     theirs = np.zeros(own.shape[1], np.float32)
     for share, color in zip(palette.shares, palette.colors, strict=True):
         theirs += np.float32(share) * _kernel(own, _planes(color[None]))
-    return theirs + ANY_COLOR, _surroundings(image, people, where, rings) + ANY_COLOR
+    return theirs + ANY_COLOR, _surroundings(image, people, where, rings)[0] + ANY_COLOR
 
 
-def _surroundings(image: np.ndarray, people: np.ndarray, where: np.ndarray, rings: tuple[tuple[int, ...], int]) -> np.ndarray:
-    """Density of some pixels' colors among those pixels of rings around each that are in the image and free of people; shape (n,)."""
+def _surroundings(
+    image: np.ndarray, people: np.ndarray, where: np.ndarray, rings: tuple[tuple[int, ...], int]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Density of some pixels' colors among those pixels of rings around each that are in the image and free of people, and their number;
+    shapes (n,)."""
     radii, n = rings
     reach = max(where.shape) / 320
     # With nothing that counts all around the image, no ring needs a test of where it ends.
@@ -163,7 +168,7 @@ def _surroundings(image: np.ndarray, people: np.ndarray, where: np.ndarray, ring
             weight += counts
             counts *= _kernel(own, [plane.take(there) for plane in picture])
             density += counts
-    return density / np.maximum(weight, 1)
+    return density / np.maximum(weight, 1), weight
 
 
 def _planes(colors: np.ndarray) -> np.ndarray:

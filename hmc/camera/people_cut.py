@@ -29,8 +29,6 @@ AROUND_PX = 32
 FEWEST_PX, MOST_PX = 50, 20_000
 #: Gaussians of each mixture, how often and how long their clusters are looked for, and grey levels, squared, that any color varies.
 N_GAUSSIANS, BEGINNINGS, ROUNDS, LEAST_STEP, LEAST_VARIANCE = 5, 8, 30, 0.1, 0.01
-#: Of their beginnings.
-SEED = 0
 
 
 @dataclass(frozen=True)
@@ -101,7 +99,7 @@ def learn_colors(views: Sequence[View]) -> PeopleColors | None:
     theirs = _near(labels)
     if min(np.count_nonzero(theirs), np.count_nonzero(~theirs)) < FEWEST_PX:
         return None
-    cv2.setRNGSeed(SEED)  # the colors are clustered with OpenCV's own generator
+    cv2.setRNGSeed(0)  # the colors are clustered with OpenCV's own generator
     return PeopleColors(palette, color_mixture(pixels[theirs]), color_mixture(pixels[~theirs]))
 
 

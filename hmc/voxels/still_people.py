@@ -85,10 +85,11 @@ def find_still_people(
     places = find_standing(tables.rig, room, [amount for amount, _ in stirred], [known for _, known in stirred])
     judges = np.unique(np.linspace(0, len(images) - 1, JUDGES).round().astype(int))
     images = [images[k] for k in judges]
-    hulls = [bodies(carve_levels(tables, masks[k], (0,))[0], tables) for k in judges]
+    known = [bodies(carve_levels(tables, masks[k], (0,))[0], tables) for k in judges]
+    hulls = [grid.centres(voxels_of(hull)) for hull in known]
     found: list[StillPerson] = []
     doubted: list[Standing] = []
-    for place in [*places, *_at_times(tables, hulls)]:
+    for place in [*places, *_at_times(tables, known)]:
         if not _apart(place, found) or _is_known(tables, hulls, place):
             continue
         person = _examine(tables, images, hulls, place)
@@ -122,7 +123,7 @@ def cut_still_people(still: Sequence[StillPerson], camera: int, image: np.ndarra
 
 
 def _examine(tables: CarvingTables, samples, hulls: Sequence[np.ndarray], place: Standing) -> StillPerson | None:
-    """The person at a place, or None if the views do not show one body there."""
+    """The person at a place, or None if the views do not show one body there; `hulls` are points of those who are known, (n, 3) each."""
     for last in (False, True):
         others = [_others(tables, hull, place) for hull in hulls]
         figures = tuple(figure(camera, place) for camera in tables.rig)
@@ -139,7 +140,7 @@ def _examine(tables: CarvingTables, samples, hulls: Sequence[np.ndarray], place:
         if not last:
             # Places are tried a step apart: what is cut out beside the true one misses the feet.
             place = replace(place, x=float(x), y=float(y), stature_m=float(top))
-        elif not (litres <= LITRES[1] and lowest <= LOWEST_M and top >= TOP_M and np.sort(agree)[1] >= AGREE):
+        elif not (litres <= LITRES[1] and _is_upright(lowest, top) and np.sort(agree)[1] >= AGREE):
             return None
     return StillPerson(place, figures, colors)
 
@@ -149,7 +150,7 @@ def _measure(tables: CarvingTables, place: Standing, cuts, others, figures: Sequ
     grid = tables.grid
     filled = [cut | (mask & one.reach) for cut, mask, one in zip(cuts, others, figures, strict=True)]
     points = grid.centres(voxels_of(carve_levels(tables, filled, (0,))[0]))
-    points = points[np.hypot(points[:, 0] - place.x, points[:, 1] - place.y) <= REACH_M]
+    points = points[_within(points, place, REACH_M)]
     if len(points) == 0:
         return [0.0, np.inf, 0.0, place.x, place.y, *([0.0] * len(cuts))]
     agree = []
@@ -163,9 +164,24 @@ def _measure(tables: CarvingTables, place: Standing, cuts, others, figures: Sequ
 
 def _others(tables: CarvingTables, hull: np.ndarray, place: Standing) -> list[np.ndarray]:
     """Where in each view people are who stand elsewhere."""
-    points = tables.grid.centres(voxels_of(hull))
-    points = points[np.hypot(points[:, 0] - place.x, points[:, 1] - place.y) > 0.8 * REACH_M]
+    points = hull[~_within(hull, place, 0.8 * REACH_M)]
     return [hull_view(camera, points, 0.65 * tables.grid.voxel_size_m) for camera in tables.rig]
+
+
+def _within(points: np.ndarray, place: Standing, radius_m: float) -> np.ndarray:
+    """Which of some points, (n, 3), are no further from a place, seen from above."""
+    return np.hypot(points[:, 0] - place.x, points[:, 1] - place.y) <= radius_m
+
+
+def _is_upright(lowest: float, top: float) -> bool:
+    """Whether a body goes from near the floor to where one who sits ends."""
+    return lowest <= LOWEST_M and top >= TOP_M
+
+
+def _is_body(points: np.ndarray, voxel_size_m: float, most_litres: float = np.inf) -> bool:
+    """Whether voxels of a hull, (n, 3), are a whole person."""
+    litres = 1000 * len(points) * voxel_size_m**3
+    return LITRES[0] <= litres <= most_litres and _is_upright(points[:, 2].min(), points[:, 2].max() + voxel_size_m / 2)
 
 
 def _apart(place: Standing, found: Sequence[StillPerson]) -> bool:
@@ -180,9 +196,9 @@ def _at_times(tables: CarvingTables, hulls: Sequence[np.ndarray]) -> list[Standi
         parts, n = label(hull.any(axis=2), np.ones((3, 3)))
         for part in range(1, n + 1):
             points = grid.centres(voxels_of(hull & (parts == part)[..., None]))
-            litres, top = 1000 * len(points) * grid.voxel_size_m**3, float(points[:, 2].max()) + grid.voxel_size_m / 2
-            if LITRES[0] <= litres <= LITRES[1] and points[:, 2].min() <= LOWEST_M and top >= TOP_M:
+            if _is_body(points, grid.voxel_size_m, LITRES[1]):
                 x, y = points[:, :2].mean(axis=0).tolist()
+                top = float(points[:, 2].max()) + grid.voxel_size_m / 2
                 seen.append(Standing(x, y, min(top, STATURES_M[-1]), 0.0))
     beside = [[np.hypot(one.x - other.x, one.y - other.y) <= APART_M / 2 for other in seen] for one in seen]
     places: list[Standing] = []
@@ -194,10 +210,5 @@ def _at_times(tables: CarvingTables, hulls: Sequence[np.ndarray]) -> list[Standi
 
 def _is_known(tables: CarvingTables, hulls: Sequence[np.ndarray], place: Standing) -> bool:
     """Whether enough samples have the whole body of a known person about a place: one who steps from side to side is not still."""
-    grid = tables.grid
-    near = [
-        points[np.hypot(points[:, 0] - place.x, points[:, 1] - place.y) <= REACH_M] for points in map(grid.centres, map(voxels_of, hulls))
-    ]
-    litres = 1000 * grid.voxel_size_m**3 * np.array([len(points) for points in near])
-    whole = [bool(len(z)) and z.min() <= LOWEST_M and z.max() >= TOP_M for z in (points[:, 2] for points in near)]
-    return bool(np.mean((litres >= LITRES[0]) & whole) > KNOWN)
+    near = [hull[_within(hull, place, REACH_M)] for hull in hulls]
+    return bool(np.mean([_is_body(points, tables.grid.voxel_size_m) for points in near]) > KNOWN)

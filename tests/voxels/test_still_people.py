@@ -83,10 +83,11 @@ def test_who_steps_from_side_to_side_and_is_known_beside_a_place_is_not_still(ri
     tables, _, nobody = drawn(ring, 0.03)
     beside = [replace(PLACE, x=PLACE.x + side) for side in (-0.22, 0.22)]
     people = [[figure(camera, beside[k % 2]).body for camera in tables.rig] for k in range(len(nobody))]
-    hulls = [still_people.bodies(carve_levels(tables, masks, (0,))[0], tables) for masks in people]
+    known = [still_people.bodies(carve_levels(tables, masks, (0,))[0], tables) for masks in people]
+    hulls = [tables.grid.centres(np.argwhere(hull)) for hull in known]
     assert still_people._is_known(tables, hulls, PLACE)
     assert not still_people._is_known(tables, hulls, replace(PLACE, x=PLACE.x + 1.0))
-    trunks = [hull & (np.arange(hull.shape[2]) > 18) for hull in hulls]  # nothing below .9 m
+    trunks = [hull[hull[:, 2] > 0.9] for hull in hulls]
     assert not still_people._is_known(tables, trunks, PLACE)
 
 
