@@ -8,7 +8,7 @@ import numpy as np
 
 from hmc.camera.model import Camera, Rig, project, undistort
 
-__all__ = ["estimate_room", "floor_points", "in_view", "inside_image", "point_looked_at"]
+__all__ = ["estimate_room", "floor_points", "in_view", "inside_image", "nearest_pixels", "point_looked_at"]
 
 #: Height of an estimated room, metres: a tall person with raised arms.
 ROOM_HEIGHT_M = 2.4
@@ -79,6 +79,27 @@ def inside_image(camera: Camera, uv: np.ndarray) -> np.ndarray:
     """Whether pixels, (..., 2), lie on a camera's image, border pixels whole; bool, (...)."""
     u, v = np.moveaxis(uv, -1, 0)
     return (u >= -0.5) & (v >= -0.5) & (u < camera.size[0] - 0.5) & (v < camera.size[1] - 0.5)
+
+
+def nearest_pixels(camera: Camera, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The pixel in which each world point is seen.
+
+    Parameters
+    ----------
+    camera : Camera
+    points : ndarray, shape (n, 3)
+        World, metres.
+
+    Returns
+    -------
+    pixels : ndarray of int, shape (n, 2)
+        Column and row; 0, 0 where a point is not seen.
+    seen : ndarray of bool, shape (n,)
+    """
+    uv, valid = project(camera, points)
+    # Compared before the cast: beside the camera a distortion can lead beyond all integers.
+    seen = valid & inside_image(camera, uv)
+    return np.floor(np.where(seen[:, None], uv, 0.0) + 0.5).astype(int), seen
 
 
 def point_looked_at(rig: Rig) -> np.ndarray:

@@ -14,10 +14,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
+from scipy.ndimage import binary_fill_holes
 
 from hmc.camera.background import masked_median, stable_background
 from hmc.camera.people_cut import PeopleColors, View, cut_people, disc, learn_colors
@@ -28,6 +29,7 @@ __all__ = [
     "SamplePeople",
     "Views",
     "add_bodies",
+    "cut_again",
     "cut_samples",
     "replace_people",
     "scenes_behind",
@@ -46,6 +48,9 @@ ROUNDS = 2
 LEAST_FREE = 0.1
 #: A place that is the same in more samples than this share never changes.
 STILL = 0.8
+#: Where somebody was found in so many samples, and of the others a smaller share than this is alike, that is somebody too; gaps of so many
+#: pixels are closed. Less than this share of a person in half of the views is nobody. So often people are cut out again.
+FOUND, ALIKE, GAP_PX, LEAST_UNEVEN, MORE_ROUNDS = 2, 0.7, 9, 0.25, 2
 #: Margin around people, pixels of an image whose longer side is 320.
 MARGIN_PX = 5
 
@@ -80,11 +85,14 @@ class SamplePeople:
         By which they were cut out.
     scenes : sequence of (ndarray of uint8, ndarray of bool), one a camera
         The scene without them, small, and where it was hardly ever seen.
+    regions : sequence of ndarray of bool, shape (height, width), one a camera, or None
+        Where somebody was found in some samples and is in the others as well: there, what changes though nobody was found is not the scene.
     """
 
     masks: Sequence[Masks]
     colors: Sequence[PeopleColors | None]
     scenes: Sequence[tuple[np.ndarray, np.ndarray]]
+    regions: Sequence[np.ndarray | None]
 
 
 def shrunk(samples: Sequence[Masks], sizes: Sequence[tuple[int, int]]) -> list[list[np.ndarray | None]]:
@@ -113,9 +121,43 @@ def cut_samples(small: Sequence[Masks], views: Views, pool: Executor | None = No
         [[None] * n_cameras for _ in small],
         [None] * n_cameras,
         list(run(lambda c: stable_background(_of(small, c)), range(n_cameras))),
+        [None] * n_cameras,
     )
     for n_round in range(ROUNDS):
-        people = _find_people(small, people.scenes, views, run, None, n_round)
+        people = _find_people(small, people, views, run, None, n_round)
+    return people
+
+
+def cut_again(
+    small: Sequence[Masks], people: SamplePeople, regions: Sequence[np.ndarray], views: Views, pool: Executor | None = None
+) -> SamplePeople:
+    """People cut out of small samples again, with those who were found in some samples and are scene in the others.
+
+    Parameters
+    ----------
+    small : sequence of sequences of ndarray of uint8, shape (height, width, 3), or None
+    people : SamplePeople
+        Those who were found so far.
+    regions : sequence of ndarray of bool, shape (height, width), one a camera
+        Where somebody was found in some samples alone.
+    views, pool
+        As of `cut_samples`.
+
+    Returns
+    -------
+    SamplePeople
+        As they were where hardly anything changes.
+    """
+    run = map if pool is None else pool.map
+    images, masks = ([_of(frames, c) for c in range(len(regions))] for frames in (small, people.masks))
+    scenes = list(run(_scene, images, masks, regions))
+    uneven = [np.count_nonzero(unseen & ~before) for (_, unseen), (_, before) in zip(scenes, people.scenes, strict=True)]
+    there = [np.mean([np.count_nonzero(mask & region) for mask in own]) for own, region in zip(masks, regions, strict=True)]
+    if np.median(np.array(uneven) / np.maximum(there, 1)) < LEAST_UNEVEN:
+        return people
+    people = replace(people, scenes=scenes, regions=regions)
+    for _ in range(MORE_ROUNDS):
+        people = _find_people(small, people, views, run, None, ROUNDS)
     return people
 
 
@@ -133,14 +175,14 @@ def add_bodies(
     views, pool
         As of `cut_samples`.
     """
-    return _find_people(small, people.scenes, views, map if pool is None else pool.map, bodies, ROUNDS)
+    return _find_people(small, people, views, map if pool is None else pool.map, bodies, ROUNDS)
 
 
 def scenes_behind(samples: Sequence[Masks], people: SamplePeople, pool: Executor | None = None) -> list[EmptyScene]:
     """The scene of each camera, in the samples' full size, behind people who were cut out of them."""
     run = map if pool is None else pool.map
     cameras = range(len(people.colors))
-    scenes = run(_scene, (_of(samples, c) for c in cameras), (_of(people.masks, c) for c in cameras))
+    scenes = run(_scene, (_of(samples, c) for c in cameras), (_of(people.masks, c) for c in cameras), people.regions)
     return [EmptyScene(scene, unseen, color) for (scene, unseen), color in zip(scenes, people.colors, strict=True)]
 
 
@@ -154,8 +196,9 @@ def _of(frames: Sequence[Masks], camera: int) -> list[np.ndarray]:
     return [entry for frame in frames if (entry := frame[camera]) is not None]
 
 
-def _find_people(small, known, views: Views, run, bodies: Sequence[Masks] | None, n_round: int) -> SamplePeople:
+def _find_people(small, before: SamplePeople, views: Views, run, bodies: Sequence[Masks] | None, n_round: int) -> SamplePeople:
     """People in the samples, as the scene known so far, bodies in it, the other cameras and the colors tell."""
+    known = before.scenes
     bodies = [[None] * len(frame) for frame in small] if bodies is None else bodies
     masks = [
         [None if image is None else _with(_differs(image, *known[c]), body[c]) for c, image in enumerate(frame)]
@@ -177,7 +220,8 @@ def _find_people(small, known, views: Views, run, bodies: Sequence[Masks] | None
         for frame, body in zip(small, bodies, strict=True)
     ]
     cameras = range(len(known))
-    return SamplePeople(people, colors, list(run(_scene, (_of(small, c) for c in cameras), (_of(people, c) for c in cameras))))
+    scenes = list(run(_scene, (_of(small, c) for c in cameras), (_of(people, c) for c in cameras), before.regions))
+    return SamplePeople(people, colors, scenes, before.regions)
 
 
 def _with(mask: np.ndarray, more: np.ndarray | None) -> np.ndarray:
@@ -199,11 +243,11 @@ def _differs(image: np.ndarray, scene: np.ndarray, unseen: np.ndarray) -> np.nda
     return cv2.morphologyEx((far | unseen).view(np.uint8), cv2.MORPH_CLOSE, disc(image, 3)).view(bool)
 
 
-def _scene(images: Sequence[np.ndarray], people: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+def _scene(images: Sequence[np.ndarray], people: Sequence[np.ndarray], region: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
     """Median of what people leave free, and where that is hardly ever anything.
 
     A place that never changes is either scene or a person who never moved: where most samples show people there, the few in which
-    they were missed do not make it scene.
+    they were missed do not make it scene. Nor is it scene what changes in a region in which somebody was found in some samples alone.
     """
     size = images[0].shape[1::-1]
     margins = [cv2.dilate(mask.view(np.uint8), disc(mask, MARGIN_PX)).view(bool) for mask in people]
@@ -217,4 +261,10 @@ def _scene(images: Sequence[np.ndarray], people: Sequence[np.ndarray]) -> tuple[
     scene = masked_median(images, list(near))
     alike = np.stack([~_far(image, scene) for image in images])
     still = (alike.sum(axis=0) > STILL * len(images)) & (2 * (alike & taken).sum(axis=0) > alike.sum(axis=0))
-    return scene, still | (len(images) - taken.sum(axis=0) < least)
+    times = taken.sum(axis=0)
+    unseen = still | (len(images) - times < least)
+    if region is not None:
+        uneven = (times >= FOUND) & ((alike & ~taken).sum(axis=0) < ALIKE * (len(images) - times))
+        whole = binary_fill_holes(cv2.morphologyEx(uneven.view(np.uint8), cv2.MORPH_CLOSE, disc(uneven, GAP_PX)))
+        unseen |= whole & cv2.resize(region.view(np.uint8), size, interpolation=cv2.INTER_NEAREST).view(bool)
+    return scene, unseen

@@ -18,7 +18,7 @@ from hmc.camera.model import Camera, project
 from hmc.camera.people_cut import FEWEST_PX
 from hmc.camera.standing import Standing, half_width
 
-__all__ = ["BodyColors", "Figure", "cut_body", "figure", "learn_body"]
+__all__ = ["BodyColors", "Figure", "around", "cut_body", "figure", "learn_body"]
 
 #: Where the parts with colors of their own begin and end, in statures.
 PARTS = ((0.0, 0.25), (0.25, 0.5), (0.5, 0.8), (0.8, 1.2))
@@ -84,6 +84,11 @@ def figure(camera: Camera, place: Standing) -> Figure:
         parts[_drawn(camera, place, low * top, high * top, AROUND_M)] = k
     core = _drawn(camera, place, CORE_FROM * top, CORE_TO * top, share=CORE_WIDTH)
     return Figure(_drawn(camera, place, 0, top), core, _drawn(camera, place, 0, top, REACH_M), parts)
+
+
+def around(camera: Camera, place: Standing, reach_m: float) -> np.ndarray:
+    """Where a person may be in one view who moves on the spot and reaches so far, metres; bool, shape (height, width)."""
+    return _drawn(camera, place, 0, place.stature_m, reach_m)
 
 
 def learn_body(images: Sequence[np.ndarray], others: Sequence[np.ndarray], figure: Figure) -> BodyColors:

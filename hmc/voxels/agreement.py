@@ -12,7 +12,8 @@ import cv2
 import numpy as np
 from scipy.ndimage import distance_transform_edt, label
 
-from hmc.camera.model import Camera, project
+from hmc.camera.coverage import nearest_pixels
+from hmc.camera.model import Camera
 from hmc.voxels.carving import CarvingTables, carve_levels
 from hmc.voxels.components import components
 from hmc.voxels.grid import voxels_of
@@ -84,13 +85,10 @@ def bodies(hull: np.ndarray, tables: CarvingTables) -> np.ndarray:
 
 def hull_view(camera: Camera, points: np.ndarray, radius_m: float) -> np.ndarray:
     """Image of balls, all drawn as large as one at the middle depth."""
-    uv, valid = project(camera, points)
-    width, height = camera.size
-    mask: np.ndarray = np.zeros((height, width), np.uint8)
-    pixel = np.round(np.where(valid[:, None], uv, -1)).astype(int)
-    seen = ((pixel >= 0) & (pixel < (width, height))).all(axis=1)
+    pixels, seen = nearest_pixels(camera, points)
+    mask: np.ndarray = np.zeros(camera.size[::-1], np.uint8)
     if seen.any():
-        mask[pixel[seen, 1], pixel[seen, 0]] = 1
+        mask[pixels[seen, 1], pixels[seen, 0]] = 1
         depth = float(np.median((points[seen] @ camera.rotation.T + camera.translation)[:, 2]))
         side = 2 * int(np.ceil(camera.matrix[0, 0] * radius_m / depth)) + 1
         mask = cv2.dilate(mask, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side)))

@@ -15,17 +15,19 @@ from functools import partial
 import cv2
 import numpy as np
 
-from hmc.camera.empty_scene import add_bodies, cut_samples, replace_people, scenes_behind, shrunk
+from hmc.camera.empty_scene import add_bodies, cut_again, cut_samples, replace_people, scenes_behind, shrunk
 from hmc.camera.model import Rig
 from hmc.camera.people_cut import PeopleColors, View, cut_people, disc
 from hmc.camera.segmentation import BackgroundModel, SegmentationSettings, train_background
 from hmc.camera.shade import floor_pixels
 from hmc.camera.standing import Standing
+from hmc.camera.standing_cut import around
 from hmc.errors import InputError
 from hmc.io.recording import Recording, iterate_frames, whole_recording
 from hmc.voxels.agreement import agreed_views
 from hmc.voxels.carving import CarvingTables, make_tables
 from hmc.voxels.grid import VoxelGrid
+from hmc.voxels.known_bodies import places_at_times
 from hmc.voxels.still_people import StillPerson, cut_still_people, find_still_people
 
 __all__ = ["UnseenPlaces", "learn_from_people", "with_unseen_places"]
@@ -36,6 +38,8 @@ FEWEST_SAMPLES = 9
 #: Longer side of the images on which people are told from the scene, pixels, and the voxels in which cameras agree on them, metres.
 SMALL_PX = 320
 COARSE_M = 0.05
+#: Who moves on the spot is no further from it than this, metres, limbs and all.
+REACH_M = 0.6
 #: Width of the seam between what differs from the scene and what was cut out, pixels of an image whose longer side is 320.
 SEAM_PX = 2.5
 
@@ -104,6 +108,10 @@ def learn_from_people(
     views = partial(agreed_views, tables)
     small = shrunk(samples, [camera.size for camera in rig])
     people = cut_samples(small, views, pool)
+    at_times = places_at_times(tables, people.masks)
+    if at_times:
+        regions = [np.logical_or.reduce([around(camera, place, REACH_M) for place in at_times]) for camera in rig]
+        people = cut_again(small, people, regions, views, pool)
     still, doubted = find_still_people(tables, small, people.masks)
     if still:
         bodies = [[cut_still_people(still, c, image) for c, image in enumerate(frame)] for frame in small]

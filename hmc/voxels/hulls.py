@@ -322,8 +322,7 @@ def _with_sure_shades(cut: np.ndarray | None, mask: np.ndarray | None, chance: n
 def _say_still(places: UnseenPlaces) -> Iterator[str]:
     for place in (one.place for one in places.still):
         at = f"({place.x:.1f}, {place.y:.1f}) m"
-        by = "by swaying" if place.score > 0 else "in a few frames"
-        yield f"a person who hardly moves stands at {at}: found {by} and told by colors, which is less sure; film the empty scene"
+        yield f"a person who hardly moves stands at {at}: told by colors, which is less sure; film the empty scene"
     for place in places.doubted:
         at = f"({place.x:.1f}, {place.y:.1f}) m"
         yield f"a person may stand at {at} and hardly move: the images stir there, but the views do not show one body; not counted"

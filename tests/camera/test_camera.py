@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
-from hmc.camera.coverage import estimate_room, in_view
+from hmc.camera.coverage import estimate_room, in_view, nearest_pixels
 from hmc.camera.model import Camera, Rig, backproject, look_at, project, undistort
 from hmc.errors import InputError
 
@@ -231,6 +231,19 @@ def test_in_view_counts_whole_pixels():
     camera = look_at("a", (640, 480), [0, -4, 1], [0, 0, 1], 60)
     rays = backproject(camera, np.array([[-0.4, 100], [-0.6, 100], [639.4, 100], [639.6, 100], [10, 479.6]]))
     assert in_view(camera, camera.centre + 3 * rays).tolist() == [True, False, True, False, False]
+
+
+def test_nearest_pixels_are_those_in_view_and_points_beside_the_camera_are_in_none():
+    """Where the distortion never turns back, what is beside the camera is projected beyond all integers."""
+    matrix = [[240, 0, 163], [0, 239, 119], [0, 0, 1]]
+    camera = Camera("a", (320, 240), matrix, [-0.15, 0.04, 0, 0, 0], np.zeros(3), np.zeros(3))
+    assert camera.max_radius == np.inf
+    wanted = np.array([[0, 0], [17.4, 200.4], [319.4, 0], [-0.4, 239.4], [319.6, 4], [4, -0.6]])
+    points = np.vstack([camera.centre + 2 * backproject(camera, wanted), [[3.0, 2.0, 2e-6], [0, 0, -1]]])
+    with np.errstate(all="raise"):
+        pixels, seen = nearest_pixels(camera, points)
+    assert seen.tolist() == in_view(camera, points).tolist() == [True] * 4 + [False] * 4
+    assert pixels.tolist() == [[0, 0], [17, 200], [319, 0], [0, 239]] + [[0, 0]] * 4
 
 
 def test_estimated_room_is_where_the_views_overlap(ring):

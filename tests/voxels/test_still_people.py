@@ -9,11 +9,11 @@ from hmc.camera.model import Rig
 from hmc.camera.standing import Standing
 from hmc.camera.standing_cut import figure
 from hmc.voxels import still_people
-from hmc.voxels.carving import carve_levels, make_tables
+from hmc.voxels.carving import make_tables
 from hmc.voxels.grid import VoxelGrid
 from hmc.voxels.still_people import cut_still_people, find_still_people
 
-PLACE = Standing(0.3, -0.2, 1.7, 1.0)
+PLACE = Standing(0.3, -0.2, 1.7)
 N = 10
 
 
@@ -79,18 +79,6 @@ def test_who_was_found_in_some_samples_is_scene_in_the_others(ring):
     assert not find_still_people(tables, samples, [*people[:1], *nobody[1:]])[0]
 
 
-def test_who_steps_from_side_to_side_and_is_known_beside_a_place_is_not_still(ring):
-    tables, _, nobody = drawn(ring, 0.03)
-    beside = [replace(PLACE, x=PLACE.x + side) for side in (-0.22, 0.22)]
-    people = [[figure(camera, beside[k % 2]).body for camera in tables.rig] for k in range(len(nobody))]
-    known = [still_people.bodies(carve_levels(tables, masks, (0,))[0], tables) for masks in people]
-    hulls = [tables.grid.centres(np.argwhere(hull)) for hull in known]
-    assert still_people._is_known(tables, hulls, PLACE)
-    assert not still_people._is_known(tables, hulls, replace(PLACE, x=PLACE.x + 1.0))
-    trunks = [hull[hull[:, 2] > 0.9] for hull in hulls]
-    assert not still_people._is_known(tables, trunks, PLACE)
-
-
 def test_too_few_samples_tell_nothing(ring):
     tables, samples, nobody = drawn(ring, 0.03)
     assert find_still_people(tables, samples[:4], nobody[:4]) == ((), ())
@@ -100,6 +88,6 @@ def test_too_few_samples_tell_nothing(ring):
 def test_a_place_that_was_tried_beside_the_person_leads_to_the_person(ring, monkeypatch, off):
     tables, samples, nobody = drawn(ring, 0.03)
     beside = replace(PLACE, x=PLACE.x + off[0], y=PLACE.y + off[1], stature_m=1.4)
-    monkeypatch.setattr(still_people, "find_standing", lambda *_: [beside])
+    monkeypatch.setattr(still_people, "stirring_places", lambda *_: [beside])
     (person,), _ = find_still_people(tables, samples, nobody)
     assert np.hypot(person.place.x - PLACE.x, person.place.y - PLACE.y) < np.hypot(*off) - 0.04
