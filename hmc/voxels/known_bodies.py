@@ -12,7 +12,7 @@ from hmc.voxels.agreement import bodies
 from hmc.voxels.carving import CarvingTables, carve_levels
 from hmc.voxels.grid import voxels_of
 
-__all__ = ["LITRES", "REACH_M", "is_known", "is_upright", "judges", "known_hulls", "places_at_times", "within"]
+__all__ = ["LITRES", "LOWEST_M", "REACH_M", "TOP_M", "is_known", "judges", "known_hulls", "places_at_times", "within"]
 
 #: Samples by which a place is judged.
 JUDGES = 7
@@ -20,7 +20,7 @@ JUDGES = 7
 REACH_M = 0.5
 #: Who has a whole hull about a place in more than this share of the samples is known already.
 KNOWN = 0.5
-#: Hulls of a person: litres, where they begin at most and end at least above the floor, metres.
+#: Hulls of a person: litres, where they begin at most and where those of who sits end at least, metres above the floor.
 LITRES = (25.0, 220.0)
 LOWEST_M, TOP_M = 0.45, 1.05
 #: Who reaches higher than this has arms raised, metres.
@@ -81,11 +81,6 @@ def is_known(hulls: Sequence[np.ndarray], place: Standing, voxel_size_m: float) 
     return bool(np.mean([_is_body(hull[within(hull, place, REACH_M)], voxel_size_m) for hull in hulls]) > KNOWN)
 
 
-def is_upright(lowest: float, top: float) -> bool:
-    """Whether a body goes from near the floor to where one who sits ends."""
-    return lowest <= LOWEST_M and top >= TOP_M
-
-
 def within(points: np.ndarray, place: Standing, radius_m: float) -> np.ndarray:
     """Which of some points, (n, 3), are no further from a place, seen from above."""
     return np.hypot(points[:, 0] - place.x, points[:, 1] - place.y) <= radius_m
@@ -94,4 +89,6 @@ def within(points: np.ndarray, place: Standing, radius_m: float) -> np.ndarray:
 def _is_body(points: np.ndarray, voxel_size_m: float, most_litres: float = np.inf) -> bool:
     """Whether voxels of a hull, (n, 3), are a whole person."""
     litres = 1000 * len(points) * voxel_size_m**3
-    return LITRES[0] <= litres <= most_litres and is_upright(points[:, 2].min(), points[:, 2].max() + voxel_size_m / 2)
+    if not LITRES[0] <= litres <= most_litres:
+        return False
+    return bool(points[:, 2].min() <= LOWEST_M and points[:, 2].max() + voxel_size_m / 2 >= TOP_M)

@@ -4,9 +4,11 @@ No difference from the scene tells of them: they are in all that is known of it.
 
 - they sway, and move their arms: where a person stands the images stir in all views (`hmc.voxels.stirring_places`);
 - they are cut out by their colors, camera by camera, head to foot (`hmc.camera.standing_cut`);
-- what is cut out in the views is one body: a hull of a person's size from near the floor up, which fills what was cut out.
+- what is cut out in the views is one body: a hull of a person's size, which fills what was cut out.
 
 Who was found by difference from the scene is not looked for again; who was in some samples alone is, at the place where they were.
+There, what looks like a person may be the wall behind nobody, so only a body that stands on the floor counts. Where something stirs,
+trousers of the wall's color do not hide who does.
 """
 
 from __future__ import annotations
@@ -22,7 +24,7 @@ from hmc.camera.stirring import stirring
 from hmc.voxels.agreement import hull_view
 from hmc.voxels.carving import CarvingTables, carve_levels
 from hmc.voxels.grid import voxels_of
-from hmc.voxels.known_bodies import LITRES, REACH_M, is_known, is_upright, judges, known_hulls, places_at_times, within
+from hmc.voxels.known_bodies import LITRES, LOWEST_M, REACH_M, TOP_M, is_known, judges, known_hulls, places_at_times, within
 from hmc.voxels.stirring_places import stirring_places
 
 __all__ = ["StillPerson", "cut_still_people", "find_still_people"]
@@ -81,9 +83,10 @@ def find_still_people(
     for place in [*places, *places_at_times(tables, people)]:
         if not _apart(place, found) or is_known(hulls, place, tables.grid.voxel_size_m):
             continue
-        person = _examine(tables, images, hulls, place)
+        stirs = place in places
+        person = _examine(tables, images, hulls, place, place.stature_m / 2 if stirs else LOWEST_M)
         if person is None:
-            if place in places:  # else nothing speaks for it but that somebody was there
+            if stirs:  # else nothing speaks for it but that somebody was there
                 doubted.append(place)
         elif _apart(person.place, found):
             found.append(person)
@@ -116,8 +119,11 @@ def _of(frames: Sequence[Sequence[np.ndarray | None]], camera: int) -> list[np.n
     return [entry for frame in frames if (entry := frame[camera]) is not None]
 
 
-def _examine(tables: CarvingTables, samples, hulls: Sequence[np.ndarray], place: Standing) -> StillPerson | None:
-    """The person at a place, or None if the views do not show one body there; `hulls` are points of those who are known, (n, 3) each."""
+def _examine(tables: CarvingTables, samples, hulls: Sequence[np.ndarray], place: Standing, lowest_m: float) -> StillPerson | None:
+    """The person at a place, or None if the views do not show one body there that begins at such a height or below.
+
+    `hulls` are points of those who are known, (n, 3) each.
+    """
     for left in reversed(range(ROUNDS)):
         others = [_others(tables, hull, place) for hull in hulls]
         figures = tuple(figure(camera, place) for camera in tables.rig)
@@ -134,7 +140,7 @@ def _examine(tables: CarvingTables, samples, hulls: Sequence[np.ndarray], place:
         if left:
             # Swinging arms draw the place aside: what is cut out beside the true one misses the feet.
             place = replace(place, x=float(x), y=float(y))
-        elif not (litres <= LITRES[1] and is_upright(lowest, top) and np.sort(agree)[1] >= AGREE):
+        elif not (litres <= LITRES[1] and lowest <= lowest_m and top >= TOP_M and np.sort(agree)[1] >= AGREE):
             return None
     return StillPerson(place, figures, colors)
 

@@ -91,3 +91,19 @@ def test_a_place_that_was_tried_beside_the_person_leads_to_the_person(ring, monk
     monkeypatch.setattr(still_people, "stirring_places", lambda *_: [beside])
     (person,), _ = find_still_people(tables, samples, nobody)
     assert np.hypot(person.place.x - PLACE.x, person.place.y - PLACE.y) < np.hypot(*off) - 0.04
+
+
+def test_who_stirs_may_wear_trousers_of_the_walls_color_who_was_seen_a_few_times_must_stand_on_the_floor(ring, monkeypatch):
+    """Where nothing stirs, what was cut out without legs may be a wall."""
+    tables, samples, nobody = drawn(ring, 0.03)
+
+    def measure(lowest_m):
+        monkeypatch.setattr(still_people, "_measure", lambda _, place, cuts, *__: [60, lowest_m, 1.7, place.x, place.y, *[0.7] * len(cuts)])
+        return find_still_people(tables, samples, nobody)
+
+    assert [len(some) for some in measure(0.7)] == [1, 0]
+    assert [len(some) for some in measure(1.0)] == [0, 1]
+    monkeypatch.setattr(still_people, "stirring_places", lambda *_: [])
+    monkeypatch.setattr(still_people, "places_at_times", lambda *_: [PLACE])
+    assert [len(some) for some in measure(0.3)] == [1, 0]
+    assert [len(some) for some in measure(0.7)] == [0, 0]
