@@ -31,6 +31,7 @@ __all__ = [
     "add_bodies",
     "cut_again",
     "cut_samples",
+    "of_camera",
     "replace_people",
     "scenes_behind",
     "shrunk",
@@ -120,7 +121,7 @@ def cut_samples(small: Sequence[Masks], views: Views, pool: Executor | None = No
     people = SamplePeople(
         [[None] * n_cameras for _ in small],
         [None] * n_cameras,
-        list(run(lambda c: stable_background(_of(small, c)), range(n_cameras))),
+        list(run(lambda c: stable_background(of_camera(small, c)), range(n_cameras))),
         [None] * n_cameras,
     )
     for n_round in range(ROUNDS):
@@ -149,7 +150,7 @@ def cut_again(
         As they were where hardly anything changes.
     """
     run = map if pool is None else pool.map
-    images, masks = ([_of(frames, c) for c in range(len(regions))] for frames in (small, people.masks))
+    images, masks = ([of_camera(frames, c) for c in range(len(regions))] for frames in (small, people.masks))
     scenes = list(run(_scene, images, masks, regions))
     uneven = [np.count_nonzero(unseen & ~before) for (_, unseen), (_, before) in zip(scenes, people.scenes, strict=True)]
     there = [np.mean([np.count_nonzero(mask & region) for mask in own]) for own, region in zip(masks, regions, strict=True)]
@@ -182,7 +183,7 @@ def scenes_behind(samples: Sequence[Masks], people: SamplePeople, pool: Executor
     """The scene of each camera, in the samples' full size, behind people who were cut out of them."""
     run = map if pool is None else pool.map
     cameras = range(len(people.colors))
-    scenes = run(_scene, (_of(samples, c) for c in cameras), (_of(people.masks, c) for c in cameras), people.regions)
+    scenes = run(_scene, (of_camera(samples, c) for c in cameras), (of_camera(people.masks, c) for c in cameras), people.regions)
     return [EmptyScene(scene, unseen, color) for (scene, unseen), color in zip(scenes, people.colors, strict=True)]
 
 
@@ -191,7 +192,7 @@ def replace_people(image: np.ndarray, scene: np.ndarray) -> np.ndarray:
     return np.where(_far(image, scene)[..., None], scene, image)
 
 
-def _of(frames: Sequence[Masks], camera: int) -> list[np.ndarray]:
+def of_camera(frames: Sequence[Masks], camera: int) -> list[np.ndarray]:
     """One camera's entries, without the frames that it has none of."""
     return [entry for frame in frames if (entry := frame[camera]) is not None]
 
@@ -220,7 +221,7 @@ def _find_people(small, before: SamplePeople, views: Views, run, bodies: Sequenc
         for frame, body in zip(small, bodies, strict=True)
     ]
     cameras = range(len(known))
-    scenes = list(run(_scene, (_of(small, c) for c in cameras), (_of(people, c) for c in cameras), before.regions))
+    scenes = list(run(_scene, (of_camera(small, c) for c in cameras), (of_camera(people, c) for c in cameras), before.regions))
     return SamplePeople(people, colors, scenes, before.regions)
 
 

@@ -27,7 +27,7 @@ from hmc.io.recording import Recording, iterate_frames, whole_recording
 from hmc.voxels.agreement import agreed_views
 from hmc.voxels.carving import CarvingTables, make_tables
 from hmc.voxels.grid import VoxelGrid
-from hmc.voxels.known_bodies import places_at_times
+from hmc.voxels.known_bodies import known_hulls, places_at_times
 from hmc.voxels.still_people import StillPerson, cut_still_people, find_still_people
 
 __all__ = ["UnseenPlaces", "learn_from_people", "with_unseen_places"]
@@ -108,7 +108,7 @@ def learn_from_people(
     views = partial(agreed_views, tables)
     small = shrunk(samples, [camera.size for camera in rig])
     people = cut_samples(small, views, pool)
-    at_times = places_at_times(tables, people.masks)
+    at_times = places_at_times(tables.grid, known_hulls(tables, people.masks))
     if at_times:
         regions = [np.logical_or.reduce([around(camera, place, REACH_M) for place in at_times]) for camera in rig]
         people = cut_again(small, people, regions, views, pool)

@@ -10,7 +10,7 @@ from scipy.ndimage import label
 from hmc.camera.standing import APART_M, Standing
 from hmc.voxels.agreement import bodies
 from hmc.voxels.carving import CarvingTables, carve_levels
-from hmc.voxels.grid import voxels_of
+from hmc.voxels.grid import VoxelGrid, voxels_of
 
 __all__ = ["LITRES", "LOWEST_M", "REACH_M", "TOP_M", "is_known", "judges", "known_hulls", "places_at_times", "within"]
 
@@ -34,27 +34,24 @@ def judges(samples: Sequence[Sequence[np.ndarray | None]]) -> list[int]:
 
 
 def known_hulls(tables: CarvingTables, people: Sequence[Sequence[np.ndarray | None]]) -> list[np.ndarray]:
-    """Hulls of the people who were found in some samples, one a sample, bool, shape (nx, ny, nz)."""
-    return [bodies(carve_levels(tables, masks, (0,))[0], tables) for masks in people]
+    """Hulls of the people who were found in samples, those of `judges`, bool, shape (nx, ny, nz) each."""
+    return [bodies(carve_levels(tables, people[k], (0,))[0], tables) for k in judges(people)]
 
 
-def places_at_times(tables: CarvingTables, people: Sequence[Sequence[np.ndarray | None]]) -> list[Standing]:
+def places_at_times(grid: VoxelGrid, hulls: Sequence[np.ndarray]) -> list[Standing]:
     """Places at which two samples or more have a whole body, and most have none.
 
     Parameters
     ----------
-    tables : CarvingTables
-        Of coarse voxels, and of cameras as large as the masks.
-    people : sequence of sequences of ndarray of bool, shape (height, width), or None
-        People who were found in samples, one a camera, a frame at a time.
+    grid : VoxelGrid
+    hulls : sequence of ndarray of bool, shape (nx, ny, nz)
+        Of `known_hulls`.
 
     Returns
     -------
     list of Standing
         As tall as what was found there, if no arms were raised.
     """
-    grid = tables.grid
-    hulls = known_hulls(tables, [people[k] for k in judges(people)])
     seen: list[Standing] = []
     for hull in hulls:
         parts, n = label(hull.any(axis=2), np.ones((3, 3)))

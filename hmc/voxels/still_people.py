@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from hmc.camera.empty_scene import of_camera
 from hmc.camera.standing import APART_M, Standing
 from hmc.camera.standing_cut import BodyColors, Figure, cut_body, figure, learn_body
 from hmc.camera.stirring import stirring
@@ -74,13 +75,14 @@ def find_still_people(
     judging = judges(samples)
     if not judging:
         return (), ()
-    stirred = [stirring(_of(samples, c), _of(people, c)) for c in range(len(tables.rig))]
-    places = stirring_places(tables, [amount for amount, _ in stirred], [known for _, known in stirred])
-    hulls = [tables.grid.centres(voxels_of(hull)) for hull in known_hulls(tables, [people[k] for k in judging])]
+    stirred = [stirring(of_camera(samples, c), of_camera(people, c)) for c in range(len(tables.rig))]
+    places = stirring_places(tables, [amount for amount, _ in stirred], [told for _, told in stirred])
+    known = known_hulls(tables, people)
+    hulls = [tables.grid.centres(voxels_of(hull)) for hull in known]
     images = [[image for image in samples[k] if image is not None] for k in judging]
     found: list[StillPerson] = []
     doubted: list[Standing] = []
-    for place in [*places, *places_at_times(tables, people)]:
+    for place in [*places, *places_at_times(tables.grid, known)]:
         if not _apart(place, found) or is_known(hulls, place, tables.grid.voxel_size_m):
             continue
         stirs = place in places
@@ -112,11 +114,6 @@ def cut_still_people(still: Sequence[StillPerson], camera: int, image: np.ndarra
     if image is None or not still:
         return None
     return np.logical_or.reduce([cut_body(image, None, one.figures[camera], one.colors[camera]) for one in still])
-
-
-def _of(frames: Sequence[Sequence[np.ndarray | None]], camera: int) -> list[np.ndarray]:
-    """One camera's entries, without the frames that it has none of."""
-    return [entry for frame in frames if (entry := frame[camera]) is not None]
 
 
 def _examine(tables: CarvingTables, samples, hulls: Sequence[np.ndarray], place: Standing, lowest_m: float) -> StillPerson | None:

@@ -35,7 +35,8 @@ def close(place, truth=PLACE):
 
 def test_who_is_in_some_samples_has_a_place_who_is_in_most_or_in_one_has_none(tables):
     def found(*there):
-        return places_at_times(tables, [bodies(tables, PLACE if k in there else None) for k in range(N)])
+        people = [bodies(tables, PLACE if k in there else None) for k in range(N)]
+        return places_at_times(tables.grid, known_hulls(tables, people))
 
     (place,) = found(0, 6, 11)
     assert close(place)
