@@ -235,7 +235,7 @@ def open_recording(
     for problem in (*wrong_views, *sizes_wrong, *wrong_focal_lengths(rig), *units):
         raise InputError(problem)
 
-    lengths = {view.path.name: view.n_frames for view in both if view is not None}
+    lengths = {name: view.n_frames for name, view in zip(names, both, strict=True) if view is not None}
     total = common_length(list(lengths.values()))
     problems = [
         *([] if any_world else odd_cameras(rig)),
