@@ -34,6 +34,10 @@ _LIMBS = np.concatenate([limb.landmarks for limb in LIMBS.values()])
 LEG_DOFS = np.concatenate([np.r_[LIMBS[leg].dofs, LIMBS[leg].end_dofs] for leg in ("r_leg", "l_leg")])
 
 
+#: Frames a second up to which the weight of a jump was chosen.
+RATE = 30.0
+
+
 @dataclass(frozen=True)
 class LegSettings:
     """How the legs are told apart.
@@ -137,10 +141,12 @@ def choose_legs(frames: np.ndarray, costs: np.ndarray, legs: np.ndarray, fps: fl
     ndarray of int, shape (n,)
     """
     reach = settings.reach(fps)
+    # Costs are summed over frames, of which there are more at a higher rate; a jump comes once.
+    weight = settings.jump_weight * max(1.0, fps / RATE)
     costs = costs * np.where(np.arange(costs.shape[1]) == 0, 1.0, 1.0 + settings.doubt)
 
     def between(k: int) -> np.ndarray:
-        return settings.jump_weight * np.minimum(_jumps(frames, legs, k, reach, fps), settings.largest_jump_m_s**2)
+        return weight * np.minimum(_jumps(frames, legs, k, reach, fps), settings.largest_jump_m_s**2)
 
     return cheapest_path(costs, between)
 

@@ -75,6 +75,24 @@ def test_legs_that_were_exchanged_where_they_pass_are_put_right():
     assert_array_equal(choose_legs(np.arange(45), costs, legs, FPS, LegSettings()), exchanged)
 
 
+@pytest.mark.parametrize("fps", [15, 30, 50, 60, 120, 240])
+def test_exchanged_legs_are_put_right_at_any_rate(fps):
+    """A stride of a second; hulls say nothing either way, at a cost as of real ones."""
+    phase = 2 * np.pi * np.arange(3 * fps)[:, None] / fps + np.array([0, np.pi])
+    forward = 1.3 * np.arange(3 * fps)[:, None] / fps
+    joints = [
+        np.stack([forward + swing * np.sin(phase), np.broadcast_to([0.1, -0.1], phase.shape), np.full_like(phase, z)], -1)
+        for swing, z in ((0.18, 0.5), (0.35, 0.1))
+    ]
+    right = np.stack(joints, axis=2)
+    exchanged = np.zeros(3 * fps, int)
+    exchanged[fps : fps + round(fps / 2)] = 1  # the legs pass twice a stride
+    followed = np.where(exchanged[:, None, None, None] == 0, right, right[:, ::-1]).reshape(-1, 4, 3)
+    legs = np.stack([followed, followed[:, [2, 3, 0, 1]]], axis=1)
+    picks = choose_legs(np.arange(3 * fps), np.full((3 * fps, 2), 2e-4), legs, fps, LegSettings())
+    assert np.mean(picks == exchanged) > 0.97
+
+
 def test_a_frame_that_went_wrong_does_not_turn_the_rest():
     sides = swinging().reshape(45, 4, 3)
     legs = np.stack([sides, sides[:, [2, 3, 0, 1]]], axis=1)
