@@ -37,7 +37,7 @@ from hmc.io.recording import Recording, spread_frames
 from hmc.io.results import TrackTable
 from hmc.pose.anew import doubtful_frames, pose_anew
 from hmc.pose.contacts import ground_notes, standing_feet
-from hmc.pose.follow import FollowOptions, PosedPeople
+from hmc.pose.follow import FollowOptions, PosedPeople, persons_of
 from hmc.pose.keypoint_cues import beside_body, learn_beside
 from hmc.pose.limb_colors import Found, OtherLimb, limbs_by_color
 from hmc.pose.method import SURFACE_POINTS, Capture, PoseMethod, Subject, make_subject, other_rng
@@ -130,7 +130,9 @@ def backward(
     first_bodies = make_bodies(people.states.bodies, method.limits)
     floor_z = float(recording.room[0, 2])
     records = open_journal(run.journal, with_angles(run.key), run.on_problem)
-    pass_ = SecondPass(recording, tracks, settings, options, run, capture, people.states, first_bodies, places, {})
+    pass_ = SecondPass(
+        recording, tracks, persons_of(recording, tracks), settings, options, run, capture, people.states, first_bodies, places, {}
+    )
     if records:
         turned = {int(person): frames for person, frames in records[0]["turned_frames"].items()}
     else:

@@ -19,6 +19,7 @@ from hmc.pose.method import Capture
 from hmc.pose.mixtures import BackwardSettings
 from hmc.pose.objectives.symmetric import body_distance
 from hmc.pose.occluders import HiddenPlaces, unseen_voxels
+from hmc.pose.person import PersonTrack
 from hmc.pose.views.person_view import PersonView, views_of
 from hmc.processes import each_ahead
 from hmc.tracking.resumable import person_grid
@@ -42,6 +43,7 @@ class SecondPass:
 
     recording: Recording
     tracks: TrackTable
+    persons: Mapping[int, PersonTrack]
     settings: BackwardSettings
     options: FollowOptions
     run: RunOptions
@@ -61,7 +63,7 @@ class SecondPass:
         made = self._made([frame for frame in frames if self.recent(frame) is None])
         for frame in frames:
             recent = self.recent(frame)
-            views = self._on_their_feet(frame, next(made) if recent is None else recent)
+            views = self._on_their_way(frame, next(made) if recent is None else recent)
             if not self.settings.own_rays:
                 yield frame, views
                 continue
@@ -73,11 +75,12 @@ class SecondPass:
             }
             yield frame, {person: with_own_rays(view, person, poses) for person, view in views.items()}
 
-    def _on_their_feet(self, frame: int, views: dict[int, PersonView]) -> dict[int, PersonView]:
-        """The same with what is known of who stands, and on what."""
+    def _on_their_way(self, frame: int, views: dict[int, PersonView]) -> dict[int, PersonView]:
+        """The same with what is known of who goes where, who stands, and on what."""
 
         def on_feet(person: int, view: PersonView) -> PersonView:
             known = self.footing.get(person)
+            view = replace(view, velocity=self.persons[person].velocity(frame))
             if view.target is None or known is None:
                 return view
             return replace(view, target=replace(view.target, floor_z=known.ground_z, standing=known.feet.get(frame, (False,) * 4)))

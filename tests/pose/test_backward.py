@@ -26,9 +26,11 @@ from hmc.pose.follow import FollowOptions
 from hmc.pose.mixtures import mixed_poses, mixture
 from hmc.pose.registry import pose_method
 from hmc.pose.starts.own_body import LEAST_BODY_FRAMES, choose_frames
+from hmc.pose.turned import turn_about
 from hmc.pose.views.person_view import views_of
 from hmc.pose.views.recent import RecentViews, bytes_of
 from hmc.tracking.resumable import person_grid
+from hmc.tracking.tracks import velocities
 from hmc.voxels.hulls import stream_hulls
 from hmc.voxels.run_options import RunOptions
 
@@ -184,6 +186,29 @@ def test_views_that_the_first_pass_left_are_not_made_again_and_change_nothing(on
         assert carved.value == FRAMES - len(last)
         np.testing.assert_array_equal(found.states.states, whole.states.states)
         np.testing.assert_array_equal(found.costs, whole.costs)
+
+
+@pytest.mark.parametrize("kept", [False, True], ids=["made anew", "of the first pass"])
+def test_who_may_be_turned_about_is_seen_on_the_way(one_pass, monkeypatch, kept):
+    """The tiny clip's person walks."""
+    people, run = one_pass
+    clip, tracks = tiny_clip(FRAMES), true_tracks(FRAMES)
+    steps = stream_hulls(clip, person_grid(clip, VOXEL_M), masks=kept_frames(run.masks, run.key, range(FRAMES)))
+    recent = RecentViews()
+    for step in steps if kept else ():
+        recent.add(step.index, views_of(clip, person_grid(clip, VOXEL_M), tracks, step))
+    seen = []
+
+    def noted(rng, subject, state, view, *settings):
+        seen.append((view.frame, view.velocity))
+        return turn_about(rng, subject, state, view, *settings)
+
+    monkeypatch.setattr("hmc.pose.backward.turn_about", noted)
+    second(people, run, recent=recent if kept else None)
+    speeds = dict(zip(tracks.frames.tolist(), velocities(tracks, clip.fps), strict=True))
+    assert seen and all(np.hypot(*velocity[:2]) > 0.5 for _, velocity in seen)
+    for frame, velocity in seen:
+        np.testing.assert_allclose(velocity, speeds[frame])
 
 
 def test_without_silhouettes_on_disk_the_poses_stay_and_a_note_says_so(one_pass):
