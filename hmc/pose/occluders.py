@@ -11,6 +11,7 @@ what lies behind: a body may be wherever all cameras show it that are left (occl
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -44,8 +45,8 @@ __all__ = [
 
 #: Frames that are looked at, at most, well spread: furniture does not move, and people do.
 MOST_FRAMES = 300
-#: Side of a patch of the image on a person, and of a step in depth, metres; and how far depths are told apart.
-PATCH_M, STEP_M, REACH_M = 0.03, 0.1, 12.0
+#: Side of a patch of the image on a person, and of a step in depth, metres; and how far from the pelvis limbs reach.
+PATCH_M, STEP_M, LIMB_REACH_M = 0.03, 0.1, 1.5
 #: Somebody's surface that so many cameras show is where the pose has it.
 LEAST_SUPPORT = 2
 #: Outlines differ from the flesh by so many patches: as near to a silhouette, nothing is known.
@@ -135,9 +136,10 @@ def learn_hidden_places(rig: Rig, grid: VoxelGrid, run: RunOptions, states: Pose
         skin[person] = flesh.points[flesh.is_surface], flesh.segment[flesh.is_surface]
     depths = np.array([states.states[posed, :3] @ camera.rotation[2] + camera.translation[2] for camera in rig])
     away = np.maximum(1.0, np.median(depths, axis=1)).tolist()
+    farthest = np.maximum(1.0, depths.max(axis=1) + LIMB_REACH_M).tolist()
 
     def count(some: list[int]) -> tuple[list[Sightings], np.ndarray]:
-        sightings = [no_sightings(camera, depth) for camera, depth in zip(rig, away, strict=True)]
+        sightings = [no_sightings(*one) for one in zip(rig, away, farthest, strict=True)]
         low, high = np.full(3, np.inf), np.full(3, -np.inf)
         for step in kept_frames(run.masks or "", run.key, some) or ():
             people = [(int(states.persons[row]), states.states[row]) for row in np.flatnonzero((states.frames == step.index) & posed)]
@@ -160,11 +162,11 @@ def _all_of(parts: Sequence[Sightings]) -> Sightings:
     return Sightings(parts[0].side, shown, hidden)
 
 
-def no_sightings(camera: Camera, depth_m: float) -> Sightings:
-    """Nothing seen yet by a camera from which people are so far away, metres."""
+def no_sightings(camera: Camera, depth_m: float, farthest_m: float) -> Sightings:
+    """Nothing seen yet by a camera from which people are mostly and at most so far away, metres."""
     side = max(1, round(PATCH_M * float(camera.matrix[0, 0]) / depth_m))
     width, height = camera.size
-    shape = -(-height // side), -(-width // side), round(REACH_M / STEP_M)
+    shape = -(-height // side), -(-width // side), math.ceil(farthest_m / STEP_M)
     return Sightings(side, np.zeros(shape, np.uint16), np.zeros(shape, np.uint16))
 
 
