@@ -17,13 +17,10 @@ from hmc.tracking.blobs import Observation
 from hmc.tracking.rules import RULE_SETS
 from hmc.tracking.rules.birth import confirm
 from hmc.tracking.settings import FollowingSettings
-from hmc.tracking.state import TrackerInfo, TrackerState, TrackRow
+from hmc.tracking.state import TrackerInfo, TrackerState, TrackRow, coasted
 from hmc.tracking.update import Filter, Rule, begin_update
 
 __all__ = ["advance", "finish", "init", "original_number"]
-
-#: Velocity that a track keeps over a frame that tells nothing.
-WAITING = 0.5
 
 
 def init(fps: float, most: int | None = None) -> TrackerState:
@@ -70,7 +67,7 @@ def advance(
         What is done with the frame, in this order; where left out, as the settings say.
     """
     if observation is None:
-        waiting = tuple(replace(track, last_frame=track.last_frame + 1, velocity=track.velocity * WAITING) for track in state.tracks)
+        waiting = tuple(replace(coasted(track, state.fps), last_frame=track.last_frame + 1) for track in state.tracks)
         return replace(state, tracks=waiting), TrackerInfo(())
     chosen = RULE_SETS[settings.rules] if rules is None else rules
     update = reduce(lambda update, rule: rule(update, settings), chosen, begin_update(state, frame, observation, filter))

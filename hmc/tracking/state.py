@@ -7,11 +7,14 @@ Everything here is plain numbers and named arrays, which the journal keeps and r
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-__all__ = ["Candidate", "DepartedTrack", "PersonMemory", "StaticObjects", "Track", "TrackRow", "TrackerInfo", "TrackerState"]
+__all__ = ["Candidate", "DepartedTrack", "PersonMemory", "StaticObjects", "Track", "TrackRow", "TrackerInfo", "TrackerState", "coasted"]
+
+#: Time in which the velocity of a track of which nothing is told falls to 1/e, seconds: to .8 from frame to frame at 15 frames a second.
+COASTING_S = 0.3
 
 
 @dataclass(frozen=True)
@@ -79,6 +82,8 @@ class Track:
     withheld : tuple of TrackRow
         Where it was in the last frames, as long as its voxels do not look like a person: told only when they do again, or when the
         track outlives the doubt.
+    asked : bool
+        Whether it was asked if this is somebody who had left.
     """
 
     person: int
@@ -96,6 +101,12 @@ class Track:
     rest: np.ndarray = field(default_factory=lambda: np.zeros(3))
     withheld: tuple[TrackRow, ...] = ()
     body_m3: float = 0.0
+    asked: bool = False
+
+
+def coasted(track: Track, fps: float) -> Track:
+    """A track after a frame that tells nothing of it: moved on by its velocity, of which it keeps the less the longer nothing is told."""
+    return replace(track, position=track.position + track.velocity / fps, velocity=track.velocity * np.exp(-1 / (COASTING_S * fps)))
 
 
 @dataclass(frozen=True)

@@ -106,6 +106,17 @@ def test_two_who_come_in_as_one_blob_become_two_persons():
     assert (np.bincount(table.persons) > 25).all()
 
 
+@pytest.mark.parametrize("fps", [15, 30, 60])
+@pytest.mark.parametrize("blank", [False, True], ids=["not in the hull", "no hull"])
+def test_who_walks_on_unseen_for_a_moment_is_the_same_at_any_rate(fps, blank):
+    path = [(-1.9 + 1.5 * k / fps, 0.0) for k in range(round(2.5 * fps))]
+    gone = slice(round(1.2 * fps), round(1.8 * fps))
+    seen = [observe(GRID, person(*p)) for p in path]
+    seen[gone] = [None if blank else observe(GRID, nothing())] * (gone.stop - gone.start)
+    table = run(enumerate(seen), float(fps), TRACKERS["naive"].tracker(NaiveSettings()))
+    assert set(table.persons) == {0} and table.frames.max() == len(path) - 1
+
+
 def test_a_person_in_pieces_is_one_person():
     path = line((-1, 0), (1, 0), 40)
     cut = (CENTRES[..., 2] > 0.75) & (CENTRES[..., 2] < 0.9) | (CENTRES[..., 2] > 1.3) & (CENTRES[..., 2] < 1.4)

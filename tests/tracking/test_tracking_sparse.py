@@ -124,10 +124,14 @@ def test_people_who_were_exchanged_get_their_numbers_back(crossing):
         assert np.linalg.norm(track.position - before.position) < 0.2
 
 
-def test_people_who_come_back_are_recognised_by_their_colors():
+@pytest.mark.parametrize("blank", [None, 19, 20, 21])
+def test_people_who_come_back_are_recognised_by_their_colors(blank):
+    """A frame that tells nothing, about when it is asked who they are, makes nobody a stranger."""
     nobody = [seen([])] * 26
     visit = {color: [seen([(*p, color)]) for p in line((-0.8, 0), (0.8, 0.2), 26)] for color in (RED, BLUE)}
     observations = [*visit[RED], *nobody, *visit[BLUE], *nobody, *visit[RED]]
+    if blank is not None:
+        observations[4 * 26 + blank] = None
     table = run(enumerate(observations), FPS, make_tracker("sparse", color=True))
     assert [set(table.persons[(table.frames // 52) == part]) for part in range(3)] == [{0}, {1}, {0}]
     assert len(set(run(enumerate(observations), FPS, make_tracker("sparse", color=False)).persons)) == 3

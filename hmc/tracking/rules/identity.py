@@ -47,7 +47,10 @@ def exchange_identities(update: FrameUpdate, settings: FollowingSettings) -> Fra
             whose[a], whose[b] = b, a
             taken |= {a, b}
     # Track k is really the person whose[k].
-    renamed = [replace(track, person=tracks[j].person, first_frame=tracks[j].first_frame) for track, j in zip(tracks, whose, strict=True)]
+    whom = [tracks[j] for j in whose]
+    renamed = [
+        replace(track, person=one.person, first_frame=one.first_frame, asked=one.asked) for track, one in zip(tracks, whom, strict=True)
+    ]
     moved = [replace(one, person=memories[j].person, histogram=memories[j].histogram) for one, j in zip(memories, whose, strict=True)]
     order = np.argsort(whose)
     return replace(
@@ -72,22 +75,29 @@ def learn_appearance(update: FrameUpdate, settings: FollowingSettings) -> FrameU
 
 
 def reidentify(update: FrameUpdate, settings: FollowingSettings) -> FrameUpdate:
-    """The update in which ended tracks have departed, and some who began lately are known to have been there before."""
+    """The update in which ended tracks have departed, and some who began lately are known to have been there before.
+
+    Of everybody it is asked once: in the first frame after `REIDENTIFY_AFTER_S` that tells anything of them.
+    """
     histograms = {memory.person: memory.histogram for memory in update.memories}
     departed, reidentified = update.departed, update.reidentified
-    born = {track.person for track in update.born}
+    born = {track.person for track in update.born}  # nothing is learnt yet of who was born in this frame
     ended = {track.person for track in update.ended}
+    due = update.frame - round(REIDENTIFY_AFTER_S * update.state.fps)
+    asked = set()
     followed = sorted((*update.tracks, *update.ended), key=lambda track: track.person)
     for track in (track for track in followed if track.person not in born and histograms[track.person].size):
         look = histograms[track.person]
         if track.person in ended:
             departed += (DepartedTrack(dict(reidentified).get(track.person, track.person), look, track.last_frame),)
-        elif update.frame - track.first_frame == round(REIDENTIFY_AFTER_S * update.state.fps):
+        elif track.first_frame <= due and not track.asked:
+            asked.add(track.person)
             before = recognise(look, track.first_frame, departed)
             if before is not None:
                 reidentified += ((track.person, before),)
                 departed = tuple(one for one in departed if one.person != before)
-    return replace(update, departed=departed, reidentified=reidentified)
+    tracks = tuple(replace(track, asked=True) if track.person in asked else track for track in update.tracks)
+    return replace(update, tracks=tracks, departed=departed, reidentified=reidentified)
 
 
 def recognise(histogram: np.ndarray, first_frame: int, departed: tuple[DepartedTrack, ...]) -> int | None:

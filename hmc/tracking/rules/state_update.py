@@ -18,13 +18,10 @@ from hmc.tracking.likeness import is_established
 from hmc.tracking.rules.death import FORGIVEN
 from hmc.tracking.rules.upright import MATCH_M
 from hmc.tracking.settings import FollowingSettings
-from hmc.tracking.state import PersonMemory, Track, TrackRow
+from hmc.tracking.state import PersonMemory, Track, TrackRow, coasted
 from hmc.tracking.update import FrameUpdate
 
 __all__ = ["update_tracks"]
-
-#: Velocity that a track keeps from a frame without support to the next.
-COASTING = 0.8
 
 
 @dataclass(frozen=True)
@@ -46,7 +43,7 @@ def update_tracks(update: FrameUpdate, settings: FollowingSettings) -> FrameUpda
             tracks.append(track)
             rows += told
         else:
-            tracks.append(replace(track, position=update.predicted[k], velocity=track.velocity * COASTING))
+            tracks.append(replace(coasted(track, update.state.fps), position=update.predicted[k]))
     memories = tuple(
         memory if correction.known else PersonMemory(memory.person, histogram=memory.histogram)
         for memory, correction in zip(update.memories, corrections, strict=True)
