@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from hmc.errors import InputError
 
@@ -37,7 +37,7 @@ class SegmentationSettings:
         Pieces in which the mixture found fewer pixels are specks.
     learning_rate, learn_every : float, int
         Share of a new image in the background each time it learns, and frames from one time to the next. At 30 frames a second the
-        defaults follow the light with a time constant of 7 s.
+        defaults follow the light with a time constant of 7 s, at 10 with one of 20 s; at fewer see `at_rate`.
     keep_out_px : int
         Nothing is learnt this near to a person, nor in shadows.
     max_foreground : float
@@ -69,3 +69,12 @@ class SegmentationSettings:
         for name in ("variance_threshold", "gap_threshold", "reach_threshold", "learn_every"):
             if not getattr(self, name) > 0:
                 raise InputError(f"segmentation: `{name}` must be positive; got {getattr(self, name)}")
+
+    def at_rate(self, fps: float) -> SegmentationSettings:
+        """The same for so many frames a second: the background learns once a second at least, or daylight would outrun it.
+
+        Parameters
+        ----------
+        fps : float
+        """
+        return replace(self, learn_every=min(self.learn_every, max(1, round(fps))))

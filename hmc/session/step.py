@@ -196,7 +196,7 @@ def session_step(settings: SessionSettings, state: SessionState, images: Images)
     scene, index = settings.scene, state.index
     frame = Frame(index, frame_images(settings.rig, images, scene.factors), None)
     with ThreadPoolExecutor(settings.frontend.threads or None) as pool:
-        look, models = look_once(dict(enumerate(state.models)), frame, settings.frontend.segmentation, pool)
+        look, models = look_once(dict(enumerate(state.models)), frame, settings.frontend.segmentation.at_rate(scene.fps), pool)
     step = MaskStep(index, look.images, *settle(settings.completion, look, settings.frontend))
     coarse = carve_step(settings.coarse, step, settings.frontend)
     observation = observe_step(scene, settings.coarse.grid, coarse, images=settings.tracker.color)

@@ -23,8 +23,8 @@ class FrontendSettings:
         Where the silhouettes come from; a source other than "auto" must be there.
     background_frames : int
         At most this many frames of the empty scene are learnt from.
-    median_frames, median_span : int
-        Images of which the median is taken, and the number of frames, around the selection, over which they are spread.
+    median_frames, median_span_s : int, float
+        Images of which the median is taken, and the time, around the selection, over which they are spread, seconds.
     ask_floor : bool
         Whether pixels that may be a shadow are told by how dark the other cameras see the floor behind (`hmc.voxels.floor_light`).
     complete : bool
@@ -48,7 +48,7 @@ class FrontendSettings:
     source: str = "auto"
     background_frames: int = 200
     median_frames: int = 20
-    median_span: int = 1800
+    median_span_s: float = 60.0
     ask_floor: bool = True
     complete: bool = True
     cut_shadows: bool = True

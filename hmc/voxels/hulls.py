@@ -247,7 +247,8 @@ def _empty_scene(recording: Recording, settings: FrontendSettings, report: Repor
             "so people who stay where they are may be missed"
         )
         with ThreadPoolExecutor(settings.threads or os.cpu_count() or 1) as pool:
-            models, places = learn_from_people(recording, left, settings.segmentation, settings.median_frames, settings.median_span, pool)
+            span = round(settings.median_span_s * recording.fps)
+            models, places = learn_from_people(recording, left, settings.segmentation, settings.median_frames, span, pool)
         for line in _say_still(places):
             report(line)
     known = tuple(c in background or c in models for c in range(len(names)))

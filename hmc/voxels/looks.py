@@ -209,17 +209,18 @@ def _look(
     """What some cameras see, and how often each one's scene has changed; with a pool, a frame is read while the one before is looked at."""
     lines: list[str] = []
     known = dict(models)
+    segmentation = settings.segmentation.at_rate(recording.fps)
     for c in sorted(background):
         empty = background_frames(recording, c, settings.background_frames)
         floor = floor_pixels(recording.rig.cameras[c], recording.room)
-        known[c] = train_background(empty, settings.segmentation, floor=floor)
+        known[c] = train_background(empty, segmentation, floor=floor)
     with ExitStack() as stack:
         frames: Iterable = iterate_frames(recording, first, last, lines.append)
         if pool is not None:
             frames = _read_ahead(frames, stack.enter_context(ThreadPoolExecutor(1)))
         for frame in frames:
             told, lines[:] = tuple(lines), []
-            look, known = look_once(known, frame, settings.segmentation, pool, told)
+            look, known = look_once(known, frame, segmentation, pool, told)
             yield look, [known[c].changes if c in known else 0 for c in range(len(recording.rig))]
 
 

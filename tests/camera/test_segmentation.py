@@ -154,6 +154,21 @@ def test_who_stands_still_is_never_learnt():
         assert overlap(mask, truth) > 0.85
 
 
+@pytest.mark.parametrize("fps", [4, 10])
+def test_daylight_on_a_wall_is_followed_at_few_frames_a_second_too(fps):
+    """A patch that brightens by half a grey level a second for a minute; with the ten frames of thirty a second it becomes a person."""
+    scene = Scene(7)
+    model, wall = trained(scene), scene.wall
+    patch = np.zeros(SIZE[::-1])
+    patch[40:110, 60:110] = 1
+    patch = cv2.GaussianBlur(patch, (0, 0), 6)[..., None]
+    settings = SegmentationSettings().at_rate(fps)
+    for k in range(60 * fps):
+        scene.wall = wall + 0.5 * k / fps * patch
+        mask, model = segment(model, scene.empty(), settings)
+    assert mask.sum() < 50
+
+
 def test_light_that_drifts_is_followed():
     """A tenth brighter in stripes over four hundred frames, with somebody there; without learning these would be foreground."""
     scene = Scene(5)
