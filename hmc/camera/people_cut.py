@@ -47,6 +47,8 @@ class View:
         Where the scene is not known.
     below : ndarray of bool, shape (height, width)
         What is under a body that nothing seems to hold up: its legs are there, though they may not differ from the scene.
+    changed : ndarray of bool, shape (height, width), optional
+        Where the scene is not known and the image is not what is there most of the time.
     """
 
     image: np.ndarray
@@ -55,6 +57,7 @@ class View:
     possibly: np.ndarray
     unseen: np.ndarray
     below: np.ndarray
+    changed: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -171,7 +174,8 @@ def _near(labels: np.ndarray) -> np.ndarray:
 def _limbs(view: View, labels: np.ndarray, palette: Palette, asked: np.ndarray) -> np.ndarray:
     """Solid parts that touch people, and look like them where they may be and are asked for, or below them like nothing else."""
     people = _near(labels)
-    found = looks_like_people(view.image, people, palette, asked)
+    # What has changed may be the limb itself, which is no surroundings of its own.
+    found = looks_like_people(view.image, people if view.changed is None else people | view.changed, palette, asked)
     if view.below.any():
         found |= looks_unlike_surroundings(view.image, people | view.below, asked & view.below & ~view.differs)
     solid = cv2.morphologyEx(found.view(np.uint8), cv2.MORPH_OPEN, disc(found, THIN_PX))

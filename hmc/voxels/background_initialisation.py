@@ -159,11 +159,11 @@ def with_unseen_places(
         if image is None or mask is None or differ is None or sure is None or possible is None or under is None or colors is None:
             return mask
         small = cv2.resize(image, sizes[i], interpolation=cv2.INTER_AREA)
-        hidden, differ = unseen[i], differ & ~unseen[i]
+        hidden, differ, changed = unseen[i], differ & ~unseen[i], differ & unseen[i]
         body = cut_still_people(places.still, i, small)
         if body is not None:
             hidden, differ = hidden & ~body, differ | body
-        people = cut_people(View(small, differ, sure, possible, hidden, under), colors, places.asked[i])
+        people = cut_people(View(small, differ, sure, possible, hidden, under, changed), colors, places.asked[i])
         if body is not None:
             people |= body & possible
         whole = np.where(places.unseen[i], _resize(people, mask.shape[::-1]), mask)

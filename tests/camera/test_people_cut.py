@@ -58,6 +58,21 @@ def test_legs_in_a_color_of_their_own_are_what_the_floor_around_is_not(view):
         assert people[legs].mean() > 0.95 and not people[BETWEEN].any()
 
 
+def test_a_limb_that_changed_is_not_its_own_surroundings(view):
+    """A stretched arm of the shirt's color, before a floor that was never surely seen; walls have that color too."""
+    arm = np.s_[70:90, 115:165]
+    image, unseen = view.image.copy(), np.zeros_like(view.differs)
+    image[:, :70], image[arm] = SHIRT, SHIRT
+    unseen[50:215, 115:170] = True
+    changed = np.zeros_like(unseen)
+    changed[arm] = True
+    lost = replace(view, image=image, unseen=unseen)
+    colors = learn_colors([lost])
+    people = cut_people(replace(lost, changed=changed), colors)
+    assert cut_people(lost, colors)[arm].mean() < 0.6
+    assert people[arm].mean() > 0.9 and not people[BETWEEN].any()
+
+
 def test_the_floor_between_people_is_not_theirs_though_the_mixtures_say_so(view):
     colors = learn_colors([view])
     people = cut_people(view, replace(colors, people=colors.scene, scene=colors.people))
