@@ -384,7 +384,8 @@ def export(
     Raises
     ------
     InputError
-        When the frames a second are not known, there is no such format, it needs angles that there are not, or a package is missing.
+        When the frames a second are not known, there is no such format, it needs angles that there are not, there are more frames than
+        it holds (C3D), or a package is missing.
 
     Examples
     --------

@@ -8,8 +8,11 @@ INTEL, DEC, MIPS = 84, 85, 86
 BLOCK = 512
 
 
-def write_c3d(path, labels, points, rate, processor=INTEL, scale=-1.0, missing=None, n_analog=0, units="mm"):
-    """Points (n_frames, n_points, 3) in `units`; with a positive scale as integers of that many units."""
+def write_c3d(path, labels, points, rate, processor=INTEL, scale=-1.0, missing=None, n_analog=0, units="mm", header=None, trial=None):
+    """Points (n_frames, n_points, 3) in `units`; with a positive scale as integers of that many units.
+
+    `header` and `trial` are the first and last frame by either, from 1; by default all frames, and no group TRIAL.
+    """
     n_frames, n_points = points.shape[:2]
     order = ">" if processor == MIPS else "<"
 
@@ -36,10 +39,13 @@ def write_c3d(path, labels, points, rate, processor=INTEL, scale=-1.0, missing=N
         record(1, "UNITS", struct.pack("b2B", -1, 1, len(units)) + units.encode() + b"\0"),
         record(1, "LABELS", texts(labels)),
     ]
+    if trial is not None:
+        words = [struct.pack("bBB", 2, 1, 2) + struct.pack(f"{order}2H", one % 65536, one // 65536) + b"\0" for one in trial]
+        records += [record(-2, "TRIAL", b"\0"), record(2, "ACTUAL_START_FIELD", words[0]), record(2, "ACTUAL_END_FIELD", words[1])]
     parameters = b"".join(records) + b"\0\0"
     n_blocks = -(-(4 + len(parameters)) // BLOCK)
     start = 2 + n_blocks
-    header = bytes([2, 0x50]) + struct.pack(f"{order}5H", n_points, n_analog, 1, n_frames, 0) + floats([scale])
+    header = bytes([2, 0x50]) + struct.pack(f"{order}5H", n_points, n_analog, *(header or (1, n_frames)), 0) + floats([scale])
     header += struct.pack(f"{order}2H", start, 1) + floats([rate])
     section = bytes([1, 0x50, n_blocks, processor]) + parameters
 

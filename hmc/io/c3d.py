@@ -44,11 +44,14 @@ class PointData:
         Metres; NaN where a point was not seen.
     rate : float
         Frames a second.
+    first_frame : int
+        Number of the first frame, counted from 0; the file counts from 1.
     """
 
     labels: tuple[str, ...]
     positions: np.ndarray
     rate: float
+    first_frame: int = 0
 
     def of(self, label: str) -> np.ndarray | None:
         """Positions of one point, (n_frames, 3); None where there is none of that name."""
@@ -59,6 +62,7 @@ def read_c3d(path: str | Path) -> PointData:
     """Read the points of a C3D file.
 
     A point is missing where the file says so (a negative residual) and where it lies exactly in the origin, as many programs write it.
+    Frames are numbered as the group TRIAL says, where a file has one: the header has 16 bits for them.
 
     Parameters
     ----------
@@ -90,7 +94,8 @@ def _parse(content: bytes) -> PointData:
         raise ValueError(f"processor type {processor}")
     order = ">" if processor == MIPS else "<"
     parameters = _parameters(content, section, order, processor)
-    n_points, n_analog, first, last = struct.unpack_from(f"{order}4H", content, 2)
+    n_points, n_analog, *in_header = struct.unpack_from(f"{order}4H", content, 2)
+    first, last = _frame_range(parameters) or in_header
     scale = parameters["POINT", "SCALE"][0]
     start = struct.unpack_from(f"{order}H", content, 16)[0]
     labels = [label for name in ("LABELS", "LABELS2", "LABELS3") for label in parameters.get(("POINT", name), [])]
@@ -107,7 +112,19 @@ def _parse(content: bytes) -> PointData:
         raise ValueError(f"units {units!r}")
     positions = points[..., :3] * (UNITS_M[units] * (scale if scale > 0 else 1.0))
     positions[(points[..., 3] < 0) | ~points[..., :3].any(axis=-1)] = np.nan
-    return PointData(tuple(label.rpartition(":")[2] for label in labels[:n_points]), positions, float(parameters["POINT", "RATE"][0]))
+    names = tuple(label.rpartition(":")[2] for label in labels[:n_points])
+    return PointData(names, positions, float(parameters["POINT", "RATE"][0]), max(first - 1, 0))
+
+
+def _frame_range(parameters: dict[tuple[str, str], list[Any]]) -> tuple[int, int] | None:
+    """First and last frame by the group TRIAL, counted from 1; None where it does not say."""
+    found = [parameters.get(("TRIAL", name), []) for name in ("ACTUAL_START_FIELD", "ACTUAL_END_FIELD")]
+    if any(len(words) != 2 for words in found):
+        return None
+    # Words without a sign, the lower first. The manual multiplies the upper by 65535, by which two pairs of words would be one number;
+    # programs take 65536.
+    first, last = (int(low) % 2**16 + int(high) % 2**16 * 2**16 for low, high in found)
+    return (first, last) if last >= first else None
 
 
 def _parameters(content: bytes, section: int, order: str, processor: int) -> dict[tuple[str, str], list[Any]]:

@@ -12,7 +12,7 @@ import numpy as np
 from hmc.body.joints import DOF_NAMES
 from hmc.errors import InputError
 from hmc.io.export.bvh import write_bvh
-from hmc.io.export.c3d import write_c3d
+from hmc.io.export.c3d import MOST_FRAMES, write_c3d
 from hmc.io.export.glb import MovingBody, write_glb
 from hmc.io.export.mot import write_mot
 from hmc.io.export.osim import write_osim
@@ -80,7 +80,8 @@ def export_trajectories(found: Sequence[Trajectory], out: str | Path, kind: str 
     Raises
     ------
     InputError
-        When there is no such format, the suffix is another's, it needs angles and the result has none, or a package is missing.
+        When there is no such format, the suffix is another's, it needs angles and the result has none, there are more frames than it
+        holds (C3D), or a package is missing.
     """
     out = Path(out)
     suffix = _suffix(out)
@@ -113,7 +114,11 @@ def _c3d(path: Path, found: Sequence[Trajectory]) -> Exported:
         parts.append(spread)
         labels += [name if len(found) == 1 else f"person_{one.person}:{name}" for name in names]
     write_c3d(path, labels, first, np.concatenate(parts, axis=1), found[0].fps)
-    return Exported((path,), ())
+    said = (
+        f"{path}: its header has no number above {MOST_FRAMES} and counts from 1, which is frame {first} of the recording; "
+        f"TRIAL:ACTUAL_START_FIELD says {first + 1}"
+    )
+    return Exported((path,), (said,) if last + 1 > MOST_FRAMES else ())
 
 
 def _bvh(path: Path, found: Sequence[Trajectory]) -> Exported:

@@ -55,6 +55,32 @@ def test_a_point_in_the_origin_is_missing(tmp_path):
     assert np.isnan(read_c3d(tmp_path / "file.c3d").positions).all(axis=-1).tolist() == [[False, False], [True, False]]
 
 
+@pytest.mark.parametrize("processor", [INTEL, DEC, MIPS])
+@pytest.mark.parametrize("first", [1, 32768, 65531, 70001, 131072])
+def test_frames_are_numbered_as_the_group_trial_says(tmp_path, processor, first):
+    """The header's words are those of a program that lets them run over."""
+    last = first + 9
+    path, header = tmp_path / "file.c3d", (first % 65536, last % 65536)
+    write_c3d(path, ["a"], np.ones((10, 1, 3)), 120.0, processor=processor, header=header, trial=(first, last))
+    data = read_c3d(path)
+    assert data.first_frame == first - 1 and len(data.positions) == 10
+
+
+def test_more_frames_than_the_header_can_say(tmp_path):
+    write_c3d(tmp_path / "file.c3d", ["a"], np.ones((65540, 1, 3)), 120.0, header=(1, 65535), trial=(1, 65540))
+    assert len(read_c3d(tmp_path / "file.c3d").positions) == 65540
+
+
+def test_without_a_group_trial_the_header_says(tmp_path):
+    write_c3d(tmp_path / "file.c3d", ["a"], np.ones((10, 1, 3)), 120.0, header=(41, 50))
+    data = read_c3d(tmp_path / "file.c3d")
+    assert data.first_frame == 40 and len(data.positions) == 10
+    # One that ends before it begins says nothing.
+    write_c3d(tmp_path / "file.c3d", ["a"], np.ones((10, 1, 3)), 120.0, header=(41, 50), trial=(41, 0))
+    data = read_c3d(tmp_path / "file.c3d")
+    assert data.first_frame == 40 and len(data.positions) == 10
+
+
 @pytest.mark.parametrize("length", [0, 100, 512, 700, 1024, 1100])
 def test_what_is_cut_off_is_told(tmp_path, length):
     path = tmp_path / "file.c3d"

@@ -18,6 +18,7 @@ from hmc.cli import main
 from hmc.cli.export import FORMATS as SAID
 from hmc.errors import InputError
 from hmc.io.c3d import read_c3d
+from hmc.io.export.c3d import write_c3d
 from hmc.io.results import PoseStates, PoseTable, write_joints, write_pose
 from hmc.landmarks import FOOT_POINTS, LANDMARKS
 from hmc.motion.export import FORMATS, export_trajectories
@@ -127,6 +128,34 @@ def test_our_own_reader_of_c3d_agrees(tmp_path):
     assert data.rate == 50 and len(data.labels) == 38
     first, second = people.trajectories()
     assert np.allclose(data.positions, np.hstack([first.points[1], second.points[1]]), atol=1e-6, equal_nan=True)
+
+
+@pytest.mark.parametrize("first", [0, 32_760, 65_523, 65_524, 70_000])
+def test_a_c3d_has_the_frames_of_the_recording_however_late(tmp_path, first):
+    """Frames 65,523 to 65,534 are the last that the header's 16 bits can number, from 1."""
+    ezc3d = pytest.importorskip("ezc3d")
+    late = first > 65_523
+    found = moving(n=12, first=first).trajectories()
+    written = export_trajectories(found, tmp_path / "late.c3d")
+    file = ezc3d.c3d(str(tmp_path / "late.c3d"))
+    start, end = (file["parameters"]["TRIAL"][f"ACTUAL_{name}_FIELD"] for name in ("START", "END"))
+    assert start["type"] == end["type"] == 2
+    assert [word % 65536 for word in start["value"]] == [(first + 1) % 65536, (first + 1) // 65536]
+    assert [word % 65536 for word in end["value"]] == [(first + 12) % 65536, (first + 12) // 65536]
+    points = file["header"]["points"]
+    assert (points["first_frame"], points["last_frame"]) == ((0, 11) if late else (first, first + 11))
+    assert file["data"]["points"].shape[2] == 12
+    assert len(written.notes) == late and all(f"is frame {first} of the recording" in note for note in written.notes)
+    data = read_c3d(tmp_path / "late.c3d")
+    assert data.first_frame == first and np.allclose(data.positions, found[0].points[1], atol=1e-6)
+
+
+def test_more_frames_than_a_c3d_holds_are_refused(tmp_path):
+    with pytest.raises(
+        InputError, match=r"long\.c3d: 65536 frames, and a C3D file holds 65535; write TRC, or split: .*--start and --frames"
+    ):
+        write_c3d(tmp_path / "long.c3d", ["a"], 0, np.ones((65_536, 1, 3)), 50.0)
+    assert not (tmp_path / "long.c3d").exists()
 
 
 def test_our_own_reader_of_bvh_agrees(tmp_path):

@@ -1,6 +1,6 @@
 """Points as C3D, through ezc3d: millimetres, z up, a residual of -1 where a point is missing.
 
-Source: the C3D file format specification (c3d.org), sections on POINT and its optional X_SCREEN and Y_SCREEN.
+Source: the C3D file format specification (c3d.org), sections on POINT and its optional X_SCREEN and Y_SCREEN, and on the group TRIAL.
 """
 
 from __future__ import annotations
@@ -13,7 +13,12 @@ import numpy as np
 from hmc.errors import InputError
 from hmc.io.files import sibling
 
-__all__ = ["write_c3d"]
+__all__ = ["MOST_FRAMES", "write_c3d"]
+
+#: The header's first and last frame and POINT:FRAMES are words of 16 bits.
+MOST_FRAMES = 65_535
+#: What a parameter of 16-bit integers is in the file.
+_INTEGERS = 2
 
 
 def write_c3d(path: str | Path, labels: Sequence[str], first_frame: int, positions: np.ndarray, fps: float) -> None:
@@ -25,7 +30,8 @@ def write_c3d(path: str | Path, labels: Sequence[str], first_frame: int, positio
     labels : sequence of str
         Of the k points.
     first_frame : int
-        Of the recording, counted from 0; the file counts from 1.
+        Of the recording, counted from 0; the file counts from 1. Where the last frame's number is more than `MOST_FRAMES`, the header
+        begins at 1, and TRIAL:ACTUAL_START_FIELD alone has the first frame's number.
     positions : ndarray, shape (n, k, 3)
         Metres, z up; NaN where missing.
     fps : float
@@ -33,8 +39,13 @@ def write_c3d(path: str | Path, labels: Sequence[str], first_frame: int, positio
     Raises
     ------
     InputError
-        When ezc3d is not installed, or the file cannot be written.
+        When there are more than `MOST_FRAMES` frames, ezc3d is not installed, or the file cannot be written.
     """
+    if len(positions) > MOST_FRAMES:
+        raise InputError(
+            f"{path}: {len(positions)} frames, and a C3D file holds {MOST_FRAMES}; write TRC, or split: make results of fewer frames "
+            "(--start and --frames of hmc pose) and export each"
+        )
     try:
         import ezc3d
     except ImportError:
@@ -47,7 +58,12 @@ def write_c3d(path: str | Path, labels: Sequence[str], first_frame: int, positio
     parameters["UNITS"]["value"], parameters["RATE"]["value"], parameters["LABELS"]["value"] = ["mm"], [fps], list(labels)
     file.add_parameter("POINT", "X_SCREEN", ["+X"])
     file.add_parameter("POINT", "Y_SCREEN", ["+Z"])
-    file["header"]["points"]["first_frame"] = first_frame
+    first, last = first_frame + 1, first_frame + len(positions)
+    for name, number in (("ACTUAL_START_FIELD", first), ("ACTUAL_END_FIELD", last)):
+        # ezc3d makes floating-point numbers of a list; the manual has two words of 16 bits, the lower first.
+        file.add_parameter("TRIAL", name, [0, 0])
+        file["parameters"]["TRIAL"][name] |= {"type": _INTEGERS, "value": np.array([number % 2**16, number // 2**16])}
+    file["header"]["points"]["first_frame"] = first_frame if last <= MOST_FRAMES else 0
     file["data"]["points"] = points
     file["data"]["meta_points"]["residuals"] = np.where(missing.T[None], -1.0, 0.0)
     file["data"]["meta_points"]["camera_masks"] = np.zeros((7, *missing.T.shape), bool)
