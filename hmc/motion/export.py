@@ -36,10 +36,10 @@ class Exported:
 
 @dataclass(frozen=True)
 class _Format:
-    """Whether a format needs states and holds one person a file, and what writes it."""
+    """Whether a format needs states, whether each person is written without regard to the others, and what writes it."""
 
     states: bool
-    one_person: bool
+    apart: bool
     write: Callable[[Path, Sequence[Trajectory]], Exported]
 
 
@@ -91,10 +91,19 @@ def export_trajectories(found: Sequence[Trajectory], out: str | Path, kind: str 
     chosen = FORMATS[kind]
     if chosen.states and any(one.states is None for one in found):
         raise InputError(f"{kind} needs the body's angles, and this result has no pose.npz; trc, c3d, csv and parquet do without")
-    if not chosen.one_person or len(found) == 1:
+    if not chosen.apart or len(found) == 1:
         return chosen.write(out, found)
-    parts = [chosen.write(out.with_stem(f"{out.stem}_person_{one.person}"), [one]) for one in found]
+    parts = [chosen.write(_of_person(out, one), [one]) for one in found]
     return Exported(tuple(path for part in parts for path in part.paths), tuple(note for part in parts for note in part.notes))
+
+
+def _of_person(out: Path, one: Trajectory) -> Path:
+    return out.with_stem(f"{out.stem}_person_{one.person}")
+
+
+def _span(found: Sequence[Trajectory]) -> tuple[int, int]:
+    """The first and the last frame in which anybody is there."""
+    return min(int(one.frames[0]) for one in found), max(int(one.frames[-1]) for one in found)
 
 
 def _trc(path: Path, found: Sequence[Trajectory]) -> Exported:
@@ -105,7 +114,7 @@ def _trc(path: Path, found: Sequence[Trajectory]) -> Exported:
 
 
 def _c3d(path: Path, found: Sequence[Trajectory]) -> Exported:
-    first, last = min(int(one.frames[0]) for one in found), max(int(one.frames[-1]) for one in found)
+    first, last = _span(found)
     labels, parts = [], []
     for one in found:
         names, positions = one.points
@@ -122,10 +131,23 @@ def _c3d(path: Path, found: Sequence[Trajectory]) -> Exported:
 
 
 def _bvh(path: Path, found: Sequence[Trajectory]) -> Exported:
-    (one,) = found
-    tree, states, notes = _moving(one)
-    write_bvh(path, tree, states, one.fps)
-    return Exported((path,), notes)
+    """A file a person. Rows have no times and programs play every file from its first, so all files have the frames of all persons."""
+    first, last = _span(found)
+    paths, notes = [], []
+    for one in found:
+        own = path if len(found) == 1 else _of_person(path, one)
+        tree, states, said = _moving(one)
+        notes += said
+        before, behind = int(one.frames[0]) - first, last - int(one.frames[-1])
+        if before or behind:
+            notes.append(
+                f"person {one.person}: is there in frames {one.frames[0]} to {one.frames[-1]} of the recording, which are rows "
+                f"{before + 1} to {before + len(states)} of {last - first + 1}; the first pose is held before and the last behind, so that "
+                "all BVH files begin and end together"
+            )
+        write_bvh(own, tree, np.pad(states, ((before, behind), (0, 0)), mode="edge"), one.fps)
+        paths.append(own)
+    return Exported(tuple(paths), tuple(notes))
 
 
 def _mot(path: Path, found: Sequence[Trajectory]) -> Exported:
@@ -196,7 +218,7 @@ def _columns(found: Sequence[Trajectory]) -> dict[str, np.ndarray]:
 FORMATS: dict[str, _Format] = {
     "trc": _Format(False, True, _trc),
     "c3d": _Format(False, False, _c3d),
-    "bvh": _Format(True, True, _bvh),
+    "bvh": _Format(True, False, _bvh),
     "mot": _Format(True, True, _mot),
     "glb": _Format(True, False, _glb),
     "csv": _Format(False, False, _csv),

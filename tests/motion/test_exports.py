@@ -167,6 +167,28 @@ def test_our_own_reader_of_bvh_agrees(tmp_path):
     assert file.frame_time_s == pytest.approx(1 / 50)
 
 
+def test_bvh_files_of_several_persons_begin_and_end_together(tmp_path):
+    """Who comes later and leaves earlier holds their pose: a row of a BVH file has no time, so the first rows are played together."""
+    (whole,), (late,) = moving(n=12, first=5).trajectories(), moving(persons=(1,), n=4, first=9).trajectories()
+    written = export_trajectories([whole, late], tmp_path / "two.bvh")
+    assert written.paths == tuple(tmp_path / f"two_person_{k}.bvh" for k in (0, 1))
+    (note,) = written.notes
+    assert note.startswith("person 1: is there in frames 9 to 12 of the recording, which are rows 5 to 8 of 12;")
+    for path, one, rows in zip(written.paths, (whole, late), (range(12), [0] * 4 + [0, 1, 2, 3] + [3] * 4), strict=True):
+        file = read_bvh(path)
+        points = bvh_positions(file)[0][:, [file.names.index(name) for name in LANDMARKS]] / 100
+        assert np.allclose(elsewhere.from_z_forward(points), one.positions[rows], atol=1e-6)
+    alone = export_trajectories([late], tmp_path / "one.bvh")
+    assert alone.paths == (tmp_path / "one.bvh",) and not alone.notes
+    assert len(bvh_positions(read_bvh(tmp_path / "one.bvh"))[0]) == 4
+
+
+def test_gaps_and_held_poses_are_said_each_by_itself(tmp_path):
+    (whole,), (late,) = moving(n=12, first=5).trajectories(), with_gap(moving(persons=(1,), n=5, first=9), [2]).trajectories()
+    gap, held = export_trajectories([whole, late], tmp_path / "two.bvh").notes
+    assert "in 1 of 5 frames" in gap and "frames 9 to 13" in held
+
+
 def test_formats_without_gaps_are_filled_and_say_so(tmp_path):
     (whole,), (one,) = moving().trajectories(), with_gap(moving(), [4, 5]).trajectories()
     written = export_trajectories([one], tmp_path / "walk.bvh")
