@@ -8,10 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from hmc.io.door import read_text_file
+from hmc.errors import InputError
+from hmc.io.door import read_text_file, read_toml_file
 from hmc.io.files import atomic_write
 from hmc.io.new_world import keep_before
 from hmc.io.timing import times_file, write_times
+from hmc.io.toml_lines import says, statements
 
 __all__ = ["with_first_frames", "write_new_timing"]
 
@@ -34,6 +36,11 @@ def write_new_timing(path: Path, first_frames: Mapping[str, int], times: Mapping
     -------
     list of str
         What was written and kept.
+
+    Raises
+    ------
+    InputError
+        When ``recording.toml`` is no TOML, or is written so that more than ``first_frame`` would change; nothing is written then.
     """
     lines = []
     path.mkdir(parents=True, exist_ok=True)  # a trial whose videos lie elsewhere has no folder of its own yet
@@ -41,6 +48,7 @@ def write_new_timing(path: Path, first_frames: Mapping[str, int], times: Mapping
     text = read_text_file(file) if file.is_file() else ""
     new = with_first_frames(text, first_frames, zeros)
     if new != text:
+        _refuse_other_changes(file, new, first_frames)
         kept = f"; kept what was there: {keep_before(file)}" if file.is_file() else ""
         with atomic_write(file) as target:
             target.write(new)
@@ -57,29 +65,35 @@ def with_first_frames(text: str, first_frames: Mapping[str, int], zeros: bool = 
     """``recording.toml`` with another ``first_frame``, or, unless `zeros` are asked for, without where all are 0; all else as it was."""
     kept: list[str] = []
     place = None
-    depth, inside, table = 0, False, False
-    for line in text.splitlines(keepends=True):
-        bare = line.split("#")[0]
-        header = re.match(r"\s*\[\s*([^\]]*?)\s*\]", bare) if not depth else None
-        if header:
-            inside = header[1].strip("\"'") == "first_frame"
-            if not table and not inside and place is None:
-                place = len(kept)  # a key must stand before the first table
-            table = True
-        own = depth > 0 or inside or (not table and re.match(r"\s*[\"']?first_frame[\"']?\s*[=.]", bare))
-        if own:
-            depth = max(0, depth + bare.count("{") - bare.count("}")) if not inside else 0
-            if not table and place is None:
-                place = len(kept)
-        else:
-            kept.append(line)
-    named = ", ".join(f"{_key(name)} = {first}" for name, first in first_frames.items())
+    for one in statements(text):
+        comment = one.key is None and not one.header
+        old = not comment and "first_frame" in (one.table, one.key if one.table is None else None)
+        if place is None and (one.header or (old and one.table is None)):
+            place = len(kept)  # where it stood; a key must stand before the first table
+        if not old:
+            kept.append(one.text)
     if zeros or any(first_frames.values()):
-        place = len(kept) if place is None or (table and place > len(kept)) else place
+        place = len(kept) if place is None else place
         if place and not kept[place - 1].endswith("\n"):
             kept[place - 1] += "\n"
-        kept.insert(place, f"first_frame = {{ {named} }}\n")
+        kept.insert(place, _first_frame_line(first_frames))
     return "".join(kept)
+
+
+def _first_frame_line(first_frames: Mapping[str, int]) -> str:
+    named = ", ".join(f"{_key(name)} = {first}" for name, first in first_frames.items())
+    return f"first_frame = {{ {named} }}\n"
+
+
+def _refuse_other_changes(file: Path, new: str, first_frames: Mapping[str, int]) -> None:
+    """Refuse a new text that says more or less than the file does, but for ``first_frame``."""
+    wanted = read_toml_file(file) if file.is_file() else {}
+    wanted.pop("first_frame", None)
+    if not says(new, wanted | {"first_frame": dict(first_frames)}) and (any(first_frames.values()) or not says(new, wanted)):
+        raise InputError(
+            f"{file}: `first_frame` cannot be changed in it without changing more, so nothing is written; put this line before its "
+            f"first table, in the place of any `first_frame` that it has: {_first_frame_line(first_frames).strip()}"
+        )
 
 
 def _key(name: str) -> str:

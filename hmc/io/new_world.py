@@ -8,8 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from hmc.camera.model import Rig
+from hmc.errors import InputError
 from hmc.io.calibration import write_calibration
-from hmc.io.door import read_text_file
+from hmc.io.door import read_text_file, read_toml_file
+from hmc.io.toml_lines import says, statements
 
 __all__ = ["keep_before", "write_new_world", "write_session_world"]
 
@@ -33,20 +35,26 @@ def write_new_world(path: Path, rig: Rig) -> list[str]:
     -------
     list of str
         What was written and kept.
+
+    Raises
+    ------
+    InputError
+        When ``recording.toml`` is no TOML, or is written so that more would change than is to be taken out; nothing is written then.
     """
     lines = []
     target, settings = path / "calibration.toml", path / "recording.toml"
+    text = read_text_file(settings) if settings.is_file() else ""
+    new, taken = without_old_terms(text)
+    if settings.is_file():
+        _refuse_other_changes(settings, new)
     if target.exists():
         lines.append(f"kept what was there: {keep_before(target)}")
     write_calibration(target, rig)
     lines.insert(0, f"written: {target}")
-    if settings.is_file():
-        text = read_text_file(settings)
-        new, taken = without_old_terms(text)
-        if taken:
-            kept = keep_before(settings)
-            settings.write_text(new, encoding="utf-8")
-            lines.append(f"{settings}: {', '.join(f'`{key}`' for key in taken)} of the old world taken out; kept what was there: {kept}")
+    if taken:
+        kept = keep_before(settings)
+        settings.write_text(new, encoding="utf-8")
+        lines.append(f"{settings}: {', '.join(f'`{key}`' for key in taken)} of the old world taken out; kept what was there: {kept}")
     return lines
 
 
@@ -87,15 +95,20 @@ def keep_before(file: Path) -> Path:
 
 def without_old_terms(text: str) -> tuple[str, list[str]]:
     """``recording.toml`` with the old world's terms as comments, and which they were."""
-    lines, taken, open_brackets, inside_table = [], [], 0, False
-    for line in text.splitlines():
-        bare = line.split("#")[0]
-        start = re.match(r"\s*([A-Za-z_]+)\s*=", bare)
-        inside_table = inside_table or bool(re.match(r"\s*\[[A-Za-z_]", bare) and not open_brackets)
-        if open_brackets or (start and start[1] in OLD_TERMS and not inside_table):
-            if not open_brackets and start:
-                taken.append(start[1])
-            open_brackets = max(0, open_brackets + bare.count("[") - bare.count("]"))
-            line = f"# of the world before: {line}"
-        lines.append(line)
-    return "\n".join(lines) + "\n", taken
+    lines: list[str] = []
+    taken: list[str] = []
+    for one in statements(text if text.endswith("\n") else text + "\n"):
+        old = one.table is None and one.key in OLD_TERMS
+        if old and one.key:
+            taken.append(one.key)
+        lines += [f"# of the world before: {line}" if old else line for line in re.findall(".*\n", one.text)]
+    return "".join(lines), taken
+
+
+def _refuse_other_changes(file: Path, new: str) -> None:
+    """Refuse a new text that says more or less than the file does, but for the old world's terms."""
+    if not says(new, {key: value for key, value in read_toml_file(file).items() if key not in OLD_TERMS}):
+        raise InputError(
+            f"{file}: {', '.join(f'`{key}`' for key in OLD_TERMS)} of the old world cannot be taken out of it without changing more, so "
+            "nothing is written; write each as KEY = VALUE, without quotes around the key, before the first table, and run this again"
+        )

@@ -22,7 +22,7 @@ from hmc.check.world_findings import floor_lines
 from hmc.cli import main
 from hmc.errors import InputError
 from hmc.io.calibration import read_calibration, write_calibration
-from hmc.io.new_world import without_old_terms
+from hmc.io.new_world import without_old_terms, write_new_world
 
 FIRST = Rotation.from_euler("zyx", (100, 25, 110), degrees=True).as_matrix()
 WORLDS = {
@@ -329,3 +329,14 @@ def test_old_terms_become_comments():
     assert taken == ["room", "units"]
     assert tomllib.loads(new) == {"name": "a", "fps": 30, "first_frame": {"up": 3}}
     assert all(line.removeprefix("# of the world before: ") == old for line, old in zip(new.splitlines(), text.splitlines(), strict=True))
+
+
+def test_old_terms_end_where_their_value_ends(ring, tmp_path):
+    """Brackets in quotes and comments are none, and tables of any form end what holds for all of the recording."""
+    text = "up = '[' # [\nroom = [ # ]\n  [0, 0, 0], [1, 1, 2]]\nfps = 30\n[[\"x\"]]\nroom = 3\n"
+    new, taken = without_old_terms(text)
+    assert taken == ["up", "room"] and tomllib.loads(new) == {"fps": 30, "x": [{"room": 3}]}
+    (tmp_path / "recording.toml").write_text('"r\\u006fom" = [[0, 0, 0], [1, 1, 2]]\n')
+    with pytest.raises(InputError, match=r"recording\.toml: `room`, `units`, `up` of the old world cannot be taken out"):
+        write_new_world(tmp_path, ring)
+    assert [file.name for file in tmp_path.iterdir()] == ["recording.toml"]

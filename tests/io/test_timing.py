@@ -246,6 +246,47 @@ def test_only_the_first_frames_change(text):
     assert tomllib.loads(with_first_frames(new, {"cam_00": 0}, zeros=True)) == {**before, "first_frame": {"cam_00": 0}}
 
 
+@pytest.mark.parametrize(
+    ("text", "new"),
+    [
+        ("room = [\n  [0, 0, 0],\n  [1, 1, 2],\n]\nfps = 30\n", "room = [\n  [0, 0, 0],\n  [1, 1, 2],\n]\nfps = 30\nFIRST"),
+        (
+            "room = [\n [0, 0, 0],\n [1, 1, 2],\n]\nfirst_frame = { a = 2 }\nfps = 30",
+            "room = [\n [0, 0, 0],\n [1, 1, 2],\n]\nFIRSTfps = 30",
+        ),
+        ("fps = 30\n[first_frame]\na = 3\n[background]\na = 'x'\n", "fps = 30\nFIRST[background]\na = 'x'\n"),
+        ("[background]\na = 'x'\n[first_frame]\na = 3\n", "FIRST[background]\na = 'x'\n"),
+        ("[first_frame]\na = 3\n\n# the empty scene\n[background]\na = 'x'\n", "FIRST\n# the empty scene\n[background]\na = 'x'\n"),
+        ("name = 'a # {b'\nfirst_frame.a = 3\nfps = 30\n", "name = 'a # {b'\nFIRSTfps = 30\n"),
+        ('name = """\n[first_frame]\na = "b" # {\n"""\nfps = 30\n', 'name = """\n[first_frame]\na = "b" # {\n"""\nfps = 30\nFIRST'),
+        ('name = "\\"[" # "\nfps = 30\n["videos"]\na = "b"\n', 'name = "\\"[" # "\nfps = 30\nFIRST["videos"]\na = "b"\n'),
+        (
+            "room = [ # ] of the room\n[0, 0, 0], [1, 1, 2]]\r\nfps = 30\r\n",
+            "room = [ # ] of the room\n[0, 0, 0], [1, 1, 2]]\r\nfps = 30\r\nFIRST",
+        ),
+        ("[videos]\nfirst_frame = 'v.mp4'\n", "FIRST[videos]\nfirst_frame = 'v.mp4'\n"),
+    ],
+)
+def test_first_frames_stand_before_the_first_table_and_in_no_array(tmp_path, text, new):
+    """A row of an array was taken for a table, and a key behind the table `first_frame` for one of the next."""
+    file = tmp_path / "recording.toml"
+    file.write_bytes(text.encode())
+    write_new_timing(tmp_path, {"a": 0, "b": 5}, {})
+    assert file.read_bytes().decode() == new.replace("FIRST", "first_frame = { a = 0, b = 5 }\n")
+    assert tomllib.loads(file.read_text()) == tomllib.loads(text) | {"first_frame": {"a": 0, "b": 5}}
+    assert (tmp_path / "recording_before.toml").read_bytes() == text.encode()
+
+
+def test_a_text_in_which_more_would_change_stays_as_it_is(tmp_path):
+    text = '"first\\u005fframe" = { a = 2 }\nfps = 30\n'
+    (tmp_path / "recording.toml").write_text(text)
+    assert tomllib.loads(text)["first_frame"] == {"a": 2}
+    words = r"recording\.toml: `first_frame` cannot be changed .* put this line before .*: first_frame = \{ a = 0, b = 5 \}$"
+    with pytest.raises(InputError, match=words):
+        write_new_timing(tmp_path, {"a": 0, "b": 5}, {"c": np.array([0.0, 0.1])})
+    assert [file.name for file in tmp_path.iterdir()] == ["recording.toml"] and (tmp_path / "recording.toml").read_text() == text
+
+
 def test_what_was_there_is_kept(tmp_path):
     (tmp_path / "recording.toml").write_text("fps = 30\n")
     lines = write_new_timing(tmp_path, {"a": 0, "b": 2}, {"c": np.array([0.0, 0.1])})
