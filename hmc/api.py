@@ -335,6 +335,12 @@ def view(found: PosedPeople | TrackTable, recording: Recording, out: str | Path,
     frames : sequence of int
         Of a picture; by default one in the middle.
 
+    Raises
+    ------
+    InputError
+        When the ending is of none of these, a frame is not in the recording, the file cannot be written, or it is, or would lie among, the
+        recording's own files.
+
     Examples
     --------
     >>> import hmc, pathlib, tempfile
@@ -344,9 +350,12 @@ def view(found: PosedPeople | TrackTable, recording: Recording, out: str | Path,
     ...     pathlib.Path(folder, "tracks.png").is_file()
     True
     """
+    from hmc.io.own_files import refuse_own_file
+    from hmc.io.places import places_of
     from hmc.view.mosaic import Result, with_bodies
     from hmc.view.write import write_view
 
+    refuse_own_file(out, places_of(recording))
     result = Result(tracks=found) if isinstance(found, TrackTable) else with_bodies(Result(found.poses, turned=found.turned), found.states)
     write_view(out, recording, result, frames)
 
@@ -385,7 +394,7 @@ def export(
     ------
     InputError
         When the frames a second are not known, there is no such format, it needs angles that there are not, there are more frames than
-        it holds (C3D), or a package is missing.
+        it holds (C3D), a package is missing, or the file is one of the result's own.
 
     Examples
     --------
@@ -395,10 +404,13 @@ def export(
     ...     [path.name for path in hmc.export(people, f"{folder}/walk.mot")]
     ['walk.mot', 'walk.osim']
     """
+    from hmc.io.own_files import refuse_result_file
     from hmc.motion.export import export_trajectories
     from hmc.motion.gaps import fill_trajectory
     from hmc.motion.trajectory import chosen, read_trajectories
 
+    if isinstance(found, str | Path):
+        refuse_result_file(out, found)
     people = read_trajectories(found, fps, person) if isinstance(found, str | Path) else chosen(found.trajectories(fps), person, "export")
     return list(export_trajectories([fill_trajectory(one, fill, max_gap_s) for one in people], out).paths)
 

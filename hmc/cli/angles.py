@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import argparse
 
-from hmc.cli.common import output_path, refuse_result_file
+from hmc.cli.common import output_path
 from hmc.cli.export import add_result_options, read_result_asked
+from hmc.io.own_files import refuse_result_file
 
 __all__ = ["add_parser", "run"]
 
@@ -29,7 +30,8 @@ def run(args: argparse.Namespace) -> int:
     from hmc.io.export.tables import write_csv
     from hmc.motion.clinical import angle_table
 
-    refuse_result_file(args.out, args.result)
+    if args.out is not None:
+        refuse_result_file(args.out, args.result)
     suffixes = (".png", ".pdf", ".svg")
     if args.plot is not None and args.plot.suffix.lower() not in suffixes:
         raise InputError(f"{args.plot}: a plot is one of {', '.join(suffixes)}")

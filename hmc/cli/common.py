@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from hmc.io.files import real_path
-from hmc.io.result_files import BESIDE, RESULT, UNFINISHED
+from hmc.io.result_files import UNFINISHED
 
 if TYPE_CHECKING:
     from hmc.io.camera_faults import CameraFault
@@ -40,8 +40,6 @@ __all__ = [
     "print_problems",
     "progress",
     "recording_source",
-    "refuse_own_file",
-    "refuse_result_file",
     "selected_workers",
     "unlike_its_run",
     "was_finished",
@@ -227,32 +225,6 @@ def output_path(text: str) -> Path:
     if odd or not text:
         raise argparse.ArgumentTypeError(f"{text!r}: names of files and folders may not begin with - or have blanks around them")
     return path
-
-
-def refuse_own_file(out: Path, places) -> None:
-    """Refuse to write a picture or a video in the place of a recording's own file, or among those of its cameras.
-
-    Raises
-    ------
-    InputError
-    """
-    from hmc.errors import InputError
-
-    if places.has(out):
-        raise InputError(f"--out {out}: is, or would lie among, the recording's own files; choose another place")
-
-
-def refuse_result_file(out: Path | None, result: Path) -> None:
-    """Refuse to write what is made of a result in the place of one of its own files.
-
-    Raises
-    ------
-    InputError
-    """
-    from hmc.errors import InputError
-
-    if out is not None and out.name in (*RESULT, *BESIDE) and real_path(out.parent) == real_path(result):
-        raise InputError(f"{out}: is the result's own file; choose another name")
 
 
 def whole_number(text: str) -> int:

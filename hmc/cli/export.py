@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from hmc.cli.common import output_path, positive_float, print_problems, refuse_result_file, unlike_its_run, whole_number
+from hmc.cli.common import output_path, positive_float, print_problems, unlike_its_run, whole_number
+from hmc.io.own_files import refuse_result_file
 
 __all__ = ["add_parser", "add_result_options", "read_result_asked", "run"]
 
@@ -77,7 +78,8 @@ def run(args: argparse.Namespace) -> int:
 
     if args.max_gap is not None and args.fill == "none":
         raise InputError("--max-gap is of --fill linear or spline: give that too, or take it out")
-    refuse_result_file(args.out, args.result)
+    if args.out is not None:
+        refuse_result_file(args.out, args.result)
     found = [fill_trajectory(one, args.fill, args.max_gap) for one in read_result_asked(args)]
     written = export_trajectories(found, args.out or args.result / f"motion.{args.to}", args.to)
     print_problems(written.notes)

@@ -5,8 +5,9 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from hmc.cli.common import add_session_option, given_places, output_path, positive_float, refuse_own_file, whole_number
+from hmc.cli.common import add_session_option, given_places, output_path, positive_float, whole_number
 from hmc.io.files import real_path
+from hmc.io.own_files import refuse_own_file
 
 __all__ = ["add_parser", "run"]
 

@@ -13,11 +13,11 @@ from hmc.cli.common import (
     positive_float,
     print_problems,
     progress,
-    refuse_own_file,
     unlike_its_run,
     whole_number,
 )
 from hmc.errors import InputError
+from hmc.io.own_files import refuse_own_file
 
 __all__ = ["add_parser", "run"]
 

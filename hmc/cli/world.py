@@ -8,8 +8,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hmc.cli.common import add_session_option, given_places, output_path, positive_float, refuse_own_file
+from hmc.cli.common import add_session_option, given_places, output_path, positive_float
 from hmc.io.files import real_path
+from hmc.io.own_files import refuse_own_file
 
 if TYPE_CHECKING:
     from hmc.camera.model import Rig

@@ -17,6 +17,7 @@ from hmc.body.model import neutral_state
 from hmc.body.proportions import default_body
 from hmc.camera.model import project
 from hmc.io.detections import DetectionTable
+from hmc.io.results import TrackTable
 from hmc.pose import registry
 from hmc.tracking import trackers
 
@@ -69,6 +70,30 @@ def test_what_cannot_be_done_is_said(tmp_path):
     tracks = hmc.track(recording)
     with pytest.raises(hmc.InputError, match=r"must end in \.png"):
         hmc.view(tracks, recording, tmp_path / "picture.txt")
+
+
+@pytest.mark.parametrize("out", ["videos/cam_00.avi", "videos/new.png", "calibration.toml"])
+def test_no_view_takes_the_place_of_a_recording_s_file(recording_folder, out):
+    """`hmc.view(tracks, recording, "RECORDING/videos/cam_00.mp4")` wrote over what was filmed; the command refused."""
+    before = {file: file.read_bytes() for file in recording_folder.rglob("*") if file.is_file()}
+    recording = hmc.open_recording(recording_folder, frames=2)
+    tracks = TrackTable(np.zeros(1, int), np.zeros(1, int), np.array([[0.0, 0.0, 1.0]]))
+    with pytest.raises(ValueError, match="the recording's own files; choose another place"):
+        hmc.view(tracks, recording, str(recording_folder / out))
+    assert {file: file.read_bytes() for file in recording_folder.rglob("*") if file.is_file()} == before
+    hmc.view(tracks, recording, recording_folder / "tracks.png")
+    assert (recording_folder / "tracks.png").is_file()
+
+
+def test_no_export_takes_the_place_of_a_result_s_file(tmp_path, monkeypatch):
+    text = "frame,person,joint,x,y,z\n0,0,pelvis,0,0,1\n"
+    (tmp_path / "two").mkdir()
+    (tmp_path / "two" / "joints.csv").write_text(text)
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ValueError, match="is the result's own file; choose another name"):
+        hmc.export("two", tmp_path / "two" / "joints.csv", fps=15)
+    assert (tmp_path / "two" / "joints.csv").read_text() == text
+    assert hmc.export("two", "two/table.csv", fps=15) == [Path("two/table.csv")]
 
 
 @pytest.mark.parametrize("smooth_s", [-0.1, float("nan"), float("inf")])
