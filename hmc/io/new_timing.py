@@ -10,9 +10,8 @@ import numpy as np
 
 from hmc.errors import InputError
 from hmc.io.door import read_text_file, read_toml_file
-from hmc.io.files import atomic_write
-from hmc.io.new_world import keep_before
-from hmc.io.timing import times_file, write_times
+from hmc.io.keeping import write_keeping
+from hmc.io.timing import times_file, times_text
 from hmc.io.toml_lines import says, statements
 
 __all__ = ["with_first_frames", "write_new_timing"]
@@ -40,25 +39,21 @@ def write_new_timing(path: Path, first_frames: Mapping[str, int], times: Mapping
     Raises
     ------
     InputError
-        When ``recording.toml`` is no TOML, or is written so that more than ``first_frame`` would change; nothing is written then.
+        When ``recording.toml`` is no TOML, or is written so that more than ``first_frame`` would change, or a file cannot be written;
+        all is as it was then.
     """
-    lines = []
-    path.mkdir(parents=True, exist_ok=True)  # a trial whose videos lie elsewhere has no folder of its own yet
     file = path / "recording.toml"
     text = read_text_file(file) if file.is_file() else ""
     new = with_first_frames(text, first_frames, zeros)
+    texts, said = {}, {}
     if new != text:
         _refuse_other_changes(file, new, first_frames)
-        kept = f"; kept what was there: {keep_before(file)}" if file.is_file() else ""
-        with atomic_write(file) as target:
-            target.write(new)
-        lines.append(f"written: `first_frame` of {file}{kept}")
+        texts[file], said[file] = new, f"`first_frame` of {file}"
     for name, seconds in times.items():
         own = times_file(path, name)
-        kept = f"; kept what was there: {keep_before(own)}" if own.is_file() else ""
-        write_times(own, seconds)
-        lines.append(f"written: {own}{kept}")
-    return lines
+        texts[own], said[own] = times_text(seconds), str(own)
+    before = write_keeping(texts)
+    return [f"written: {said[one]}" + (f"; kept what was there: {kept}" if kept else "") for one, kept in before.items()]
 
 
 def with_first_frames(text: str, first_frames: Mapping[str, int], zeros: bool = False) -> str:

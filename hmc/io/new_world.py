@@ -9,11 +9,12 @@ from typing import Any
 
 from hmc.camera.model import Rig
 from hmc.errors import InputError
-from hmc.io.calibration import write_calibration
+from hmc.io.calibration.toml import calibration_text
 from hmc.io.door import read_text_file, read_toml_file
+from hmc.io.keeping import write_keeping
 from hmc.io.toml_lines import says, statements
 
-__all__ = ["keep_before", "write_new_world", "write_session_world"]
+__all__ = ["write_new_world", "write_session_world"]
 
 #: Of recording.toml: what is said in the old world's terms.
 OLD_TERMS = ("room", "units", "up")
@@ -39,22 +40,20 @@ def write_new_world(path: Path, rig: Rig) -> list[str]:
     Raises
     ------
     InputError
-        When ``recording.toml`` is no TOML, or is written so that more would change than is to be taken out; nothing is written then.
+        When ``recording.toml`` is no TOML, or is written so that more would change than is to be taken out, or a file cannot be
+        written; all is as it was then.
     """
-    lines = []
     target, settings = path / "calibration.toml", path / "recording.toml"
-    text = read_text_file(settings) if settings.is_file() else ""
-    new, taken = without_old_terms(text)
+    texts, taken = {target: calibration_text(rig)}, list[str]()
     if settings.is_file():
+        new, taken = without_old_terms(read_text_file(settings))
         _refuse_other_changes(settings, new)
-    if target.exists():
-        lines.append(f"kept what was there: {keep_before(target)}")
-    write_calibration(target, rig)
-    lines.insert(0, f"written: {target}")
+        texts |= {settings: new} if taken else {}
+    before = write_keeping(texts)
+    lines = [f"written: {target}", *_kept_lines(before[target])]
     if taken:
-        kept = keep_before(settings)
-        settings.write_text(new, encoding="utf-8")
-        lines.append(f"{settings}: {', '.join(f'`{key}`' for key in taken)} of the old world taken out; kept what was there: {kept}")
+        terms = ", ".join(f"`{key}`" for key in taken)
+        lines.append(f"{settings}: {terms} of the old world taken out; {_kept_lines(before[settings])[0]}")
     return lines
 
 
@@ -74,23 +73,22 @@ def write_session_world(session: Path, rig: Rig, settings: Mapping[str, Any]) ->
     -------
     list of str
         What was written, and what to change in the session's file.
+
+    Raises
+    ------
+    InputError
+        When it cannot be written; all is as it was then.
     """
     folder = session if session.is_dir() else session.parent
     target = folder / "calibration_world.toml"
-    lines = [f"kept what was there: {keep_before(target)}"] if target.exists() else []
-    write_calibration(target, rig)
+    lines = _kept_lines(write_keeping({target: calibration_text(rig)})[target])
     old = [key for key in OLD_TERMS if key in settings]
     also = f", and take {', '.join(f'`{key}`' for key in old)} of the old world out of its [recording]" if old else ""
     return [f"written: {target}", *lines, f'now say calibration = "{target.name}" in the session\'s file{also}: it holds for all trials']
 
 
-def keep_before(file: Path) -> Path:
-    """Rename a file to a name that is free, and tell it."""
-    for n in range(1, 1000):
-        kept = file.with_stem(f"{file.stem}_before{'' if n == 1 else f'_{n}'}")
-        if not kept.exists():
-            return file.rename(kept)
-    raise FileExistsError(file)
+def _kept_lines(kept: Path | None) -> list[str]:
+    return [] if kept is None else [f"kept what was there: {kept}"]
 
 
 def without_old_terms(text: str) -> tuple[str, list[str]]:

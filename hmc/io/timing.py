@@ -17,7 +17,7 @@ from hmc.io.door import MAX_FRAME_NUMBER, check_folder, read_text_file
 from hmc.io.files import atomic_write
 from hmc.io.footage import Footage, stamps
 
-__all__ = ["NO_FRAME", "go_by_time", "nearest_frames", "rates_differ", "read_times", "times_file", "write_times"]
+__all__ = ["NO_FRAME", "go_by_time", "nearest_frames", "rates_differ", "read_times", "times_file", "times_text", "write_times"]
 
 #: In place of a frame's number: the camera has none.
 NO_FRAME = -1
@@ -112,7 +112,12 @@ def read_times(file: Path) -> np.ndarray | None:
 def write_times(file: Path, times: np.ndarray) -> None:
     """Write the times, (n,) seconds, as `read_times` reads them."""
     with atomic_write(file) as target:
-        target.write(HEAD + "\n" + "".join(f"{frame},{time:.6f}\n" for frame, time in enumerate(times) if np.isfinite(time)))
+        target.write(times_text(times))
+
+
+def times_text(times: np.ndarray) -> str:
+    """What `write_times` writes of times, shape (n,), seconds; NaN are left out."""
+    return HEAD + "\n" + "".join(f"{frame},{time:.6f}\n" for frame, time in enumerate(times) if np.isfinite(time))
 
 
 def go_by_time(path: Path, views: Mapping[str, Footage], fps: float, by_stamps: bool, starts: Mapping[str, int]) -> dict[str, np.ndarray]:

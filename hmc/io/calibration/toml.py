@@ -16,8 +16,9 @@ from hmc.io.calibration.caliscope import caliscope_tables
 from hmc.io.calibration.entry import CalibrationEntry, natural_key
 from hmc.io.calibration.text import as_numbers, listed
 from hmc.io.door import read_toml_file
+from hmc.io.files import atomic_write
 
-__all__ = ["read_toml", "write_calibration"]
+__all__ = ["calibration_text", "read_toml", "write_calibration"]
 
 KEYS = ("size", "matrix", "distortions", "rotation", "translation")
 
@@ -81,8 +82,21 @@ def write_calibration(path: str | Path, rig: Iterable[Camera]) -> None:
     Parameters
     ----------
     path : str or Path
+        It appears when it is complete; folders are made.
     rig : Rig or iterable of Camera
+
+    Raises
+    ------
+    InputError
+        When it cannot be written; a file that was there is as it was.
     """
+    text = calibration_text(rig)
+    with atomic_write(path) as file:
+        file.write(text)
+
+
+def calibration_text(rig: Iterable[Camera]) -> str:
+    """What `write_calibration` writes of a rig."""
     blocks = []
     for camera in rig:
         distortions = camera.distortions if camera.distortions[4] else camera.distortions[:4]
@@ -97,7 +111,7 @@ def write_calibration(path: str | Path, rig: Iterable[Camera]) -> None:
             f"translation = {_numbers(camera.translation)}\n"
             f"fisheye = false\n"
         )
-    Path(path).write_text("\n".join(blocks), encoding="utf-8")
+    return "\n".join(blocks)
 
 
 def _key(name: str) -> str:
