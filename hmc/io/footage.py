@@ -69,6 +69,8 @@ class Footage:
         Frames of the file before frame 0, of a camera that began before the others.
     places : tuple of int, or None
         Of a camera that goes by time (`hmc.io.timing`): the frame of the file for each frame, -1 where it has none.
+    first_number : int
+        What the names of numbered images call the first frame of the files; 0 of a video, and of images that are counted in their order.
     arrays : sequence of ndarray or None, optional
         The frames themselves, where they are in memory: images (h, w, 3), or silhouettes (h, w) of bool or uint8. `path` is then a name.
     """
@@ -82,6 +84,7 @@ class Footage:
     skipped: int = 0
     arrays: Sequence[np.ndarray | None] | np.ndarray | None = field(default=None, repr=False, compare=False)
     places: tuple[int, ...] | None = None
+    first_number: int = 0
 
     def in_file(self, frame: int) -> int | None:
         """Which frame of the file a frame is, counted from the file's beginning; None where the camera took none."""
@@ -303,7 +306,7 @@ def _footage_of_images(path: Path, images: dict[int, Path], first_number: int = 
             continue
         if image is not None:
             _refuse_unlike(file, image)
-            return Footage(path, max(images) + 1, (image.shape[1], image.shape[0]), images)
+            return Footage(path, max(images) + 1, (image.shape[1], image.shape[0]), images, first_number=first_number)
     raise InputError(f"{path}: none of its {len(images)} images can be read; copy or convert them again")
 
 

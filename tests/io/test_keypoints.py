@@ -1,11 +1,13 @@
 """Keypoints of other programs: every form is read alike, ordinary gaps are no errors, and what is broken is one line."""
 
 import json
+import shutil
 import tempfile
 from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import write_images
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
@@ -226,6 +228,26 @@ def test_frames_count_as_the_recording_does(recording_folder):
     source = open_keypoints(hmc.open_recording(recording_folder, start=1))
     assert [len(view) for view in source.frame(0)] == [1, 0, 0, 0, 0] and [len(view) for view in source.frame(2)] == [0, 1, 0, 0, 0]
     assert last_number("cam_00_000000000012_keypoints") == 12 and last_number("cam") is None
+
+
+@pytest.mark.parametrize(
+    ("name", "first"), [("frame{:04d}_cam{camera}.png", 0), ("{:06d}.png", 1), ("{:06d}.png", 100), ("take_7_{:03d}_b.png", 3)]
+)
+def test_frames_count_as_images_are_counted(recording_folder, name, first):
+    """By the images' numbers where those tell frames apart, else by their order: a camera's number in a name moves nothing."""
+    shutil.rmtree(recording_folder / "videos")
+    for camera in range(5):
+        numbers = range(first, first + 4)
+        folder = recording_folder / "images" / f"cam_{camera:02d}"
+        write_images(folder, numbers, (160, 120), lambda number: 40, name=name.replace("{camera}", str(camera)))
+        rows = [f"{number},{joint},{10 * (number - first) + 1},5,0.9" for number in numbers for joint in ("nose", "left_hip")]
+        put(recording_folder / "keypoints" / f"cam_{camera:02d}.csv", "\n".join(["frame,keypoint,x,y,confidence", *rows]))
+    for camera_first in (0, 2):
+        put(recording_folder / "recording.toml", f"first_frame = {{ cam_01 = {camera_first} }}\n")
+        source = open_keypoints(hmc.open_recording(recording_folder))
+        for frame in range(4 - camera_first):
+            shown = [10 * frame + 1, 10 * (frame + camera_first) + 1, *[10 * frame + 1] * 3]
+            assert [view[0, NOSE, 0] for view in source.frame(frame)] == shown
 
 
 def test_none(recording_folder):

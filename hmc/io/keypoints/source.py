@@ -198,7 +198,7 @@ def open_keypoints(recording: Recording) -> KeypointSource | None:
             if item is not None and reader is not None and (share := reader.outside) > MOST_OUTSIDE:
                 outside.append(_line_outside(item, camera.name, share, size))
             readers.append(reader)
-            offsets.append(first + _offset(view))
+            offsets.append(first + (0 if view is None else view.first_number))
         present = tuple(item is not None for item in found)
         own = recording._own_views
         return KeypointSource(folder, rig.names, present, recording.factors, tuple(readers), tuple(offsets), own, _outside=tuple(outside))
@@ -242,16 +242,6 @@ def _item_of(camera: str, items: Sequence[Path]) -> Path | None:
 def _is_table_of(camera: str, item: Path) -> bool:
     suffix = item.suffix.lower()
     return (item.stem == camera and suffix in TABLE_SUFFIXES) or (suffix == ".csv" and item.stem.startswith(f"{camera}DLC"))
-
-
-def _offset(footage: Footage | None) -> int:
-    """The number that a detector gives frame 0 of the camera's files: that of the image, or 0 of a video."""
-    if footage is not None and footage.images:
-        frame, path = next(iter(footage.images.items()))
-        number, place = last_number(path.stem), footage.in_file(frame)
-        if number is not None and place is not None:
-            return number - place
-    return 0
 
 
 def _reader(item: Path, size: tuple[int, int]) -> tuple[_Folder | _Table, int]:
