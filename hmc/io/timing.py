@@ -69,12 +69,13 @@ def read_times(file: Path) -> np.ndarray | None:
     Parameters
     ----------
     file : Path
-        ``frame,time_s``: frames counted as in the files, from 0 or as images are numbered, and seconds on a clock that all cameras share.
+        ``frame,time_s``: a frame's number in the camera's files (of images, their own numbers or counted from 0: `go_by_time` tells), and
+        seconds on a clock that all cameras share.
 
     Returns
     -------
     ndarray, shape (n,), or None
-        Seconds, by frame; NaN of frames that are not in it. None where there is no such file.
+        Seconds, by the file's numbers; NaN of frames that are not in it. None where there is no such file.
 
     Raises
     ------
@@ -144,7 +145,7 @@ def go_by_time(path: Path, views: Mapping[str, Footage], fps: float, by_stamps: 
     Raises
     ------
     InputError
-        When a file of times is wrong, or contradicts `first_frame`.
+        When a file of times is wrong, has frames that the camera's files have not, or contradicts `first_frame`.
     """
     found = {}
     for name, view in views.items():
@@ -155,16 +156,17 @@ def go_by_time(path: Path, views: Mapping[str, Footage], fps: float, by_stamps: 
                 raise InputError(
                     f"{file}: tells when frames were taken, and so does `first_frame` of recording.toml for '{name}'; leave one"
                 )
-            _refuse_far(file, times[: view.n_frames], fps)
-            _refuse_other_unit(file, times[: view.n_frames], fps)
+            times = _from_first_frame(file, times, view)
+            _refuse_far(file, times, fps)
+            _refuse_other_unit(file, times, fps)
             in_frames = times * fps
-            if not (nearest_frames(in_frames[: view.n_frames]) >= 0).any():
+            if not (nearest_frames(in_frames) >= 0).any():
                 low, high = np.nanmin(times), np.nanmax(times)
                 raise InputError(
                     f"{file}: no frame was taken from 0 s on, when the recording begins (its times are {low:g} to {high:g} s); "
                     "give seconds from the recording's first frame on"
                 )
-            found[name] = in_frames[: view.n_frames]
+            found[name] = in_frames
         elif view.images is None and (by_stamps or _is_odd(view.fps)):
             seconds = stamps(view)
             even = np.arange(len(seconds)) / (view.fps or fps)
@@ -173,6 +175,30 @@ def go_by_time(path: Path, views: Mapping[str, Footage], fps: float, by_stamps: 
                 _refuse_far(view.path, seconds - seconds[first], fps)
                 found[name] = (seconds - seconds[first]) * fps
     return found
+
+
+def _from_first_frame(file: Path, times: np.ndarray, view: Footage) -> np.ndarray:
+    """Times by frames counted from 0, of those by the numbers of a table: these count from 0 too or, of numbered images, as they do.
+
+    Where either may be meant, that counts which more images bear; a frame that is not there would silently move all others.
+    """
+    rows, first, n = np.flatnonzero(np.isfinite(times)), view.first_number, view.n_frames
+    fitting = [shift for shift in sorted({0, first}) if rows[0] >= shift and rows[-1] < shift + n]
+    if not fitting:
+        own = f"0 to {n - 1}" + (f", or {first} to {first + n - 1} as its images are numbered" if first else "")
+        raise InputError(
+            f"{file}: has times of frames {rows[0]} to {rows[-1]}, but the frames of {view.path} are {own}; count them so, and leave out "
+            "what is not there"
+        )
+    if len(fitting) > 1 and view.images is not None:
+        borne = [sum(row - shift in view.images for row in rows.tolist()) for shift in fitting]
+        if borne[0] == borne[1]:
+            raise InputError(
+                f"{file}: has times of frames {rows[0]} to {rows[-1]}, which may count from 0 or as the images are numbered, from {first}; "
+                "give the times of the first frame and of the last too"
+            )
+        fitting = [fitting[int(np.argmax(borne))]]
+    return times[fitting[0] :]
 
 
 def _refuse_far(file: Path, times: np.ndarray, fps: float) -> None:

@@ -172,6 +172,69 @@ def test_dropped_frames_are_none_by_a_file_of_times(recording_folder, as_images)
     assert [[value is None for value in part] for part in parts] == [[False, False, True], [True, True, False]]
 
 
+def numbered_images(folder, first, rows, bearing=range(6)):
+    """Two cameras' images, numbered from `first`, the second's with times of these rows: at 25 a second, row k at that of place k."""
+    shutil.rmtree(folder / "videos")
+    for camera, places in (("cam_00", range(6)), ("cam_01", bearing)):
+        write_images(folder / "images" / camera, [first + k for k in places], (160, 120), lambda number: 40 + 5 * (number - first))
+    (folder / "recording.toml").write_text("fps = 25\n")
+    times = np.full(max(rows) + 1, np.nan)
+    times[list(rows)] = np.arange(len(rows)) / 25
+    write_times(times_file(folder, "cam_01"), times)
+
+
+@pytest.mark.parametrize(
+    ("first", "rows", "shown"),
+    [
+        (1, range(1, 7), range(6)),  # as the images are numbered
+        (1, range(6), range(6)),  # from 0
+        (1, range(2, 7), range(1, 6)),
+        (1, range(5), range(5)),
+        (3, range(3, 9), range(6)),
+        (3, range(1, 6), range(1, 6)),
+        (40, range(40, 46), range(6)),
+        (40, range(6), range(6)),
+        (40, range(42, 46), range(2, 6)),
+    ],
+)
+def test_times_of_numbered_images_count_as_these_or_from_0(recording_folder, first, rows, shown):
+    numbered_images(recording_folder, first, rows)
+    found = levels(recording_folder, cameras=["cam_00", "cam_01"])[1]
+    np.testing.assert_allclose([row[1] for row in found[: len(shown)]], shown, atol=0.3)
+
+
+def test_times_that_may_count_either_way_count_as_more_images_do(recording_folder):
+    """Of a camera without the first image of all: by its own numbers one row would have no image."""
+    numbered_images(recording_folder, 1, range(1, 6), bearing=range(1, 6))
+    found = levels(recording_folder, cameras=["cam_00", "cam_01"])[1]
+    np.testing.assert_allclose([row[1] for row in found[:5]], range(1, 6), atol=0.3)
+
+
+@pytest.mark.parametrize(
+    ("first", "rows", "words"),
+    [
+        (
+            1,
+            range(1, 6),
+            "frames 1 to 5, which may count from 0 or as the images are numbered, from 1; give the times of the first frame and",
+        ),
+        (1, range(7), "has times of frames 0 to 6, but the frames of "),
+        (40, range(39, 45), "cam_01 are 0 to 5, or 40 to 45 as its images are numbered; count them so"),
+        (0, range(1, 7), "cam_01 are 0 to 5; count them so"),
+    ],
+)
+def test_times_of_frames_that_are_not_there_are_told(recording_folder, first, rows, words):
+    numbered_images(recording_folder, first, rows)
+    with pytest.raises(InputError, match=re.escape(words)):
+        open_recording(recording_folder, cameras=["cam_00", "cam_01"])
+
+
+def test_times_of_a_video_that_count_from_1_are_told(recording_folder):
+    write_times(times_file(recording_folder, "cam_01"), np.r_[np.nan, np.arange(12) / 25])
+    with pytest.raises(InputError, match=re.escape("has times of frames 1 to 12, but the frames of ") + ".*are 0 to 11; count"):
+        open_recording(recording_folder)
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
