@@ -214,7 +214,7 @@ def open_recording(
     footage, silhouettes = find_views(path, names, all_names, settings=settings)
     both = [image or mask for image, mask in zip(footage, silhouettes, strict=True)]
     there = {name: view for name, view in zip(names, both, strict=True) if view is not None}
-    rates = all_rates(path, there, all_names)
+    rates = all_rates(path, there, all_names, settings)
     by_stamps = rates_differ(rates)
     fps = settings.get("fps") or (min(rates) if by_stamps else next(iter(rates), DEFAULT_FPS))
     times = go_by_time(path, there, fps, by_stamps, starts)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -186,18 +187,34 @@ def put_in_time(view: Footage | None, first: int, times: np.ndarray | None) -> F
     return in_time(view, places.tolist())
 
 
-def all_rates(path: Path, views: Mapping[str, Footage], all_names: Sequence[str]) -> list[float]:
-    """The rates that the videos of a recording state, of all its cameras, whichever of them are read."""
-    rates = [view.fps for view in views.values()]
-    folder = path / "videos"
-    others = [name for name in all_names if name not in views] if folder.is_dir() else []
-    for name in others:
-        try:
-            found = find_footage(folder, name, count=False)
-        except InputError:
-            continue  # it is not read
-        rates.append(None if found is None else found.fps)
-    return [rate for rate in rates if rate]
+def all_rates(path: Path, views: Mapping[str, Footage], all_names: Sequence[str], settings: Mapping[str, Any]) -> list[float]:
+    """The rates that the videos of a recording state, of all its cameras in the calibration's order, whichever of them are read.
+
+    Parameters
+    ----------
+    path : Path
+        Folder of the recording.
+    views : mapping of str to Footage
+        Of the cameras that are read.
+    all_names : sequence of str
+        All cameras of the calibration.
+    settings : mapping
+        As `find_views`.
+
+    Raises
+    ------
+    InputError
+        When it is not clear which file is which camera's.
+    """
+    others = [name for name in all_names if name not in views]
+    files = find_files(path, "videos", all_names, settings) if others else Found({}, {})
+    coming = _side_by_side(lambda name: _open(path / "videos", files, name, None, False), others)
+    rates = {name: view.fps for name, view in views.items()}
+    for name, outcome in zip(others, coming, strict=True):
+        with suppress(InputError):  # it is not read
+            found = outcome.result()
+            rates[name] = None if found is None else found.fps
+    return [rate for name in all_names if (rate := rates.get(name))]
 
 
 def gaps(views: Sequence[Footage | None]) -> list[str]:

@@ -19,6 +19,7 @@ from hmc.io import footage
 from hmc.io.ffmpeg import ffmpeg_path
 from hmc.io.keypoints import open_keypoints
 from hmc.io.new_timing import with_first_frames, write_new_timing
+from hmc.io.places import RecordingPlaces
 from hmc.io.recording import iterate_frames, open_recording
 from hmc.io.timing import nearest_frames, read_times, times_file, write_times
 
@@ -74,6 +75,27 @@ def test_rates_that_differ_are_matched_by_time(recording_folder):
     recording, found = levels(recording_folder, cameras=["cam_02"], start=3)
     assert recording.fps == 25  # whatever cameras are read
     np.testing.assert_allclose(np.ravel(found), range(3, 12), atol=0.3)
+
+
+@pytest.mark.parametrize("fps", [25.1, 50])
+@pytest.mark.parametrize("where", ["pattern", "table", "guessed", "session"])
+def test_the_rate_is_of_all_cameras_wherever_their_videos_lie(recording_folder, where, fps):
+    """Whichever cameras are read: a result is looked at with some of them alone."""
+    videos, raw = recording_folder / "videos", recording_folder / "raw"
+    write_video(videos / "cam_02.avi", 24, (160, 120), fps=fps)
+    if where == "guessed":
+        for camera in range(5):
+            (videos / f"cam_{camera:02d}.avi").rename(videos / f"trial_cam_{camera:02d}_x.avi")
+    else:
+        videos.rename(raw)
+    if where == "pattern":
+        (recording_folder / "recording.toml").write_text('videos = "raw/{camera}.*"\n')
+    elif where == "table":
+        lines = [f'cam_{camera:02d} = "raw/cam_{camera:02d}.avi"\n' for camera in range(5)]
+        (recording_folder / "recording.toml").write_text("[videos]\n" + "".join(lines))
+    pattern = str(raw / "{camera}.avi") if where == "session" else None
+    places = RecordingPlaces(recording_folder, videos=pattern)
+    assert {open_recording(places, cameras=cameras).fps for cameras in (None, ["cam_02"], ["cam_02", "cam_01"], ["cam_03"])} == {25}
 
 
 def test_a_rate_that_is_given_is_the_recording_s(recording_folder):
