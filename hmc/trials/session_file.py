@@ -211,10 +211,11 @@ class _Reading:
             if one not in people:
                 self.faults.append(f"{where} `persons`: no [[person]] named `{one}`{_nearest(one, people)}")
         who = tuple(people.values()) if names is None and len(people) == 1 else tuple(people[one] for one in names or () if one in people)
-        heights = [one.height_m for one in (who or people.values()) if one.height_m is not None]
-        settings = {**base.settings, **self.recording(table.get("recording", {}), f"{where} recording")}
-        if who:
-            settings.setdefault("persons", len(who))
+        heights = [one.height_m for one in who if one.height_m is not None]
+        own = self.recording(table.get("recording", {}), f"{where} recording")
+        settings = {**base.settings, **own}
+        if who and "persons" not in (own if names else settings):  # whom a trial names goes before a number for all trials
+            settings["persons"] = len(who)
         if heights:
             settings["subject_height_m"] = tuple(heights)
         selection = {key: table[key] for key in ("start", "frames") if key in table}

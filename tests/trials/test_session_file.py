@@ -70,6 +70,32 @@ def test_every_trial_gets_what_its_folder_lacks(lab):
     assert open_recording(two.places).persons is None
 
 
+@pytest.mark.parametrize("everywhere", ["", "persons = 2\n"])
+def test_statures_and_numbers_are_of_who_is_in_a_trial(lab, everywhere):
+    """Of nobody else in the session: a trial that names nobody may be of anybody, and names go before a number for all trials."""
+    both = '[[trial]]\nname = "two"\npersons = ["Ana", "Ben"]\n'
+    (lab / "session.toml").write_text(GOOD.replace("fps = 50\n", f"fps = 50\n{everywhere}") + both)
+    one, two, three = (open_recording(trial.places) for trial in read_session(lab).trials)
+    assert (one.persons, one.subject_height_m, one.known_height_m) == (1, (1.62,), 1.62)
+    assert (two.persons, two.known_height_m) == (2, None)
+    assert (three.persons, three.subject_height_m, three.known_height_m) == (2 if everywhere else None, (), None)
+
+
+def test_a_trial_s_own_number_of_persons_goes_before(lab):
+    (lab / "session.toml").write_text(GOOD.replace("recording = { fps = 25 }", "recording = { persons = 2 }"))
+    one = open_recording(read_session(lab).trials[0].places)
+    assert (one.persons, one.known_height_m) == (2, None)
+
+
+def test_a_session_s_one_person_is_in_every_trial(lab):
+    """Unless the session says that there are more."""
+    alone = GOOD.replace('[[person]]\nname = "Ben"\n', "")
+    (lab / "session.toml").write_text(alone)
+    assert [open_recording(trial.places).known_height_m for trial in read_session(lab).trials] == [1.62] * 3
+    (lab / "session.toml").write_text(alone.replace("fps = 50\n", "fps = 50\npersons = 2\n"))
+    assert [open_recording(trial.places).known_height_m for trial in read_session(lab).trials] == [1.62, None, None]
+
+
 def test_what_a_folder_has_goes_before(lab, ring):
     own = lab / "trials" / "two"
     (own / "recording.toml").write_text("fps = 7\n")
