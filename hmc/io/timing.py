@@ -183,6 +183,8 @@ def _from_first_frame(file: Path, times: np.ndarray, view: Footage) -> np.ndarra
     Where either may be meant, that counts which more images bear; a frame that is not there would silently move all others.
     """
     rows, first, n = np.flatnonzero(np.isfinite(times)), view.first_number, view.n_frames
+    if first == 0 and rows[0] == 0:  # a log may go on after the last frame that was written
+        return times[:n]
     fitting = [shift for shift in sorted({0, first}) if rows[0] >= shift and rows[-1] < shift + n]
     if not fitting:
         own = f"0 to {n - 1}" + (f", or {first} to {first + n - 1} as its images are numbered" if first else "")

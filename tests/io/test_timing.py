@@ -251,6 +251,11 @@ def test_times_of_frames_that_are_not_there_are_told(recording_folder, first, ro
         open_recording(recording_folder, cameras=["cam_00", "cam_01"])
 
 
+def test_a_log_may_go_on_after_a_video_s_last_frame(recording_folder):
+    write_times(times_file(recording_folder, "cam_01"), np.arange(20) / 25)
+    assert open_recording(recording_folder).n_frames == 12
+
+
 def test_times_of_a_video_that_count_from_1_are_told(recording_folder):
     write_times(times_file(recording_folder, "cam_01"), np.r_[np.nan, np.arange(12) / 25])
     with pytest.raises(InputError, match=re.escape("has times of frames 1 to 12, but the frames of ") + ".*are 0 to 11; count"):
