@@ -282,7 +282,10 @@ def filter_samples(
     """
     n, size, origin = len(state.tracks), observation.voxel_size_m, observation.room[0]
     last = np.array([track.position for track in state.tracks]).reshape(-1, 3)
-    samples, person = propagate(rng, state.memories, np.rint((centres - last) / size), observation, around, settings)
+    # What is less than a voxel is owed to the next frame: at many frames a second it is all of the way.
+    owed = (centres - last) / size + np.array([one.arrays.get("owed", np.zeros(3)) for one in state.memories]).reshape(-1, 3)
+    moved = np.rint(owed)
+    samples, person = propagate(rng, state.memories, moved, observation, around, settings)
     weights, drawn = np.zeros(0), np.bincount(person, minlength=n)
     if len(samples):
         weights = sample_likelihood(samples, person, state.memories, observation, around, settings)
@@ -299,7 +302,10 @@ def filter_samples(
     positions = np.where(seen[:, None], origin + size * (mean + 0.5), centres)
     looks = looks_of(observation, around, positions, settings.following) if settings.color else ()
     parts = np.split(np.arange(len(samples)), np.cumsum(np.bincount(person, minlength=n))[:-1]) if n else []
-    kept = [{"samples": samples[part], "weights": weights[part]} if len(part) else {} for part in parts]
+    kept = [
+        {"samples": samples[part], "weights": weights[part], "owed": rest} if len(part) else {}
+        for part, rest in zip(parts, owed - moved, strict=True)
+    ]
     memories = tuple(PersonMemory(one.person, arrays, one.histogram) for one, arrays in zip(state.memories, kept, strict=True))
     return FilterEstimate(positions, seen, memories, looks, settings.keep_histogram, around.color_s, efficiency)
 

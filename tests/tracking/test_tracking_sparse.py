@@ -10,6 +10,7 @@ from hmc.camera.model import Rig, look_at, project
 from hmc.tracking.appearance import color_surface
 from hmc.tracking.blobs import observe
 from hmc.tracking.following import init
+from hmc.tracking.sparse import propagate
 from hmc.tracking.state import Candidate, DepartedTrack, PersonMemory, TrackerState, TrackRow
 from hmc.tracking.stored import from_plain, to_plain
 from hmc.tracking.trackers import make_tracker
@@ -135,6 +136,19 @@ def test_people_who_come_back_are_recognised_by_their_colors(blank):
     table = run(enumerate(observations), FPS, make_tracker("sparse", color=True))
     assert [set(table.persons[(table.frames // 52) == part]) for part in range(3)] == [{0}, {1}, {0}]
     assert len(set(run(enumerate(observations), FPS, make_tracker("sparse", color=False)).persons)) == 3
+
+
+def test_samples_go_with_a_walker_by_less_than_a_voxel_a_frame(monkeypatch):
+    """At 120 frames a second 1.2 m/s are a sixth of a voxel."""
+    moved, path = [], line((-1.2, 0), (0.6, 0), 181)
+
+    def noted(rng, memories, drift, *others):
+        moved.append(drift.sum(axis=0))
+        return propagate(rng, memories, drift, *others)
+
+    monkeypatch.setattr("hmc.tracking.sparse.propagate", noted)
+    run(enumerate(seen([(*p, RED)]) for p in path), 120.0, make_tracker("sparse", color=False))
+    assert 1.3 < np.sum(moved, axis=0)[0] * GRID.voxel_size_m < 1.9
 
 
 @pytest.mark.parametrize(("name", "color"), FILTERS)
