@@ -383,7 +383,7 @@ def export(
     fill : {"none", "linear", "spline"}
         What is done about gaps; formats without any are filled in any case.
     max_gap_s : float, optional
-        Longer gaps stay, seconds.
+        Longer gaps stay, seconds; of `fill` "linear" or "spline".
 
     Returns
     -------
@@ -393,8 +393,9 @@ def export(
     Raises
     ------
     InputError
-        When the frames a second are not known, there is no such format, it needs angles that there are not, there are more frames than
-        it holds (C3D), a package is missing, or the file is one of the result's own.
+        When the frames a second are not known, a number is not above 0, there is no such way to fill gaps or nothing for `max_gap_s` to act
+        on, there is no such format, it needs angles that there are not, there are more frames than it holds (C3D), a package is missing,
+        or the file is one of the result's own.
 
     Examples
     --------
@@ -406,9 +407,10 @@ def export(
     """
     from hmc.io.own_files import refuse_result_file
     from hmc.motion.export import export_trajectories
-    from hmc.motion.gaps import fill_trajectory
+    from hmc.motion.gaps import check_fill, fill_trajectory
     from hmc.motion.trajectory import chosen, read_trajectories
 
+    check_fill(fill, max_gap_s)
     if isinstance(found, str | Path):
         refuse_result_file(out, found)
     people = read_trajectories(found, fps, person) if isinstance(found, str | Path) else chosen(found.trajectories(fps), person, "export")

@@ -72,12 +72,10 @@ def read_result_asked(args: argparse.Namespace):
 
 def run(args: argparse.Namespace) -> int:
     """Read, fill, smooth, write."""
-    from hmc.errors import InputError
     from hmc.motion.export import export_trajectories
-    from hmc.motion.gaps import fill_trajectory
+    from hmc.motion.gaps import check_fill, fill_trajectory
 
-    if args.max_gap is not None and args.fill == "none":
-        raise InputError("--max-gap is of --fill linear or spline: give that too, or take it out")
+    check_fill(args.fill, args.max_gap)
     if args.out is not None:
         refuse_result_file(args.out, args.result)
     found = [fill_trajectory(one, args.fill, args.max_gap) for one in read_result_asked(args)]

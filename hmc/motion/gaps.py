@@ -3,16 +3,40 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from hmc.motion.trajectory import Trajectory
+from hmc.errors import InputError
+from hmc.motion.trajectory import Trajectory, above_zero
 
-__all__ = ["Fill", "complete_states", "fill_gaps", "fill_trajectory"]
+__all__ = ["Fill", "check_fill", "complete_states", "fill_gaps", "fill_trajectory"]
 
 Fill = Literal["none", "linear", "spline"]
+
+
+def check_fill(how: Fill, max_gap_s: float | None = None) -> None:
+    """Refuse what `fill_trajectory` cannot do, for callers who would read or compute much before that.
+
+    Parameters
+    ----------
+    how : {"none", "linear", "spline"}
+    max_gap_s : float, optional
+        Longer gaps stay, seconds.
+
+    Raises
+    ------
+    InputError
+        When there is no such way, or a longest gap is no number above 0 or given where no gap is filled.
+    """
+    if how not in get_args(Fill):
+        raise InputError(f"`fill` must be one of {', '.join(get_args(Fill))}; got {how!r}")
+    if max_gap_s is None:
+        return
+    above_zero("max_gap_s", max_gap_s)
+    if how == "none":
+        raise InputError("max_gap_s (--max-gap) is of fill (--fill) linear or spline: give that too, or take it out")
 
 
 def fill_gaps(values: np.ndarray, how: Fill, longest: float = np.inf) -> np.ndarray:
@@ -30,7 +54,13 @@ def fill_gaps(values: np.ndarray, how: Fill, longest: float = np.inf) -> np.ndar
     Returns
     -------
     ndarray, shape (n, ...)
+
+    Raises
+    ------
+    InputError
+        When there is no such way.
     """
+    check_fill(how)
     out = np.array(values, float)
     columns = out.reshape(len(out), -1)
     if how == "none":
@@ -59,7 +89,13 @@ def fill_trajectory(one: Trajectory, how: Fill, max_gap_s: float | None = None) 
     how : {"none", "linear", "spline"}
     max_gap_s : float, optional
         Longer gaps stay, seconds; by default all are filled.
+
+    Raises
+    ------
+    InputError
+        As `check_fill`.
     """
+    check_fill(how, max_gap_s)
     longest = np.inf if max_gap_s is None else max_gap_s * one.fps
     states = None if one.states is None else _filled_states(one.states, how, longest)
     return replace(one, positions=fill_gaps(one.positions, how, longest), states=states)

@@ -17,7 +17,7 @@ from hmc.errors import InputError
 from hmc.io.results import PoseStates, PoseTable, read_joints, read_pose, read_run
 from hmc.landmarks import ENOUGH_VIEWS, FOOT_POINTS, LANDMARKS, landmark_index
 
-__all__ = ["Trajectory", "read_trajectories", "trajectories"]
+__all__ = ["Trajectory", "above_zero", "chosen", "read_trajectories", "trajectories"]
 
 #: No person is away for so many frames for each of a pose.
 MOST_GAPS = 10_000
@@ -146,20 +146,43 @@ def read_trajectories(folder: str | Path, fps: float | None = None, person: int 
     Raises
     ------
     InputError
-        When there is no such result, nobody in it, or its frames a second are not known.
+        When there is no such result, nobody in it, or its frames a second are not known or no number above 0.
     """
-    folder = Path(folder)
+    folder, given = Path(folder), None if fps is None else above_zero("fps", fps)
     if not folder.is_dir():
         raise InputError(f"{folder}: no such folder; a result is the folder that `hmc pose` wrote")
     if not (folder / "joints.csv").is_file():
         raise InputError(f"{folder}: no joints.csv; make poses first (hmc pose)")
     states = read_pose(folder / "pose.npz") if (folder / "pose.npz").is_file() else None
-    poses, rate = read_joints(folder / "joints.csv"), fps or _fps_of(folder, states)
+    poses, rate = read_joints(folder / "joints.csv"), given or _fps_of(folder, states)
     try:
         found = trajectories(poses, states, rate)
     except InputError as error:
         raise InputError(f"{folder / 'pose.npz'}: {error}") from None
     return chosen(found, person, str(folder))
+
+
+def above_zero(name: str, value: float) -> float:
+    """A number that an argument gives.
+
+    Parameters
+    ----------
+    name : str
+        Of the argument, for the message.
+    value : float
+
+    Raises
+    ------
+    InputError
+        When it is no finite number above 0.
+    """
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        number = np.nan
+    if not 0 < number < np.inf:
+        raise InputError(f"`{name}` must be a number above 0; got {value}")
+    return number
 
 
 def chosen(found: list[Trajectory], person: int | None, source: str) -> list[Trajectory]:

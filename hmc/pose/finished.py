@@ -40,7 +40,7 @@ class FinishedPeople:
         Raises
         ------
         InputError
-            When they are not known.
+            When they are not known, or no number above 0.
         """
         from hmc.motion.trajectory import trajectories
 
@@ -192,7 +192,9 @@ class FinishedPeople:
         return angle_table(found)
 
     def _known_fps(self, fps: float | None) -> float:
-        known = fps or self.fps
+        from hmc.motion.trajectory import above_zero
+
+        known = self.fps if fps is None else above_zero("fps", fps)
         if not known:
             raise InputError("how many frames a second is not known of these poses; give fps")
         return known

@@ -85,7 +85,7 @@ def test_no_export_takes_the_place_of_a_result_s_file(tmp_path, capsys, words):
         (["export", "rec", "--to", "csv", "--cutoff", "3"], "--cutoff is of --smooth butterworth"),
         (["export", "rec", "--to", "csv", "--smooth", "butterworth", "--window", "1"], "--window is of --smooth polynomial"),
         (["angles", "rec", "--window", "1"], "--window is of --smooth polynomial"),
-        (["export", "rec", "--to", "csv", "--max-gap", "1"], "--max-gap is of --fill linear or spline"),
+        (["export", "rec", "--to", "csv", "--max-gap", "1"], "(--max-gap) is of fill (--fill) linear or spline"),
         (["world", "rec", "--square", "0.05"], "give --board too"),
         (["world", "rec", "--board", "2x9"], "'2x9' is not the inner corners of a chessboard, 3 or more each way"),
         (["world", "rec", "--distance", "cam_00,cam_01"], "'cam_00,cam_01' is not two cameras and how many metres they are apart"),

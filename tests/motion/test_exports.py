@@ -2,6 +2,7 @@
 
 import importlib.util
 import json
+import re
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -22,7 +23,7 @@ from hmc.io.export.c3d import write_c3d
 from hmc.io.results import PoseStates, PoseTable, write_joints, write_pose
 from hmc.landmarks import FOOT_POINTS, LANDMARKS
 from hmc.motion.export import FORMATS, export_trajectories
-from hmc.motion.gaps import fill_trajectory
+from hmc.motion.gaps import fill_gaps, fill_trajectory
 from hmc.motion.trajectory import read_trajectories, trajectories
 from hmc.pose.follow import PosedPeople
 from hmc.synthetic.bvh import bvh_positions, read_bvh
@@ -206,6 +207,41 @@ def test_gaps_are_filled_up_to_a_length():
     (whole,) = moving(n=20).trajectories()
     assert np.abs(filled.positions[3:5] - whole.positions[3:5]).max() < 0.01
     assert np.isfinite(fill_trajectory(one, "linear").positions).all()
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        *(({"fps": fps}, f"`fps` must be a number above 0; got {fps}") for fps in (0, -5, np.nan, np.inf, "fast")),
+        ({"max_gap_s": 0.1}, "max_gap_s (--max-gap) is of fill (--fill) linear or spline: give that too, or take it out"),
+        *(({"fill": "spline", "max_gap_s": gap}, f"`max_gap_s` must be a number above 0; got {gap}") for gap in (0, -1, np.nan)),
+        ({"fill": "cubic"}, "`fill` must be one of none, linear, spline; got 'cubic'"),
+    ],
+)
+@pytest.mark.parametrize("folder", [True, False], ids=["folder", "poses"])
+def test_python_refuses_what_the_command_does(tmp_path, given, words, folder):
+    """Times ran backwards at -5 frames a second, 0 was the recording's rate, and `cubic` was linear."""
+    people = with_gap(moving(), [4, 5])
+    people.save(tmp_path / "two")
+    with pytest.raises(ValueError, match=f"^{re.escape(words)}$"):
+        hmc.export(tmp_path / "two" if folder else people, tmp_path / "walk.csv", **given)
+    assert not (tmp_path / "walk.csv").exists()
+
+
+def test_each_step_of_an_export_refuses_by_itself(tmp_path):
+    people = with_gap(moving(), [4, 5])
+    people.save(tmp_path)
+    (one,) = people.trajectories()
+    for wrong in (
+        lambda: people.trajectories(0),
+        lambda: read_trajectories(tmp_path, -5),
+        lambda: fill_trajectory(one, "cubic"),
+        lambda: fill_trajectory(one, "none", 0.1),
+        lambda: fill_gaps(one.positions, "cubic"),
+    ):
+        with pytest.raises(InputError):
+            wrong()
+    assert people.trajectories(np.float32(25))[0].fps == 25 and read_trajectories(tmp_path, 25)[0].fps == 25
 
 
 def test_half_a_turn_is_followed_through():
