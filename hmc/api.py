@@ -45,6 +45,7 @@ def check(recording: Recording | str | Path) -> list[Finding]:
     Parameters
     ----------
     recording : Recording or path
+        One that is open is looked at as it was opened: its cameras alone, in its session, or of what is in memory all that needs no files.
 
     Returns
     -------
@@ -57,9 +58,9 @@ def check(recording: Recording | str | Path) -> list[Finding]:
     >>> [finding.severity for finding in hmc.check("data/synthetic/tiny")]
     []
     """
-    from hmc.check.findings import check_recording
+    from hmc.check.findings import check_opened, check_recording
 
-    return check_recording(recording.path if isinstance(recording, Recording) else recording)
+    return check_opened(recording) if isinstance(recording, Recording) else check_recording(recording)
 
 
 def silhouettes(recording: Recording) -> Iterator[MaskStep]:

@@ -5,8 +5,8 @@
 """
 
 from hmc.callable_package import make_callable
-from hmc.check.findings import Finding, Inspection, check_recording, inspect_recording
+from hmc.check.findings import Finding, Inspection, check_opened, check_recording, inspect_recording
 
-__all__ = ["Finding", "Inspection", "check_recording", "inspect_recording"]
+__all__ = ["Finding", "Inspection", "check_opened", "check_recording", "inspect_recording"]
 
 make_callable(__name__)

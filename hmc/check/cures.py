@@ -32,4 +32,5 @@ def world_command(recording: AnyPlaces) -> str:
 def _command(name: str, recording: AnyPlaces, *more: str) -> str:
     places = to_places(recording)
     session = [] if places.session is None else ["--session", str(places.session)]
-    return " ".join(["hmc", name, *map(quote, [str(places.path), *session, *more])])
+    absent = "" if places.there else " (once these images lie in a recording's folder)"  # they are in memory
+    return " ".join(["hmc", name, *map(quote, [str(places.path), *session, *more])]) + absent

@@ -7,6 +7,7 @@ merely odd is told too.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from os.path import realpath
 from pathlib import Path
@@ -43,7 +44,7 @@ from hmc.io.timing import rates_differ
 from hmc.io.views import find_views, gaps, missing_views, shared_videos
 from hmc.io.world import world_of
 
-__all__ = ["Finding", "Inspection", "check_recording", "inspect_recording"]
+__all__ = ["Finding", "Inspection", "check_opened", "check_recording", "inspect_recording"]
 
 #: Takes a severity and sentences.
 Say = Callable[[str, Iterable[str]], None]
@@ -115,6 +116,55 @@ def check_recording(path: AnyPlaces, cameras: Sequence[str] | None = None, read_
     return list(inspect_recording(path, cameras, read_all).findings)
 
 
+def check_opened(recording: Recording) -> list[Finding]:
+    """As `check_recording`, of a recording as it was opened: its cameras, its parts wherever they lie, and images in memory.
+
+    Parameters
+    ----------
+    recording : Recording
+    """
+    if recording.in_memory:
+        return _check_arrays(recording)
+    places, names = places_of(recording), recording.rig.names
+    with suppress(InputError):  # told by what follows
+        if {entry.name for entry in places.read_entries()} == set(names):
+            return check_recording(places)
+    return check_recording(places, names)
+
+
+def _check_arrays(recording: Recording) -> list[Finding]:
+    """What needs no files."""
+    found: list[Finding] = []
+
+    def say(severity: str, sentences: Iterable[str]) -> None:
+        found.extend(Finding(severity, sentence) for sentence in sentences)
+
+    say("error", wrong_focal_lengths(recording.rig))
+    _say_of_rig(recording.rig, say)
+    say(*coverage(recording.rig, recording.room))
+    say("note", ["no `room` is given; it is estimated from the rig"] if recording.room_is_estimated else [])
+    say("note", background(recording))
+    if not any(finding.severity == "error" for finding in found):
+        try:
+            _say_of_frames(recording, False, say)
+        except InputError as error:
+            say("error", [str(error)])
+    return list(_sorted(found))
+
+
+def _say_of_rig(rig: Rig, say: Say) -> None:
+    say("warning", odd_cameras(rig))
+    say("note", [sentence for camera in rig for sentence in orientation(camera)])
+
+
+def _say_of_frames(recording: Recording, read_all: bool, say: Say) -> np.ndarray | None:
+    """Lines of the floor on which people stand, where it is not the calibration's."""
+    warnings, errors, floor = _read(recording, read_all)
+    say("error", errors)
+    say("warning", warnings)
+    return floor
+
+
 def inspect_recording(path: AnyPlaces, cameras: Sequence[str] | None = None, read_all: bool = False) -> Inspection:
     """As `check_recording`, with what a picture of the rig needs. Parameters as there."""
     places = to_places(path)
@@ -157,8 +207,7 @@ def inspect_recording(path: AnyPlaces, cameras: Sequence[str] | None = None, rea
     say("error", wrong_units(rig, path))
     say("warning", gaps(own))
     say("note", rates([view.fps for view in own if view is not None]))
-    say("warning", odd_cameras(rig))
-    say("note", [sentence for camera in rig for sentence in orientation(camera)])
+    _say_of_rig(rig, say)
     if not wrong_units(rig):
         room = estimate_room(rig) if room is None else room
         say(*coverage(rig, room))
@@ -177,9 +226,7 @@ def inspect_recording(path: AnyPlaces, cameras: Sequence[str] | None = None, rea
             low, high = recording.room.round(1).tolist()
             say("note", [f"recording.toml gives no `room`; estimated from the rig: {low} to {high} m"])
         say("note", background(recording))
-        warnings, errors, floor = _read(recording, read_all)
-        say("error", errors)
-        say("warning", warnings)
+        floor = _say_of_frames(recording, read_all, say)
         try:
             source = open_keypoints(recording)
             keypoints = None if source is None else keypoint_agreement(recording, source)

@@ -139,6 +139,11 @@ class Recording:
         return tuple(view.size if view else camera.size for camera, view in zip(self.rig, self._own_views, strict=True))
 
     @property
+    def in_memory(self) -> bool:
+        """Whether images or silhouettes are arrays (`hmc.io.memory.recording_of`), and `path` is a name alone."""
+        return any(view is not None and view.arrays is not None for view in (*self._footage, *self._silhouettes))
+
+    @property
     def has_images(self) -> bool:
         """Whether any camera has images (else there are only silhouettes)."""
         return any(footage is not None for footage in self._footage)

@@ -11,6 +11,7 @@ from drawn import draw_recording, walk
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
+import hmc
 from hmc.camera.model import Camera, Rig, look_at, project
 from hmc.camera.rig_picture import _free_offset, draw_rig, draw_view, rig_figure, view_cone
 from hmc.check import check_recording, inspect_recording
@@ -18,6 +19,8 @@ from hmc.check.hull import coarse_grid, fine_hull
 from hmc.cli import main
 from hmc.io.calibration import write_calibration
 from hmc.io.files import write_figure
+from hmc.io.places import RecordingPlaces
+from hmc.io.recording import iterate_frames, open_recording
 
 
 def sentences(findings, severity):
@@ -44,6 +47,35 @@ def body_folder(tmp_path, ring):
 def test_a_good_recording_has_only_notes(recording_folder, body_folder):
     assert {finding.severity for finding in check_recording(recording_folder)} <= {"note"}
     assert sentences(check_recording(body_folder), "warning") == []
+
+
+def test_an_open_recording_is_looked_at_as_it_was_opened(recording_folder, tmp_path):
+    """Of its cameras alone, and in its session, which has the calibration."""
+    four = [f"cam_{k:02d}" for k in range(4)]
+    (recording_folder / "videos" / "cam_04.avi").write_bytes(b"")
+    (rest := tmp_path / "rig").mkdir()
+    (recording_folder / "calibration.toml").rename(rest / "calibration.toml")
+    recording = open_recording(RecordingPlaces(recording_folder, calibration=rest), cameras=four)
+    assert sentences(hmc.check(recording), "error") == []
+    (recording_folder / "videos" / "cam_04.avi").unlink()
+    write_video(recording_folder / "videos" / "cam_04.avi", 12, (160, 120))
+    write_video(recording_folder / "videos" / "lobby.avi", 12, (160, 120))
+    recording = open_recording(recording.places)
+    assert any("lobby.avi: no camera of this name" in note for note in sentences(hmc.check(recording), "note"))
+    (rest / "calibration.toml").unlink()
+    assert "no calibration found" in hmc.check(recording)[0].sentence
+
+
+def test_images_in_memory_are_looked_at_too(body_folder, ring):
+    masks = [[frame.silhouettes[c] for frame in iterate_frames(open_recording(body_folder))] for c in range(5)]
+    found = hmc.check(hmc.recording_of(ring, silhouettes=masks))
+    assert [(one.severity, one.sentence) for one in found] == [("note", "no `room` is given; it is estimated from the rig")]
+    moved = Rig(tuple(turned(camera, 7) if camera.name == "cam_03" else camera for camera in ring))
+    (warning,) = sentences(hmc.check(hmc.recording_of(moved, silhouettes=masks)), "warning")
+    assert warning.startswith("camera 'cam_03': its silhouettes do not fit the calibration")
+    assert "hmc sync" not in warning or warning.endswith("(once these images lie in a recording's folder)")
+    elsewhere = hmc.recording_of(ring, silhouettes=masks, room=[[0, 0, 100], [2, 2, 102]])
+    assert any("no camera sees anything of the room" in error for error in sentences(hmc.check(elsewhere), "error"))
 
 
 @pytest.mark.parametrize(
