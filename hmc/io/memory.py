@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from hmc.camera.model import Camera, Rig
 from hmc.errors import InputError
 from hmc.io.footage import Footage
 from hmc.io.recording import DEFAULT_FPS, Recording, wrong_units
+from hmc.io.settings import check_settings
 from hmc.io.views import common_length
 
 __all__ = ["recording_of"]
@@ -31,7 +33,7 @@ def recording_of(
     fps: float = DEFAULT_FPS,
     room: np.ndarray | None = None,
     persons: int | None = None,
-    height_m: float | Sequence[float] = (),
+    height_m: float | Sequence[float] | None = (),
     name: str = "arrays",
 ) -> Recording:
     """A recording of images in memory, for `hmc.track`, `hmc.pose`, `hmc.view` and all else that takes one.
@@ -43,6 +45,8 @@ def recording_of(
     images : sequence of images, one a camera, optional
         Each a sequence of (h, w, 3) uint8 BGR, one a frame, None where there is none; the recording lasts as long as two cameras at
         least do. Nothing is copied, and items are asked for when they are needed: a memory map, or a sequence that loads, streams.
+        The first is looked at here, the others when they are read: what is no such array is an `InputError` then, and one of another
+        size is left out.
     background : sequence of images, one a camera, optional
         Of the empty scene, 30 or so; None of a camera that has none.
     silhouettes : sequence of images, one a camera, optional
@@ -53,7 +57,7 @@ def recording_of(
         Lower and upper corner, metres; estimated from the rig where left out.
     persons : int, optional
         How many people are there at once at most, where that is known.
-    height_m : float or sequence of float
+    height_m : float or sequence of float, optional
         Statures that are known, metres.
     name : str
 
@@ -64,7 +68,8 @@ def recording_of(
     Raises
     ------
     InputError
-        When there is nothing, numbers of cameras differ, or an array is no image of its camera.
+        When there is nothing, numbers of cameras differ, an array is no image of its camera, or a setting is none that recording.toml
+        may have.
 
     Examples
     --------
@@ -84,21 +89,17 @@ def recording_of(
         raise InputError(f"camera '{lacking[0]}' has neither images nor silhouettes; give some, or leave it out of the rig")
     for problem in wrong_units(rig):
         raise InputError(problem)
-    if not (np.isfinite(fps) and fps > 0):
-        raise InputError(f"`fps` must be above 0; got {fps}")
-    corners = estimate_room(rig) if room is None else np.array(room, float)
-    if corners.shape != (2, 3) or not np.all(corners[1] > corners[0]):
-        raise InputError("`room` must be [[x0, y0, z0], [x1, y1, z1]] in metres, lower corner first")
+    settings = _checked({"name": name, "fps": fps, "room": room, "persons": persons, "subject_height_m": height_m})
     return Recording(
         path=Path(name),
         name=name,
-        fps=float(fps),
+        fps=float(settings["fps"]),
         rig=rig,
-        room=corners,
+        room=estimate_room(rig) if room is None else settings["room"],
         n_frames=common_length([view.n_frames for view in both if view is not None]),
         start=0,
-        persons=persons,
-        subject_height_m=tuple(float(one) for one in np.atleast_1d(np.array(height_m, float))),
+        persons=settings.get("persons"),
+        subject_height_m=settings.get("subject_height_m", ()),
         room_is_estimated=room is None,
         factors=(1,) * len(rig),
         _footage=footage,
@@ -107,25 +108,79 @@ def recording_of(
     )
 
 
+def _checked(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings by the rules of recording.toml; all but `fps` may be None."""
+    plain = {key: value.tolist() if isinstance(value, np.ndarray | np.generic) else value for key, value in given.items()}
+    if isinstance(plain["subject_height_m"], tuple):
+        plain["subject_height_m"] = list(plain["subject_height_m"])
+    try:
+        return check_settings({key: value for key, value in plain.items() if key == "fps" or value is not None}, Path("recording_of"))
+    except InputError as error:
+        raise InputError(str(error).replace("subject_height_m", "height_m")) from None
+
+
 def _views(rig: Rig, images: Sequence[Images | None] | None, what: str) -> tuple[Footage | None, ...]:
     """One camera's images after the other's, looked at as far as the first image of each."""
     if images is None:
         return (None,) * len(rig)
-    if len(images) != len(rig):
-        raise InputError(f"`{what}` must have one entry a camera, {len(rig)} of them; got {len(images)}")
+    if not _is_sequence(images) or len(images) != len(rig):
+        got = len(images) if _is_sequence(images) else type(images).__name__
+        raise InputError(f"`{what}` must have one entry a camera, {len(rig)} of them; got {got}")
+    for camera, own in zip(rig, images, strict=True):
+        if own is not None and not _is_sequence(own):
+            raise InputError(
+                f"camera '{camera.name}': its {what} must be an array or a list, which tells its length and gives any item; got "
+                f"{type(own).__name__}"
+            )
     return tuple(None if own is None or not len(own) else _view(camera, own, what) for camera, own in zip(rig, images, strict=True))
 
 
+def _is_sequence(value: Any) -> bool:
+    """Whether it tells its length and gives any item; an array of no dimension has both methods and does neither."""
+    return hasattr(value, "__len__") and hasattr(value, "__getitem__") and (not isinstance(value, np.ndarray) or value.ndim > 0)
+
+
+@dataclass(frozen=True)
+class _Checked(Sequence[np.ndarray | None]):
+    """Images of a camera, each looked at when it is asked for: what OpenCV and NumPy say of a wrong one names neither camera nor frame."""
+
+    images: Images
+    camera: Camera
+    what: str
+
+    def __len__(self) -> int:
+        return len(self.images)
+
+    def __getitem__(self, frame: Any) -> Any:
+        image = self.images[frame]
+        if image is not None and not _is_image(image, self.what):
+            raise InputError(f"camera '{self.camera.name}': frame {frame} of its {self.what} {_unlike(image, self.camera, self.what)}")
+        return image
+
+
 def _view(camera: Camera, images: Images, what: str) -> Footage:
-    flat = what == "silhouettes"
-    first = next((image for image in images if image is not None), None)
+    found = (images[frame] for frame in range(len(images)))
+    first = next((image for image in found if image is not None), None)
     if first is None:
         raise InputError(f"camera '{camera.name}': all of its {what} are None; leave it out of the rig")
-    kinds = (np.bool_, np.uint8) if flat else (np.uint8,)
-    shape = camera.size[::-1] if flat else (*camera.size[::-1], 3)
-    if not isinstance(first, np.ndarray) or first.dtype not in kinds or first.shape != shape:
-        got = f"{first.dtype} of shape {first.shape}" if isinstance(first, np.ndarray) else type(first).__name__
-        wanted = f"bool or uint8, shape {shape}" if flat else f"uint8, shape {shape}, BGR"
-        raise InputError(f"camera '{camera.name}': its {what} must be arrays of {wanted}; got {got}")
+    if not _is_image(first, what) or first.shape[1::-1] != camera.size:
+        raise InputError(f"camera '{camera.name}': its {what} {_unlike(first, camera, what)}")
     footage = Footage(Path(camera.name), len(images), camera.size)
-    return replace(footage, arrays=images)
+    return replace(footage, arrays=_Checked(images, camera, what))
+
+
+def _is_image(image: Any, what: str) -> bool:
+    """Whether it may be one, of whatever size."""
+    if not isinstance(image, np.ndarray):
+        return False
+    if what == "silhouettes":
+        return image.ndim == 2 and image.dtype in (np.bool_, np.uint8)
+    return image.ndim == 3 and image.shape[2] == 3 and image.dtype == np.uint8
+
+
+def _unlike(image: Any, camera: Camera, what: str) -> str:
+    """What a camera's images must be, and what this one is."""
+    shape, flat = camera.size[::-1], what == "silhouettes"
+    wanted = f"bool or uint8, shape {shape}" if flat else f"uint8, shape {(*shape, 3)}, BGR"
+    got = f"{image.dtype} of shape {image.shape}" if isinstance(image, np.ndarray) else type(image).__name__
+    return f"must be {wanted}; got {got}"

@@ -76,6 +76,10 @@ def test_frames_may_be_missing_and_come_late(on_disk):
         (lambda images: [[None, None], *images[1:]], "all of its images are None"),
         (lambda images: [[], *images[1:]], "neither images nor silhouettes"),
         (lambda images: [[1, 2], *images[1:]], "got int"),
+        (lambda images: [(image for image in images[0]), *images[1:]], "cam_00.*must be an array or a list.*got generator"),
+        (lambda images: [np.uint8(3), *images[1:]], "must be an array or a list.*got uint8"),
+        (lambda images: (own for own in images), "one entry a camera, 5 of them; got generator"),
+        (lambda images: 5, "one entry a camera, 5 of them; got int"),
     ],
 )
 def test_what_is_no_recording_is_told(on_disk, change, said):
@@ -84,7 +88,74 @@ def test_what_is_no_recording_is_told(on_disk, change, said):
         hmc.recording_of(on_disk.rig, change(images))
 
 
-@pytest.mark.parametrize(("more", "said"), [({"fps": 0}, "fps"), ({"room": [[0, 0, 0], [1, 1, 0]]}, "lower corner first")])
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        ({"fps": 0}, "`fps` must be a number above 0; got 0"),
+        ({"fps": None}, "`fps` must be a number above 0; got None"),
+        ({"fps": "15"}, "`fps` must be a number above 0; got '15'"),
+        ({"fps": np.nan}, "`fps` must be a number above 0; got nan"),
+        ({"room": [[0, 0, 0], [1, 1, 0]]}, "lower corner first"),
+        ({"room": [[0, 0, 0], [1, 1, np.inf]]}, "`room` must be .* in metres"),
+        ({"room": np.array([[0, 0], [1, 1]])}, "lower corner first"),
+        ({"room": "auto"}, "lower corner first"),
+        ({"room": [[-2000, -2000, 0], [2000, 2000, 2500]]}, "looks like millimetres"),
+        ({"persons": -1}, "`persons` must be a whole number, 0 or more; got -1"),
+        ({"persons": 1.5}, "`persons` must be a whole number"),
+        ({"name": 3}, "`name` must be a text; got 3"),
+        ({"height_m": 177}, r"`height_m` must be statures in metres, such as \[1.77\]; got 177"),
+        ({"height_m": np.nan}, "`height_m` must be statures"),
+        ({"height_m": (1.7, "1.8")}, "`height_m` must be statures"),
+    ],
+)
 def test_settings_that_cannot_be_are_told(on_disk, more, said):
-    with pytest.raises(InputError, match=said):
+    with pytest.raises(InputError, match=said) as told:
         hmc.recording_of(on_disk.rig, arrays_of(on_disk)[0], **more)
+    assert "\n" not in str(told.value) and "subject" not in str(told.value)
+
+
+@pytest.mark.parametrize(
+    ("more", "statures"),
+    [
+        ({"height_m": 1.7}, (1.7,)),
+        ({"height_m": [1.7, np.float64(1.8)]}, (1.7, 1.8)),
+        ({"height_m": np.array([1.5, 2])}, (1.5, 2)),
+        ({"height_m": None}, ()),
+        ({"fps": np.float32(12.5), "persons": np.int64(2), "room": np.array([[-1, -1, 0], [1, 1, 2]])}, ()),
+    ],
+)
+def test_settings_may_be_numpy_s(on_disk, more, statures):
+    recording = hmc.recording_of(on_disk.rig, arrays_of(on_disk)[0], **more)
+    assert recording.subject_height_m == statures and recording.persons == more.get("persons") and recording.fps == more.get("fps", 30)
+
+
+@pytest.mark.parametrize(
+    ("change", "got"),
+    [
+        (lambda image: image.astype(float), r"float64 of shape \(120, 160, 3\)"),
+        (lambda image: np.dstack([image, image[..., :1]]), r"uint8 of shape \(120, 160, 4\)"),
+        (lambda image: image[..., 0], r"uint8 of shape \(120, 160\)"),
+        (lambda image: "late.png", "str"),
+    ],
+)
+@pytest.mark.parametrize("what", ["images", "background", "silhouettes"])
+def test_a_later_frame_that_is_no_image_is_told(on_disk, change, got, what):
+    """When it is read: which camera's, and which frame."""
+    images, background, masks = (list(map(list, own)) for own in arrays_of(on_disk))
+    spoilt = {"images": images, "background": background, "silhouettes": masks}[what]
+    spoilt[1][2] = change(images[1][2])
+    if what == "silhouettes" and spoilt[1][2] is not None and np.ndim(spoilt[1][2]) == 2:
+        spoilt[1][2], got = images[1][2], r"uint8 of shape \(120, 160, 3\)"  # flat is what a silhouette is
+    recording = hmc.recording_of(on_disk.rig, images, background, masks)
+    with pytest.raises(InputError, match=f"camera 'cam_01': frame 2 of its {what} must be .*; got {got}$"):
+        _ = list(background_frames(recording, 1)) if what == "background" else list(iterate_frames(recording))
+    if what != "background":
+        assert any(finding.severity == "error" and "frame 2 of its" in finding.sentence for finding in hmc.check(recording))
+
+
+def test_a_later_frame_of_another_size_is_left_out(on_disk):
+    images = list(map(list, arrays_of(on_disk)[0]))
+    images[1][2] = images[1][2][:-1]
+    told = []
+    frames = list(iterate_frames(hmc.recording_of(on_disk.rig, images), on_problem=told.append))
+    assert frames[2].images[1] is None and told == ["cam_01: frame 2 is 160 x 119 and not 160 x 120; left out"]
