@@ -126,8 +126,7 @@ def run(args: argparse.Namespace) -> int:
     elif args.board is not None:
         points = board_points(rig, images, args.board, args.square)
     frames = moment_frames(recording, MOMENTS)
-    heights = recording.subject_height_m
-    known = Known(args.unit, args.distance, args.height or (heights[0] if len(heights) == 1 else None))
+    known = Known(args.unit, args.distance, args.height or recording.known_height_m)
     shown, ground, hidden = _people(recording, frames, rig)
     try:
         found = find_world(rig, ground, points, known, hidden)

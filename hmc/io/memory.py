@@ -109,14 +109,19 @@ def recording_of(
 
 
 def _checked(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings by the rules of recording.toml; all but `fps` may be None."""
-    plain = {key: value.tolist() if isinstance(value, np.ndarray | np.generic) else value for key, value in given.items()}
-    if isinstance(plain["subject_height_m"], tuple):
-        plain["subject_height_m"] = list(plain["subject_height_m"])
+    """Settings by the rules of recording.toml, of NumPy's numbers too; those that are None are left out, but for `name` and `fps`."""
+    plain = {key: _plain(value) for key, value in given.items()}
+    stated = {key: value for key, value in plain.items() if key in ("name", "fps") or value is not None}
     try:
-        return check_settings({key: value for key, value in plain.items() if key == "fps" or value is not None}, Path("recording_of"))
+        return check_settings(stated, Path("recording_of"))
     except InputError as error:
         raise InputError(str(error).replace("subject_height_m", "height_m")) from None
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    return [_plain(one) for one in value] if isinstance(value, list | tuple) else value
 
 
 def _views(rig: Rig, images: Sequence[Images | None] | None, what: str) -> tuple[Footage | None, ...]:

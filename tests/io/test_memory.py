@@ -102,6 +102,7 @@ def test_what_is_no_recording_is_told(on_disk, change, said):
         ({"room": [[-2000, -2000, 0], [2000, 2000, 2500]]}, "looks like millimetres"),
         ({"persons": -1}, "`persons` must be a whole number, 0 or more; got -1"),
         ({"persons": 1.5}, "`persons` must be a whole number"),
+        ({"name": None}, "`name` must be a text; got None"),
         ({"name": 3}, "`name` must be a text; got 3"),
         ({"height_m": 177}, r"`height_m` must be statures in metres, such as \[1.77\]; got 177"),
         ({"height_m": np.nan}, "`height_m` must be statures"),
@@ -118,7 +119,7 @@ def test_settings_that_cannot_be_are_told(on_disk, more, said):
     ("more", "statures"),
     [
         ({"height_m": 1.7}, (1.7,)),
-        ({"height_m": [1.7, np.float64(1.8)]}, (1.7, 1.8)),
+        ({"height_m": [1.5, np.float32(1.75)]}, (1.5, 1.75)),
         ({"height_m": np.array([1.5, 2])}, (1.5, 2)),
         ({"height_m": None}, ()),
         ({"fps": np.float32(12.5), "persons": np.int64(2), "room": np.array([[-1, -1, 0], [1, 1, 2]])}, ()),
