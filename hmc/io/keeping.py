@@ -73,7 +73,7 @@ def _keep(file: Path) -> Path | None:
 def _second_name(file: Path, kept: Path) -> None:
     """A link, which takes no space; a copy where the file system has none, and of what is a link itself."""
     if not file.is_symlink():
-        with suppress(OSError, NotImplementedError):
+        with suppress(OSError):
             os.link(file, kept)
             return
     shutil.copy2(file, kept, follow_symlinks=False)

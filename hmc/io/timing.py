@@ -180,12 +180,11 @@ def go_by_time(path: Path, views: Mapping[str, Footage], fps: float, by_stamps: 
 def _from_first_frame(file: Path, times: np.ndarray, view: Footage) -> np.ndarray:
     """Times by frames counted from 0, of those by the numbers of a table: these count from 0 too or, of numbered images, as they do.
 
-    Where either may be meant, that counts which more images bear; a frame that is not there would silently move all others.
+    Where either may be meant, that counts which more images bear; a frame that is not there would silently move all others. A log that
+    begins with the first frame's own number may go on after the last that was written.
     """
     rows, first, n = np.flatnonzero(np.isfinite(times)), view.first_number, view.n_frames
-    if first == 0 and rows[0] == 0:  # a log may go on after the last frame that was written
-        return times[:n]
-    fitting = [shift for shift in sorted({0, first}) if rows[0] >= shift and rows[-1] < shift + n]
+    fitting = [shift for shift in sorted({0, first}) if rows[0] >= shift and (rows[-1] < shift + n or rows[0] == shift == first)]
     if not fitting:
         own = f"0 to {n - 1}" + (f", or {first} to {first + n - 1} as its images are numbered" if first else "")
         raise InputError(
@@ -200,7 +199,7 @@ def _from_first_frame(file: Path, times: np.ndarray, view: Footage) -> np.ndarra
                 "give the times of the first frame and of the last too"
             )
         fitting = [fitting[int(np.argmax(borne))]]
-    return times[fitting[0] :]
+    return times[fitting[0] :][:n]
 
 
 def _refuse_far(file: Path, times: np.ndarray, fps: float) -> None:

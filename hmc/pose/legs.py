@@ -32,8 +32,6 @@ _LIMBS = np.concatenate([limb.landmarks for limb in LIMBS.values()])
 
 #: Legs can be told apart where none of these is missing.
 LEG_DOFS = np.concatenate([np.r_[LIMBS[leg].dofs, LIMBS[leg].end_dofs] for leg in ("r_leg", "l_leg")])
-
-
 #: Frames a second up to which the weight of a jump was chosen.
 RATE = 30.0
 
@@ -49,7 +47,7 @@ class LegSettings:
     doubt : float
         Share by which exchanged legs count more than they cost: where hulls are poor, small differences say nothing.
     jump_weight : float
-        Cost, square metres, of a jump of the legs' velocity by one metre a second.
+        Cost, square metres, of a jump of the legs' velocity by one metre a second, up to `RATE` frames a second; more in proportion.
     largest_jump_m_s : float
         A greater jump costs no more than this one, so that a frame that went wrong does not decide alone.
     reach_s : float

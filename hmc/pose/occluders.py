@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import cv2
@@ -70,11 +70,14 @@ class Sightings:
     side : int
         Of a patch, pixels.
     shown, hidden : ndarray of uint16, shape (n_rows, n_columns, n_steps)
+    before : int
+        Steps nearer than the first of these, in which nobody is.
     """
 
     side: int
     shown: np.ndarray
     hidden: np.ndarray
+    before: int = 0
 
 
 @dataclass(frozen=True)
@@ -136,10 +139,10 @@ def learn_hidden_places(rig: Rig, grid: VoxelGrid, run: RunOptions, states: Pose
         skin[person] = flesh.points[flesh.is_surface], flesh.segment[flesh.is_surface]
     depths = np.array([states.states[posed, :3] @ camera.rotation[2] + camera.translation[2] for camera in rig])
     away = np.maximum(1.0, np.median(depths, axis=1)).tolist()
-    farthest = np.maximum(1.0, depths.max(axis=1) + LIMB_REACH_M).tolist()
+    ranges = np.stack([depths.min(axis=1) - LIMB_REACH_M, depths.max(axis=1) + LIMB_REACH_M], axis=1)
 
     def count(some: list[int]) -> tuple[list[Sightings], np.ndarray]:
-        sightings = [no_sightings(*one) for one in zip(rig, away, farthest, strict=True)]
+        sightings = [no_sightings(*one) for one in zip(rig, away, ranges, strict=True)]
         low, high = np.full(3, np.inf), np.full(3, -np.inf)
         for step in kept_frames(run.masks or "", run.key, some) or ():
             people = [(int(states.persons[row]), states.states[row]) for row in np.flatnonzero((states.frames == step.index) & posed)]
@@ -159,15 +162,16 @@ def _all_of(parts: Sequence[Sightings]) -> Sightings:
     """One camera's sightings in several lots of frames, together."""
     shown = np.array([one.shown for one in parts]).sum(axis=0, dtype=np.uint16)
     hidden = np.array([one.hidden for one in parts]).sum(axis=0, dtype=np.uint16)
-    return Sightings(parts[0].side, shown, hidden)
+    return replace(parts[0], shown=shown, hidden=hidden)
 
 
-def no_sightings(camera: Camera, depth_m: float, farthest_m: float) -> Sightings:
-    """Nothing seen yet by a camera from which people are mostly and at most so far away, metres."""
+def no_sightings(camera: Camera, depth_m: float, range_m: Sequence[float]) -> Sightings:
+    """Nothing seen yet by a camera from which people are mostly so far away, and between these two depths, metres."""
     side = max(1, round(PATCH_M * float(camera.matrix[0, 0]) / depth_m))
     width, height = camera.size
-    shape = -(-height // side), -(-width // side), math.ceil(farthest_m / STEP_M)
-    return Sightings(side, np.zeros(shape, np.uint16), np.zeros(shape, np.uint16))
+    before, behind = max(0, math.floor(range_m[0] / STEP_M)), max(1, math.ceil(range_m[1] / STEP_M))
+    shape = -(-height // side), -(-width // side), max(1, behind - before)
+    return Sightings(side, np.zeros(shape, np.uint16), np.zeros(shape, np.uint16), before)
 
 
 def count_bodies(sightings: Sequence[Sightings], rig: Rig, step: MaskStep, points: np.ndarray) -> None:
@@ -197,7 +201,7 @@ def count_bodies(sightings: Sequence[Sightings], rig: Rig, step: MaskStep, point
         # A patch can show the nearest body alone.
         patch, place = np.unique(row[near_first] // own.side * n_columns + column[near_first] // own.side, return_index=True)
         nearest = near_first[place]
-        depth_step = np.minimum((depth[nearest] / STEP_M).astype(int), n_steps - 1)
+        depth_step = np.clip((depth[nearest] / STEP_M).astype(int) - own.before, 0, n_steps - 1)
         some = _patches_of(mask, own.side, (n_rows, n_columns))
         beside = np.asarray(cv2.dilate(some, np.ones((2 * OUTLINE + 1, 2 * OUTLINE + 1), np.uint8)))
         shown = some.ravel()[patch] > 0
@@ -225,7 +229,10 @@ def blocked_from(sightings: Sightings) -> BlockedView:
     # past the edge of a table. In between a camera that shows nothing says nothing.
     n_steps = shown.shape[-1]
     free_to = np.where(sightings.shown.any(axis=-1), n_steps - (sightings.shown[..., ::-1] > 0).argmax(axis=-1), 0)
-    return BlockedView(sightings.side, np.where(blocked.any(axis=-1), np.minimum(first, free_to) * STEP_M, np.inf))
+    step = np.minimum(first, free_to)
+    # Of a patch that has shown nobody nothing is known before its first step either.
+    depth = np.where(step > 0, (step + sightings.before) * STEP_M, 0.0)
+    return BlockedView(sightings.side, np.where(blocked.any(axis=-1), depth, np.inf))
 
 
 def _with_around(counts: np.ndarray) -> np.ndarray:

@@ -104,14 +104,14 @@ def test_a_board_hides_what_is_behind_it_and_only_that(tmp_path):
 def test_a_body_lost_before_one_that_is_shown_blocks_nothing_however_far(away):
     """Of a hundred bodies at one place five are lost, and as many are shown a metre behind: depths are told apart there as well."""
     rig = Rig(tuple(look_at(name, SIZE, [away, 0, 1.6], [0, 0, 1.6], 5) for name in "abc"))
-    sightings = no_sightings(rig[0], away, away + 2)
-    others = [no_sightings(camera, away, away + 2) for camera in rig[1:]]
+    sightings = no_sightings(rig[0], away, (away - 2, away + 2))
+    others = [no_sightings(camera, away, (away - 2, away + 2)) for camera in rig[1:]]
     mask = np.ones(SIZE[::-1], bool)
     for x, masks, times in ((0.0, np.zeros_like(mask), 5), (0.0, mask, 95), (-1.0, mask, 100)):
         step = MaskStep(0, (None,) * 3, (masks, mask, mask), (None,) * 3)
         for _ in range(times):
             count_bodies([sightings, *others], rig, step, np.array([[x, 0, 1.6]]))
-    assert sightings.hidden.sum() == 5
+    assert sightings.hidden.sum() == 5 and sightings.shown.shape[2] <= 41  # no more for who is far away
     assert blocked_from(sightings).depth[sightings.shown.any(axis=-1)].min() > away + 0.5
 
 
