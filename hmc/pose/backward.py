@@ -3,7 +3,7 @@
 A filter knows only the frames before: a limb that it loses stays lost until the silhouettes show it again, and the body was fitted to the
 first second and a half. When the recording is over more is known:
 
-1. Who was followed the wrong way round is turned about (`hmc.pose.turned`).
+1. Who was followed the wrong way round, by shapes and by the colors of heads, is turned about (`hmc.pose.turned`).
 2. What the scene hides from single cameras is learnt from the first pass's poses (`hmc.pose.occluders`); and what another's pose
    covers asks nothing of a person. Feet that stand, as their motion tells, are held to the floor, or to what is on it
    (`hmc.pose.contacts`).
@@ -38,6 +38,7 @@ from hmc.io.results import TrackTable
 from hmc.pose.anew import doubtful_frames, pose_anew
 from hmc.pose.contacts import ground_notes, standing_feet
 from hmc.pose.follow import FollowOptions, PosedPeople, persons_of
+from hmc.pose.head_colors import turned_by_heads
 from hmc.pose.keypoint_cues import beside_body, learn_beside
 from hmc.pose.limb_colors import Found, OtherLimb, limbs_by_color
 from hmc.pose.method import SURFACE_POINTS, Capture, PoseMethod, Subject, make_subject, other_rng
@@ -250,7 +251,9 @@ def _followed_wrongly(pass_: SecondPass, people: PosedPeople, fitted: np.ndarray
         number: stretches(people.frames[person.rows], person.own[:, 3], pass_.recording.fps, turned_settings)
         for number, person in persons.items()
     }
-    return followed_wrongly(followed, evidence_in, turned_settings)
+    if not pass_.recording.has_images:
+        return followed_wrongly(followed, evidence_in, turned_settings)
+    return followed_wrongly(followed, evidence_in, turned_settings, partial(turned_by_heads, pass_))
 
 
 def _turned_about(

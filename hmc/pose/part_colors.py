@@ -159,12 +159,15 @@ class Shown:
         Along the camera's axis, metres.
     kind, chain : ndarray of int, shape (n,)
         Of the skin, as in `Skin`.
+    point : ndarray of int, shape (n,)
+        Which point of its person's skin it is.
     """
 
     patch: np.ndarray
     depth: np.ndarray
     kind: np.ndarray
     chain: np.ndarray
+    point: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -225,11 +228,12 @@ def shown(camera: Camera, side: int, people: Iterable[tuple[Skin, np.ndarray]]) 
     """
     skins, points = zip(*people, strict=True)
     kind, chain = (np.concatenate([getattr(skin, name) for skin in skins]) for name in ("kind", "chain"))
+    point = np.concatenate([np.arange(len(skin.kind)) for skin in skins])
     patch, depth, seen = _patches(camera, side, np.concatenate(points))
     near_first = np.flatnonzero(seen)[np.argsort(depth[seen], kind="stable")]
     patches, first = np.unique(patch[near_first], return_index=True)
     nearest = near_first[first]
-    return Shown(patches, depth[nearest], kind[nearest], chain[nearest])
+    return Shown(patches, depth[nearest], kind[nearest], chain[nearest], point[nearest])
 
 
 def _patches(camera: Camera, side: int, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

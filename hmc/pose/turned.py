@@ -3,7 +3,8 @@
 A hull hardly tells a person's front from the back in one frame: feet, bent knees and elbows and the way of a walk do, over many. The body
 turned about is refined beside the pose as it is, and the logarithms of the ratios of their costs are summed up: frame by frame while a
 person is followed (`hmc.pose.recovery`), and over frames of the whole run when the recording is over (`hmc.pose.backward`), since who was
-followed the wrong way round from the first pose on was found among others, in silhouettes that told little.
+followed the wrong way round from the first pose on was found among others, in silhouettes that told little. Where these leave it open, the
+colors of heads have a say (`hmc.pose.head_colors`).
 
 Nobody turns about from one frame to the next. Where a followed heading does, one side of that moment was followed the wrong way round, if
 nothing else speaks against it: evidence for the body turned about on one side is evidence against it on the other.
@@ -29,6 +30,10 @@ from hmc.pose.views.person_view import PersonView
 from hmc.search.paths import cheapest_path
 
 __all__ = ["Stretch", "TurnedAbout", "TurnedSettings", "followed_wrongly", "stretches", "turn_about"]
+
+
+#: Frames, and who is asked of in each, to evidence for the body turned about by person, frame by frame.
+EvidenceIn = Callable[[Mapping[int, Sequence[int]]], Iterator[Mapping[int, float]]]
 
 
 @dataclass(frozen=True)
@@ -138,9 +143,7 @@ def stretches(frames: np.ndarray, headings: np.ndarray, fps: float, settings: Tu
 
 
 def followed_wrongly(
-    followed: Mapping[int, Sequence[Stretch]],
-    evidence_in: Callable[[Mapping[int, Sequence[int]]], Iterator[Mapping[int, float]]],
-    settings: TurnedSettings,
+    followed: Mapping[int, Sequence[Stretch]], evidence_in: EvidenceIn, settings: TurnedSettings, heads_in: EvidenceIn | None = None
 ) -> dict[int, list[int]]:
     """In which frames people were followed the wrong way round.
 
@@ -152,27 +155,39 @@ def followed_wrongly(
         ``evidence_in(persons) -> iterator over the frames of evidence by person``, of the persons asked of by frame, as `TurnedAbout` has
         it; a person of whom a frame shows too little is not in it.
     settings : TurnedSettings
+    heads_in : callable, optional
+        The same of what the colors of heads say for the body turned about (`hmc.pose.head_colors`), nats; asked of where shapes leave it
+        open which way round somebody is.
 
     Returns
     -------
     dict of int to list of int
         By person, rising; those of whom no frame is wrong are not in it. Stretch by stretch it is as the evidence has it in sum, with
         `TurnedSettings.about` against two stretches that are right, or wrong, on both sides of a moment of turning about. A stretch of
-        which fewer than `TurnedSettings.first` frames tell is as its neighbors have it, unless those say that it is right.
+        which fewer than `TurnedSettings.first` frames tell is as its neighbors and its heads' colors have it, unless those frames say that
+        it is right.
     """
     parts = [(person, stretch) for person, of in followed.items() for stretch in of]
     chosen = [spread_frames(stretch.frames, settings.frames) for _, stretch in parts]
     stride = max(1, settings.frames // settings.first)
     found: list[list[float]] = [[] for _ in parts]
-    for begin in ([0], range(1, stride)):
+    heads: list[list[float]] = [[] for _ in parts]
+
+    def ask(asking: EvidenceIn, begin: Sequence[int], told_of: list[list[float]]) -> None:
         left = [k for k, told in enumerate(found) if len(told) < settings.first or np.mean(told) > -settings.sure]
         asked = sorted((frame, k) for k in left for first in begin for frame in chosen[k][first::stride])
         part_of = {(frame, parts[k][0]): k for frame, k in asked}
         by_frame = {frame: [parts[k][0] for _, k in some] for frame, some in groupby(asked, itemgetter(0))}
-        for frame, told in zip(by_frame, evidence_in(by_frame), strict=True):
+        for frame, told in zip(by_frame, asking(by_frame), strict=True):
             for person, evidence in told.items():
-                found[part_of[frame, person]].append(evidence)
-    sums = iter([sum(told) if len(told) >= settings.first else min(0.0, sum(told)) for told in found])
+                told_of[part_of[frame, person]].append(evidence)
+
+    ask(evidence_in, [0], found)
+    ask(evidence_in, range(1, stride), found)
+    if heads_in is not None:
+        ask(heads_in, range(stride), heads)
+    by_shape = [sum(told) if len(told) >= settings.first else min(0.0, sum(told)) for told in found]
+    sums = iter([of_shape + sum(told) for of_shape, told in zip(by_shape, heads, strict=True)])
     wrong: dict[int, list[int]] = {}
     for person, of in followed.items():
         turned = _wrong_ones([next(sums) for _ in of], [stretch.about for stretch in of], settings.about)

@@ -130,7 +130,8 @@ def _learnt(color_of_kind: list[int]) -> PartColors:
     for camera in range(len(RIG)):
         kind = np.repeat(np.arange(len(KINDS)), 100)
         bins = np.array(color_of_kind, np.int16)[kind]
-        count_colors(counts, camera, Shown(np.arange(len(kind)), np.ones(len(kind)), kind, np.zeros_like(kind)), bins, [0])
+        place = np.arange(len(kind))
+        count_colors(counts, camera, Shown(place, np.ones(len(kind)), kind, np.zeros_like(kind), place), bins, [0])
     return learn_part_colors(counts)
 
 
@@ -152,6 +153,6 @@ def test_a_person_of_one_color_and_one_who_was_hardly_seen_say_nothing():
 
 def test_colors_of_other_people_and_of_doubtful_limbs_are_not_learnt():
     counts = no_counts(RIG)
-    seen = Shown(np.arange(4), np.ones(4), np.array([0, ANOTHER, 2, 2]), np.array([0, ANOTHER, 1, 2]))
+    seen = Shown(np.arange(4), np.ones(4), np.array([0, ANOTHER, 2, 2]), np.array([0, ANOTHER, 1, 2]), np.arange(4))
     count_colors(counts, 1, seen, np.array([5, 5, 6, 7], np.int16), [0, 1])
     assert counts.sum() == 2 and counts[1, 0, 5] == counts[1, 2, 6] == 1

@@ -10,7 +10,7 @@ import numpy as np
 
 from hmc.camera.model import Camera
 
-__all__ = ["N_BINS", "OUTSIDE", "PATCH_M", "patch_bins", "patch_of_pixel", "patch_shape", "patch_side"]
+__all__ = ["N_BINS", "OUTSIDE", "PATCH_M", "patch_bins", "patch_means", "patch_of_pixel", "patch_shape", "patch_side"]
 
 #: Side of a patch on the person, metres.
 PATCH_M = 0.03
@@ -39,8 +39,8 @@ def patch_of_pixel(camera: Camera, side: int, row: np.ndarray, column: np.ndarra
     return row // side * patch_shape(camera, side)[1] + column // side
 
 
-def patch_bins(camera: Camera, image: np.ndarray, mask: np.ndarray, side: int) -> np.ndarray:
-    """The bin of each patch's mean color over its silhouette.
+def patch_means(camera: Camera, image: np.ndarray, mask: np.ndarray, side: int) -> tuple[np.ndarray, np.ndarray]:
+    """The mean color of each patch over its silhouette, where it is not hardly silhouette.
 
     Parameters
     ----------
@@ -53,14 +53,15 @@ def patch_bins(camera: Camera, image: np.ndarray, mask: np.ndarray, side: int) -
 
     Returns
     -------
-    ndarray of int16, shape (n_rows * n_columns,)
-        `OUTSIDE` where the patch is hardly silhouette.
+    patch : ndarray of int, shape (n,)
+        Flat, rising.
+    mean : ndarray of float32, shape (n, 3)
+        CIE L*a*b* as OpenCV has it in bytes: lightness of 255, and grey at 128.
     """
-    n_rows, n_columns = patch_shape(camera, side)
-    bins = np.full(n_rows * n_columns, OUTSIDE, np.int16)
+    n_columns = patch_shape(camera, side)[1]
     rows, columns = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
     if not len(rows):
-        return bins
+        return np.empty(0, int), np.empty((0, 3), np.float32)
     (top, bottom), (left, right) = ((ends[0] // side, ends[-1] // side + 1) for ends in (rows, columns))
     box = slice(top * side, bottom * side), slice(left * side, right * side)
     there, lab = mask[box].astype(np.float32), cv2.cvtColor(np.ascontiguousarray(image[box]), cv2.COLOR_BGR2LAB)
@@ -68,10 +69,27 @@ def patch_bins(camera: Camera, image: np.ndarray, mask: np.ndarray, side: int) -
     values = np.pad(values, ((0, (bottom - top) * side - len(there)), (0, (right - left) * side - there.shape[1]), (0, 0)))
     sums = values.reshape(bottom - top, side, right - left, side, 4).sum(axis=(1, 3))
     own = sums[..., 0] >= MOST_OF * side * side
-    mean = sums[own][:, 1:] / sums[own][:, :1]
+    at = np.flatnonzero(own)
+    patch = (top + at // (right - left)) * n_columns + left + at % (right - left)
+    return patch, sums[own][:, 1:] / sums[own][:, :1]
+
+
+def patch_bins(camera: Camera, image: np.ndarray, mask: np.ndarray, side: int) -> np.ndarray:
+    """The bin of each patch's mean color over its silhouette.
+
+    Parameters
+    ----------
+    camera, image, mask, side
+        As for `patch_means`.
+
+    Returns
+    -------
+    ndarray of int16, shape (n_rows * n_columns,)
+        `OUTSIDE` where the patch is hardly silhouette.
+    """
+    bins = np.full(np.prod(patch_shape(camera, side)), OUTSIDE, np.int16)
+    patch, mean = patch_means(camera, image, mask, side)
     low, step = np.array([0.0, 128 - CHROMA, 128 - CHROMA]), np.array([256, 2 * CHROMA, 2 * CHROMA]) / STEPS
     place = np.clip(((mean - low) / step).astype(int), 0, STEPS - 1)
-    at = np.flatnonzero(own)
-    flat = (top + at // (right - left)) * n_columns + left + at % (right - left)
-    bins[flat] = np.ravel_multi_index(tuple(place.T), (STEPS,) * 3)
+    bins[patch] = np.ravel_multi_index(tuple(place.T), (STEPS,) * 3)
     return bins
