@@ -35,7 +35,7 @@ FOLLOWING = PERSON | FINISHED | {"pose.finished", "pose.records", "pose.follow",
 METHODS = STARTS | MIXTURES | {"pose.recovery", "pose.methods"}
 POSE = METHODS | FOLLOWING | {"pose.backward", "pose.clear_views", "pose.keypoint_tracks", "pose.occluders", "pose.registry"}
 POSE |= {"pose.contacts", "pose.keypoint_views", "pose.limb_colors", "pose.second_pass", "pose.trust", "pose.trust_model"}
-POSE |= {"pose.chain", "pose.turned_back", "pose.turned_by_keypoints", "pose.turned_by_silhouettes"}
+POSE |= {"pose.chain", "pose.head_colors", "pose.turned_back", "pose.turned_by_keypoints", "pose.turned_by_silhouettes"}
 METRICS = IO | {"metrics"}
 VIEW = VOXELS | {"body", "view"}
 EVERYTHING = POSE | METRICS | VIEW | {"motion", "check", "synthetic", "plugins"}
@@ -71,8 +71,11 @@ MAY_IMPORT = {
     "pose.occluders": VIEWS,
     "pose.part_colors": VIEWS,
     "pose.second_pass": FOLLOWING | MIXTURES | {"pose.contacts", "pose.occluders"},
+    "pose.head_colors": VIEWS | {"pose.part_colors", "pose.second_pass"},
     "pose.limb_colors": FOLLOWING | MIXTURES | {"pose.clear_views", "pose.second_pass", "pose.trust"},
-    "pose.backward": FOLLOWING | MIXTURES | {"pose.backward", "pose.contacts", "pose.limb_colors", "pose.occluders", "pose.second_pass"},
+    "pose.backward": FOLLOWING
+    | MIXTURES
+    | {"pose.backward", "pose.contacts", "pose.head_colors", "pose.limb_colors", "pose.occluders", "pose.second_pass"},
     "pose.contacts": BODY | IO,
     "pose.turned_by_keypoints": OBJECTIVES | {"pose.keypoint_cues"},
     "pose.turned_by_silhouettes": VOXELS,

@@ -17,12 +17,13 @@ def one_way(frames):
     return stretches(np.array(frames, int), np.zeros(len(frames)), 25.0, SETTINGS)
 
 
-def asked(evidence, frames=None, settings=SETTINGS):
-    """Who is found in which frames, and which were asked of each person, by evidence ``evidence(person, frame)``."""
+def asked(evidence, frames=None, settings=SETTINGS, heads=None):
+    """Who is found in which frames, and which were asked of each person, by evidence ``evidence(person, frame)``; with that of ``heads``,
+    which were asked for it."""
     people = {person: one_way(of) for person, of in (frames or dict.fromkeys(range(3), FRAMES)).items()}
-    seen = {person: [] for person in people}
+    seen, seen_heads = ({person: [] for person in people} for _ in range(2))
 
-    def evidence_in(asked):
+    def evidence_in(evidence, seen, asked):
         assert list(asked) == sorted(asked)
         for frame, persons in asked.items():
             told = {person: evidence(person, frame) for person in persons}
@@ -30,7 +31,21 @@ def asked(evidence, frames=None, settings=SETTINGS):
                 seen[person].append(frame)
             yield {person: value for person, value in told.items() if value is not None}
 
-    return followed_wrongly(people, evidence_in, settings), seen
+    if heads is None:
+        return followed_wrongly(people, partial(evidence_in, evidence, seen), settings), seen
+    found = followed_wrongly(people, partial(evidence_in, evidence, seen), settings, partial(evidence_in, heads, seen_heads))
+    return found, seen_heads
+
+
+def test_heads_are_asked_where_shapes_leave_it_open_and_tell_in_a_single_frame():
+    frames = {0: FRAMES, 1: FRAMES, 2: FRAMES[:1], 3: FRAMES[:1], 4: []}
+    mean = {0: -0.6, 1: -0.1, 2: -0.2, 3: -0.2}
+    by_head = {1: 0.2, 2: 0.5, 3: 0.1}
+    found, seen = asked(lambda person, frame: mean[person], frames, heads=lambda person, frame: by_head[person])
+    assert found == {1: FRAMES, 2: FRAMES[:1]}
+    assert {person: len(of) for person, of in seen.items()} == {0: 0, 1: SETTINGS.frames, 2: 1, 3: 1, 4: 0}
+    found, _ = asked(lambda person, frame: 0.1, heads=lambda person, frame: None if person else -0.3)
+    assert found == {1: FRAMES, 2: FRAMES}
 
 
 def test_the_mean_over_the_run_decides_and_who_is_surely_right_is_asked_less():
