@@ -13,8 +13,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hmc.camera.model import Rig
-from hmc.io.masks import kept_frames
-from hmc.io.recording import iterate_frames
 from hmc.pose.part_colors import KINDS, Skin, patch_sides, shown, skin_of
 from hmc.pose.views.color_patches import patch_means
 
@@ -134,12 +132,9 @@ def turned_by_heads(pass_: SecondPass, asked: Mapping[int, Sequence[int]]) -> It
     """
     if not asked:
         return
-    recording, poses, frames = pass_.recording, pass_.states, list(asked)
+    rig, poses = pass_.recording.rig, pass_.states
     skins = {person: skin_of(body) for person, body in pass_.bodies.items()}
-    masks = kept_frames(pass_.run.masks or "", pass_.run.key, frames) or ()
-    # Read in one go: to open a video in the middle takes as long as to pass over what is before.
-    images = iterate_frames(recording, frames[0], frames[-1] + 1, on_problem=lambda _: None, only=set(frames))
-    for step, frame in zip(masks, images, strict=True):
+    for frame, step in pass_.pictures(list(asked)):
         rows = np.flatnonzero((poses.frames == frame.index) & np.isfinite(poses.states).all(axis=1))
         placed = {
             person: skins[person].placed(pass_.bodies[person], poses.states[row])
@@ -148,6 +143,6 @@ def turned_by_heads(pass_: SecondPass, asked: Mapping[int, Sequence[int]]) -> It
         told = {}
         for person in asked[frame.index]:
             people = [(skins[one] if one == person else skins[one].of_another(), points) for one, points in placed.items()]
-            sides = patch_sides(recording.rig, placed[person].mean(axis=0))
-            told[person] = -facing_by_redness(*face_patches(recording.rig, frame.images, step.masks, sides, people, skins[person]))
+            sides = patch_sides(rig, placed[person].mean(axis=0))
+            told[person] = -facing_by_redness(*face_patches(rig, frame.images, step.masks, sides, people, skins[person]))
         yield told

@@ -27,8 +27,7 @@ from hmc.body.limbs import LIMBS
 from hmc.body.model import BodyModel
 from hmc.body.prior import POSTURE
 from hmc.camera.model import Rig
-from hmc.io.masks import kept_frames
-from hmc.io.recording import Recording, iterate_frames, spread_frames
+from hmc.io.recording import Recording, spread_frames
 from hmc.landmarks import TRUSTED
 from hmc.motion.smoothing import stretches
 from hmc.pose.clear_views import kept_borne_out
@@ -207,11 +206,8 @@ class _Asking:
         return self.pass_.recording.rig
 
     def colors_in(self, frames: Sequence[int]) -> Iterator[FrameColors]:
-        """The patches of some frames, rising; what cannot be read was told when silhouettes were made."""
-        masks = kept_frames(self.pass_.run.masks or "", self.pass_.run.key, frames) or ()
-        # Read in one go: to open a video in the middle takes as long as to pass over what is before.
-        images = iterate_frames(self.pass_.recording, frames[0], frames[-1] + 1, on_problem=lambda _: None, only=set(frames))
-        for step, frame in zip(masks, images, strict=True):
+        """The patches of some frames, rising."""
+        for frame, step in self.pass_.pictures(frames):
             yield frame_colors(self.rig, frame.images, step.masks, self.sides)
 
     def shown(self, frame: int, colors: FrameColors, person: int, without: int | None = None) -> dict[int, Shown]:

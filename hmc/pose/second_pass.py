@@ -9,8 +9,8 @@ from typing import TypeVar
 import numpy as np
 
 from hmc.body.model import BodyModel
-from hmc.io.masks import kept_frames
-from hmc.io.recording import Recording
+from hmc.io.masks import MaskStep, kept_frames
+from hmc.io.recording import Frame, Recording, iterate_frames
 from hmc.io.results import PoseStates, TrackTable
 from hmc.pose.contacts import Footing
 from hmc.pose.follow import FollowOptions
@@ -103,6 +103,13 @@ class SecondPass:
             unseen = None if self.places is None else unseen_voxels(self.places, hull.masks)
             views = views_of(self.recording, grid, self.tracks, hull, unseen=unseen)
             yield with_keypoints(views, self.recording.rig, self.tracks, self.options.keypoints, hull.masks)
+
+    def pictures(self, frames: Sequence[int]) -> Iterator[tuple[Frame, MaskStep]]:
+        """Images and silhouettes of some frames, rising; what cannot be read was told when silhouettes were made."""
+        masks = kept_frames(self.run.masks or "", self.run.key, frames) or ()
+        # Read in one go: to open a video in the middle takes as long as to pass over what is before.
+        images = iterate_frames(self.recording, frames[0], frames[-1] + 1, on_problem=lambda _: None, only=set(frames))
+        return zip(images, masks, strict=True)
 
     def rng(self, person: int, frame: int) -> np.random.Generator:
         """The random numbers of a person's frame."""

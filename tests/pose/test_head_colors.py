@@ -9,25 +9,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from methods import HEIGHT_M, VOXEL_M, followed, tiny_clip, true_tracks
+from standing import BODY, RIG, SIDES, SKIN, STATE
 
 from hmc.body.exchange import swapped_pose
-from hmc.body.model import neutral_state
-from hmc.body.proportions import default_body, make_bodies
+from hmc.body.proportions import make_bodies
 from hmc.camera.model import project
-from hmc.pose import head_colors
+from hmc.pose import second_pass
 from hmc.pose.backward import backward
 from hmc.pose.follow import FollowOptions
 from hmc.pose.head_colors import ALIKE, FACE_M, FLOOR, LEAST_PATCHES, MOST_NATS, face_patches, facing_by_redness
-from hmc.pose.part_colors import KINDS, patch_sides, skin_of
+from hmc.pose.part_colors import KINDS
 from hmc.pose.registry import pose_method
 from hmc.voxels.run_options import RunOptions
 
-RIG = tiny_clip(1).rig
-BODY = default_body(1.75)
-SKIN = skin_of(BODY)
-STATE = neutral_state("down")
-STATE[:3] = 0.0, 0.0, 0.95
-SIDES = patch_sides(RIG, STATE[:3])
 RED, GREY = (90, 110, 190), (110, 110, 110)
 
 
@@ -130,13 +124,13 @@ def test_in_a_moment_of_a_recording_the_face_tells_who_is_the_wrong_way_round(co
     states = np.array([swapped_pose(body, state, "all") for state in people.states.states])
     lost = replace(people, states=replace(people.states, states=states))
     if not colored:
-        read = head_colors.iterate_frames
+        read = second_pass.iterate_frames
 
         def grey(*args, **options):
             for frame in read(*args, **options):
                 yield replace(frame, images=tuple(None if image is None else np.full_like(image, 120) for image in frame.images))
 
-        monkeypatch.setattr(head_colors, "iterate_frames", grey)
+        monkeypatch.setattr(second_pass, "iterate_frames", grey)
     found = backward(tiny_clip(3), true_tracks(3), pose_method("apf"), lost, FollowOptions(VOXEL_M, 3, HEIGHT_M), run)
     way = np.cos(found.states.states[:, 3] - people.states.states[:, 3])
     assert (way > 0.8).all() if colored else (way < -0.8).all()

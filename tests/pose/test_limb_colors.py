@@ -14,7 +14,7 @@ from hmc.body.kinematics import landmarks
 from hmc.body.limbs import LIMBS
 from hmc.body.proportions import make_bodies
 from hmc.landmarks import LANDMARKS
-from hmc.pose import limb_colors
+from hmc.pose import limb_colors, second_pass
 from hmc.pose.backward import backward
 from hmc.pose.follow import FollowOptions
 from hmc.pose.part_colors import ColorSettings
@@ -73,14 +73,14 @@ def test_an_arm_before_the_chest_is_put_where_its_colors_are(one_pass, no_sweep)
 def test_images_of_one_color_change_nothing_but_what_silhouettes_deny(one_pass, no_sweep, monkeypatch):
     people, run = one_pass
     lost = with_the_arm_before_the_chest(people)
-    read, asked = limb_colors.iterate_frames, []
+    read, asked = second_pass.iterate_frames, []
 
     def grey(*args, **options):
         for frame in read(*args, **options):
             asked.append(frame.index)
             yield replace(frame, images=tuple(None if image is None else np.full_like(image, 120) for image in frame.images))
 
-    monkeypatch.setattr(limb_colors, "iterate_frames", grey)
+    monkeypatch.setattr(second_pass, "iterate_frames", grey)
     settings = ColorSettings(own_share=2.0, least_nats=-1.0)
     np.testing.assert_allclose(second(people, run, settings).positions, people.positions, atol=1e-9)
     assert asked

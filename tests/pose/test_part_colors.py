@@ -5,11 +5,10 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
-from methods import tiny_clip
+from standing import BODY, RIG, SIDES, SKIN, STATE
 
 from hmc.body.limbs import LIMBS
-from hmc.body.model import PARTS, neutral_state
-from hmc.body.proportions import default_body
+from hmc.body.model import PARTS
 from hmc.camera.model import project
 from hmc.landmarks import LANDMARKS
 from hmc.pose.part_colors import (
@@ -23,18 +22,9 @@ from hmc.pose.part_colors import (
     gains,
     learn_part_colors,
     no_counts,
-    patch_sides,
     shown,
-    skin_of,
 )
 from hmc.pose.views.color_patches import CHROMA, MOST_OF, N_BINS, OUTSIDE, STEPS, patch_bins, patch_shape
-
-RIG = tiny_clip(1).rig
-BODY = default_body(1.75)
-SKIN = skin_of(BODY)
-STATE = neutral_state("down")
-STATE[:3] = 0.0, 0.0, 0.95
-SIDES = patch_sides(RIG, STATE[:3])
 
 
 def test_bins_of_patches_are_those_of_a_loop():
