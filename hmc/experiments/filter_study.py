@@ -10,7 +10,7 @@ of variances; and ``strong``, with the schedules and scalable models of the pres
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from time import thread_time
@@ -55,7 +55,7 @@ from hmc.voxels.hulls import stream_hulls, stream_masks
 
 __all__ = [
     "ANNEALING", "APF", "BASE", "CHAINS", "FAMILY", "MARKERS", "METHODS", "QUICK_ACTIONS", "SHBM", "STUDY_FRAMES", "VERSION", "cell",
-    "evaluations", "others_grid", "study_grid", "study_preset",
+    "evaluations", "followed", "others_grid", "study_grid", "study_preset",
 ]  # fmt: skip
 
 FAMILY = "filters"
@@ -201,7 +201,20 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
         kept, options = tracked(inputs, parameters["recording"], 0), FollowOptions(VOXEL_M, int(rng.integers(2**31)))
         return pose_results(kept.recording, run_method(kept, pose_method(*CHAINS[parameters["method"]]), options))
     kept = tracked(inputs, parameters["recording"], parameters["cameras"])
-    recording = kept.recording
+    return followed(rng, parameters, kept.recording, lambda grid: _hulls(parameters, kept, grid))
+
+
+def followed(rng: np.random.Generator, parameters: Parameters, recording: Recording, hulls: Callable[[VoxelGrid], Path]) -> Results:
+    """Follow the first person from the true first pose in hulls that are there already; parameters and results as of `cell`.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    parameters : mapping
+    recording : Recording
+    hulls : callable
+        ``hulls(grid)`` is the folder in which `hmc.experiments.engine.inputs.write_hulls` kept those of a grid.
+    """
     truth = measured_truth(recording, parameters["recording"])
     if parameters["frames"]:
         truth = truth.where(truth.frames < truth.frames[0] + parameters["frames"])
@@ -212,7 +225,7 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
     state, _ = fit_landmarks(body, truth.positions[0], standing_state(body, truth.positions[0]))
     pose, where = begin_tracking(annealed_subject(body, capture, preset), state), truth_track(truth)
     first, last = int(truth.frames[0]), int(truth.frames[-1]) + 1
-    seen = read_hulls(_hulls(parameters, kept, grid), grid, recording, first, last)
+    seen = read_hulls(hulls(grid), grid, recording, first, last)
     step, movers = annealed_pose_step(preset), landmark_masks(body)
     estimates, seconds = {}, 0.0
     for hull in seen:

@@ -35,7 +35,7 @@ from hmc.experiments.study import change_of, runs_of, score_table, table_of
 from hmc.experiments.truth import HEIGHT_M, standing_state, stature_m
 from hmc.search.filters import AnnealedSettings, annealed_step, particle_init
 
-__all__ = ["CHANGES", "EXPERIMENT", "PLACES"]
+__all__ = ["CHANGES", "EXPERIMENT", "PLACES", "nearest_states"]
 
 #: What is seen: the true place of every landmark; or the markers of Table 6.3.
 PLACES, SEEN_MARKERS = "true places", "markers"
@@ -92,7 +92,7 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
     recording = inputs.unseen_recording(label)
     truth, drift = measured_truth(recording, label), action_drift(recording, label)
     body = canton_body(stature_m(recording) or HEIGHT_M)
-    states = _states(body, truth.positions[: parameters["frames"] or None])
+    states = nearest_states(body, truth.positions[: parameters["frames"] or None])
     true = np.array([landmarks(body, state) for state in states])
     estimates = _follow(rng, body, states[0], true, parameters["drift_scale"] * drift, _settings(parameters))
     return {
@@ -108,7 +108,7 @@ def _settings(parameters: Parameters) -> AnnealedSettings:
     return AnnealedSettings(parameters["layers"], parameters["particles"], SURVIVAL, parameters["spread"])
 
 
-def _states(body: BodyModel, positions: np.ndarray) -> np.ndarray:
+def nearest_states(body: BodyModel, positions: np.ndarray) -> np.ndarray:
     """The poses of a body that are nearest to true landmarks (n, 15, 3), each sought from the one before; (n, 37)."""
     state, states = standing_state(body, positions[0]), []
     for points in positions:

@@ -13,7 +13,18 @@ from hmc.synthetic.room import box_mesh, cast_rays
 from hmc.synthetic.scene import Crowd, Scene
 from hmc.synthetic.shading import ShadowMap, contact_map, flat_index, irradiance, look_up, shadow_map, soft_shadow
 
-__all__ = ["Backdrop", "LitCrowd", "develop", "exposure", "light_crowd", "make_backdrop", "picture", "relit", "static_shadows"]
+__all__ = [
+    "Backdrop",
+    "LitCrowd",
+    "develop",
+    "exposure",
+    "light_crowd",
+    "make_backdrop",
+    "person_pixels",
+    "picture",
+    "relit",
+    "static_shadows",
+]
 
 #: Anti-aliasing: every pixel of a person is the mean of this many samples squared.
 SAMPLES = 2
@@ -213,6 +224,13 @@ def picture(scene: Scene, camera: Camera, backdrop: Backdrop, lit: LitCrowd) -> 
         counts = np.stack([np.bincount(place[whose == k], minlength=len(touched)) for k in range(-1, len(scene.actors))])
         labels[touched] = np.where(coverage >= 0.5, counts.argmax(axis=0), 0)
     return radiance, labels.reshape(height, width)
+
+
+def person_pixels(camera: Camera, crowd: Crowd, person: int) -> np.ndarray:
+    """Pixels half of which a person would cover if nothing stood before them, ndarray of bool, shape (h, w)."""
+    width, height = camera.size
+    _, pixel = _draw(camera, crowd.vertices, crowd.triangles[crowd.persons[crowd.triangles[:, 0]] == person])
+    return (2 * np.bincount(pixel, minlength=width * height) >= SAMPLES**2).reshape(height, width)
 
 
 def _draw(camera: Camera, vertices: np.ndarray, triangles: np.ndarray) -> tuple[Fragments, np.ndarray]:

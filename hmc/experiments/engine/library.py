@@ -31,6 +31,7 @@ EXPERIMENTS = {
     "why-behind": "why_behind",
     "why-lost": "why_lost",
     "why-slow": "why_slow",
+    "why-hulls": "why_hulls",
     "fig-5.3": "fig_5_3",
     "fig-5.4": "fig_5_4",
     "fig-5.5": "fig_5_5",
