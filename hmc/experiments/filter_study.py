@@ -20,7 +20,8 @@ import numpy as np
 
 from hmc.body.inverse import fit_landmarks
 from hmc.body.kinematics import landmark_masks, landmarks
-from hmc.body.proportions import canton_body
+from hmc.body.model import BodyModel
+from hmc.body.proportions import canton_body, stiff_body
 from hmc.experiments import marker_runs
 from hmc.experiments.engine.experiment import Parameters, Plan, Results
 from hmc.experiments.engine.inputs import Inputs, once, read_hulls, write_hulls
@@ -55,7 +56,7 @@ from hmc.voxels.hulls import stream_hulls, stream_masks
 
 __all__ = [
     "ANNEALING", "APF", "BASE", "CHAINS", "FAMILY", "MARKERS", "METHODS", "QUICK_ACTIONS", "SHBM", "STUDY_FRAMES", "VERSION", "cell",
-    "evaluations", "followed", "others_grid", "study_grid", "study_preset",
+    "evaluations", "followed", "others_grid", "study_body", "study_grid", "study_preset",
 ]  # fmt: skip
 
 FAMILY = "filters"
@@ -95,6 +96,8 @@ BASE: dict[str, Any] = {
 QUICK_BASE = BASE | {"voxel_mm": 30, "particles": 300, "gamma": 25.0}
 QUICK_ACTIONS = ("walk", "gesture", "box")
 REPEATS = 3
+#: Bodies of the same degrees of freedom: of Table 6.1, and with the lengths and the flesh of `default`.
+BODIES = {"printed": canton_body, "people's": stiff_body}
 #: How far hulls reach beyond a person's joints, metres.
 REACH_M = 0.7
 #: Beside the filters stand the marker-based filter behind the detector of Table 6.3 ...
@@ -186,7 +189,7 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
         `BASE`: ``cameras`` and ``frames`` (0: all), ``voxel_mm``, ``annealing``, ``layers`` and ``particles`` (of the plain filter),
         ``gamma`` (particles a dimension, of models of rising detail), ``likelihood``, ``density``, ``removed_percent`` of the silhouettes
         and ``removed`` (`hmc.experiments.removal`); and, where they differ from the preset's, ``hull``, ``motion`` and ``drift_scale``;
-        and ``led``, whether the root of all particles is moved on with the person's true centroid.
+        ``body`` (of `BODIES`); and ``led``, whether the root of all particles is moved on with the person's true centroid.
     inputs : Inputs
     rng : numpy.random.Generator
 
@@ -220,7 +223,7 @@ def followed(rng: np.random.Generator, parameters: Parameters, recording: Record
         truth = truth.where(truth.frames < truth.frames[0] + parameters["frames"])
     voxel_m, preset = parameters["voxel_mm"] / 1000, study_preset(parameters)
     grid = _around(recording, voxel_m)
-    body = canton_body(stature_m(recording) or HEIGHT_M)
+    body = study_body(parameters, recording)
     capture = Capture(recording.fps, voxel_m, recording.room, recording.rig, action_drift(recording, parameters["recording"]))
     state, _ = fit_landmarks(body, truth.positions[0], standing_state(body, truth.positions[0]))
     pose, where = begin_tracking(annealed_subject(body, capture, preset), state), truth_track(truth)
@@ -246,6 +249,11 @@ def followed(rng: np.random.Generator, parameters: Parameters, recording: Record
         "truth_m": truth.positions[1:],
         "filter_s_per_frame": seconds / max(1, len(truth.frames) - 1),
     }
+
+
+def study_body(parameters: Parameters, recording: Recording) -> BodyModel:
+    """The body of a cell, of the first person's stature: the thesis's, or one of people's lengths."""
+    return BODIES[parameters.get("body", "printed")](stature_m(recording) or HEIGHT_M)
 
 
 def _led(pose: Tracked, where: TrackTable, frame: int) -> Tracked:
