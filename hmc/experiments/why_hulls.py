@@ -59,7 +59,7 @@ def grid(plan: Plan) -> list[dict]:
 
 
 def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Results:
-    """As `filter_study.cell`, in hulls of ``hulls_of``, one of `HULLS`; and ``nearest_m``, what of the truth the body can do, (n, 15, 3)."""
+    """As `filter_study.cell` in hulls of ``hulls_of``, one of `HULLS`; and ``nearest_m``, what the body can do of the truth, (n, 15, 3)."""
     label = parameters["recording"]
     recording = inputs.unseen_recording(label)
     if parameters["hulls_of"] == IMAGES:
