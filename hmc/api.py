@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Literal
 from hmc.errors import InputError
 from hmc.io.masks import MaskStep
 from hmc.io.recording import Recording, for_voxels, open_recording
-from hmc.io.results import TrackTable, read_centroids, read_joints
+from hmc.io.results import TrackTable, read_joints, read_tracks
 from hmc.processes import one_thread
 from hmc.voxels.hulls import HullStep, stream_hulls, stream_masks
 
@@ -291,7 +291,7 @@ def evaluate(found: PosedPeople | TrackTable, recording: Recording) -> PoseEvalu
     ----------
     found : PosedPeople or TrackTable
     recording : Recording
-        With ``truth/joints.csv``, or ``truth/centroids.csv`` for tracks.
+        With ``truth/joints.csv``, or ``truth/centroids.csv`` for tracks (the true pelvis where there is none). Only its frames count.
 
     Returns
     -------
@@ -311,17 +311,20 @@ def evaluate(found: PosedPeople | TrackTable, recording: Recording) -> PoseEvalu
     >>> bool(hmc.evaluate(hmc.pose(recording), recording).summary["mean_mm"] < 40)
     True
     """
-    from hmc.metrics.scores import evaluate_pose, evaluate_tracks
+    from hmc.metrics.scores import evaluate_pose, evaluate_tracks, pelvis_tracks
 
-    path = recording.path / "truth" / ("centroids.csv" if isinstance(found, TrackTable) else "joints.csv")
+    joints, centroids = (recording.path / "truth" / name for name in ("joints.csv", "centroids.csv"))
+    path = centroids if isinstance(found, TrackTable) and centroids.is_file() else joints
     if not path.is_file():
         raise InputError(f"{path}: no such file; there is no truth to evaluate against")
-    first, last = recording.start, recording.start + recording.n_frames
+
+    def selected(table):
+        return table.where((table.frames >= recording.start) & (table.frames < recording.start + recording.n_frames))
+
     if isinstance(found, TrackTable):
-        centroids = read_centroids(path)
-        return evaluate_tracks(found, centroids.where((centroids.frames >= first) & (centroids.frames < last)))
-    truth = read_joints(path)
-    return evaluate_pose(found.poses, truth.where((truth.frames >= first) & (truth.frames < last)))
+        truth = read_tracks(path) if path == centroids else pelvis_tracks(read_joints(path))
+        return evaluate_tracks(selected(found), selected(truth))
+    return evaluate_pose(selected(found.poses), selected(read_joints(path)))
 
 
 def view(found: PosedPeople | TrackTable, recording: Recording, out: str | Path, frames: Sequence[int] = ()) -> None:

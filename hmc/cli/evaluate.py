@@ -70,9 +70,9 @@ def _threshold(text: str) -> float | str:
 
 def run(args: argparse.Namespace) -> int:
     """Score, print, write."""
-    from hmc.io.results import PoseTable, read_centroids, read_joints, read_tracks, run_selection
-    from hmc.metrics.mot import MotScores
-    from hmc.metrics.scores import PoseEvaluation, angle_rows, evaluate_offsets, evaluate_pose, evaluate_tracks, pelvis_tracks
+    from hmc.io.results import PoseTable, read_joints, read_tracks, run_selection
+    from hmc.metrics.mot import MotScores, clear_mot
+    from hmc.metrics.scores import PoseEvaluation, angle_rows, comparable_tracks, evaluate_offsets, evaluate_pose, pelvis_tracks
     from hmc.metrics.scores.poses import THRESHOLDS_M
 
     if not args.directory.is_dir():
@@ -100,14 +100,17 @@ def run(args: argparse.Namespace) -> int:
         images = _in_images(args, estimated, true_poses, truth_images, selected)
 
     tracks: MotScores | None = None
-    tracks_note, beyond = "", list[str]()
-    true_tracks = None if truth_centroids is None else selected(read_centroids(truth_centroids))
+    tracks_note, tracks_notes = "", list[str]()
+    true_tracks = None if truth_centroids is None else selected(read_tracks(truth_centroids))
     if true_tracks is None and true_poses is not None:
         true_tracks, tracks_note = pelvis_tracks(true_poses), " (against the true pelvis, as there are no true centroids)"
     if true_tracks is not None and tracks_file.exists():
         found = selected(read_tracks(tracks_file))
-        tracks = evaluate_tracks(found, true_tracks)
-        beyond = _beyond_truth(found, true_tracks)
+        found, comparable, left_out = comparable_tracks(found, true_tracks)
+        tracks_notes += left_out
+        if len(comparable.frames) or not len(true_tracks.frames):
+            tracks = clear_mot(comparable, found)
+            tracks_notes += _beyond_truth(found, comparable)
     if poses is None and tracks is None and images is None:
         raise InputError(f"{args.directory}: neither joints.csv nor tracks.csv that the truth could be compared with")
     if args.angles and poses is None and images is None:
@@ -156,7 +159,7 @@ def run(args: argparse.Namespace) -> int:
             f"positives, {tracks.mismatches} mismatches in {tracks.objects} person-frames{tracks_note}"
         )
         report["tracks"] = track_summary(tracks)
-        notes += beyond
+    notes += tracks_notes
     notes += unlike_its_run(args.directory) + made_from(args.directory, args.recording)
     for note in notes:
         print(f"note: {note}")

@@ -5,16 +5,18 @@ from __future__ import annotations
 import csv
 import tomllib
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+import hmc
 from hmc.cli import main
 from hmc.errors import InputError
 from hmc.io.results import PoseTable, TrackTable, read_joints, write_joints, write_run, write_tracks
 from hmc.landmarks import LANDMARKS, landmark_index
 from hmc.metrics.persons import exchange_sides
-from hmc.metrics.scores import evaluate_pose, evaluate_tracks
+from hmc.metrics.scores import evaluate_pose, evaluate_tracks, pelvis_tracks
 
 
 @pytest.fixture
@@ -185,3 +187,51 @@ def test_a_result_without_tables_is_refused(recording, tmp_path, capsys):
 def test_empty_truth_is_refused(truth):
     with pytest.raises(InputError, match="the truth has no row in these frames"):
         evaluate_pose(truth, truth.where(np.zeros(0, int)))
+
+
+def test_tracks_are_compared_where_the_truth_says_where_people_are(result, truth, tmp_path, capsys):
+    """Without a pelvis by the middle of the hips, without these not at all; of every second frame: not between."""
+    pelvis, hips = landmark_index("pelvis"), [landmark_index("l_hip"), landmark_index("r_hip")]
+    true_pelvis = TrackTable(truth.frames, truth.persons, truth.positions[:, hips].mean(axis=1))
+    names = np.array([7, 4])[truth.persons]
+    write_tracks(result / "tracks.csv", TrackTable(truth.frames, names, true_pelvis.positions + np.array([0.02, 0, 0])))
+    every_row = np.ones(len(truth.frames), bool)
+    cases = [
+        ([pelvis], every_row, "MOTP 20.0 mm, MOTA 1.0000, 0 misses, 0 false positives, 0 mismatches in 40 person-frames", None),
+        ([pelvis, *hips], truth.frames < 5, "in 30 person-frames", "tracks are not compared in frames 0-4 (5 frames)"),
+        ([pelvis, *hips], every_row, None, "tracks are not compared in frames 0-19 (20 frames)"),
+    ]
+    for without, where, says, note in cases:
+        positions = truth.positions.copy()
+        positions[np.ix_(where, without)] = np.nan
+        write_joints(tmp_path / "reference.csv", replace(truth, positions=positions))
+        assert main(["evaluate", str(result), "--truth", str(tmp_path / "reference.csv")]) == 0
+        out = capsys.readouterr().out
+        assert says in out if says else "MOTA" not in out
+        assert note in out if note else "not compared" not in out
+    positions = truth.positions.copy()
+    positions[:, pelvis] = np.nan
+    write_joints(tmp_path / "reference.csv", replace(truth, positions=positions).where(truth.frames % 2 == 1))
+    assert main(["evaluate", str(result), "--truth", str(tmp_path / "reference.csv")]) == 0
+    out = capsys.readouterr().out
+    assert "MOTA 1.0000" in out and "20 person-frames" in out and "the truth is of one frame in 2" in out
+
+
+def test_a_person_without_any_landmark_is_not_there(truth):
+    positions = truth.positions.copy()
+    positions[truth.persons == 1] = np.nan
+    assert set(pelvis_tracks(replace(truth, positions=positions)).persons.tolist()) == {0}
+
+
+def test_true_centroids_need_no_heads(result, truth, tmp_path, capsys):
+    write_tracks(tmp_path / "where.csv", replace(centroids(truth), heads=None))
+    assert main(["evaluate", str(result), "--truth", str(tmp_path / "where.csv")]) == 0
+    assert "MOTP 60.0 mm" in capsys.readouterr().out
+
+
+def test_from_python_only_the_frames_of_the_recording_count_and_the_pelvis_will_do(recording, truth):
+    part = SimpleNamespace(path=recording, start=5, n_frames=5)
+    assert hmc.evaluate(centroids(truth), part).mota == 1
+    (recording / "truth" / "centroids.csv").unlink()
+    scores = hmc.evaluate(TrackTable(truth.frames, truth.persons, truth.positions[:, landmark_index("pelvis")]), part)
+    assert scores.mota == 1 and scores.objects == 10

@@ -7,15 +7,15 @@ from hmc.metrics.scores.poses import (
     PersonErrors,
     PoseEvaluation,
     evaluate_pose,
-    evaluate_tracks,
-    pelvis_tracks,
 )
+from hmc.metrics.scores.tracks import comparable_tracks, evaluate_tracks, pelvis_tracks
 
 __all__ = [
     "OffsetEvaluation",
     "PersonErrors",
     "PoseEvaluation",
     "angle_rows",
+    "comparable_tracks",
     "evaluate_images",
     "evaluate_offsets",
     "evaluate_pose",

@@ -1,4 +1,4 @@
-"""Scores of a result against truth: poses by landmark and person, tracks by CLEAR MOT, with what is covered and what looks odd."""
+"""Scores of poses against truth, by landmark and person, with what is covered and what looks odd."""
 
 from __future__ import annotations
 
@@ -9,16 +9,14 @@ from typing import Literal
 import numpy as np
 
 from hmc.errors import InputError
-from hmc.io.results import PoseTable, TrackTable
-from hmc.landmarks import LANDMARKS, landmark_index
+from hmc.io.results import PoseTable
+from hmc.landmarks import LANDMARKS
 from hmc.metrics.landmarks import landmark_errors, score
-from hmc.metrics.mot import MotScores, clear_mot
 from hmc.metrics.persons import LIMB_PAIRS, exchange_sides, frames_in_words, match_persons, swapped_frames
 from hmc.metrics.threshold import choose_threshold
 
 __all__ = [
-    "AUTO", "THRESHOLDS_M", "PersonErrors", "PoseEvaluation", "evaluate_pose", "evaluate_tracks", "known_thresholds", "pelvis_tracks",
-    "score_rows",
+    "AUTO", "THRESHOLDS_M", "PersonErrors", "PoseEvaluation", "evaluate_pose", "known_thresholds", "score_rows",
 ]  # fmt: skip
 
 #: Largest errors at which a landmark counts as matched: the thesis's, and a stricter one, as the first saturates.
@@ -139,18 +137,6 @@ def evaluate_pose(estimate: PoseTable, truth: PoseTable, thresholds_m: Sequence[
     summary |= chosen
     summary |= _by_trust(groups["all"], np.concatenate([person.doubtful for person in persons]), known)
     return PoseEvaluation(persons, rows, summary, tuple(_notes(persons, frame_means, estimate.persons[unmatched])), known)
-
-
-def evaluate_tracks(estimate: TrackTable, truth: TrackTable) -> MotScores:
-    """CLEAR MOT of tracks in the xy plane (`hmc.metrics.mot.clear_mot`)."""
-    return clear_mot(truth, estimate)
-
-
-def pelvis_tracks(poses: PoseTable) -> TrackTable:
-    """The pelvis of every pose as a track, for truth that has joints and no centroids; rows without a pelvis are left out."""
-    points = poses.positions[:, landmark_index("pelvis")]
-    known = ~np.isnan(points).any(axis=1)
-    return TrackTable(poses.frames[known], poses.persons[known], points[known])
 
 
 def known_thresholds(
