@@ -84,9 +84,20 @@ def run(args: argparse.Namespace) -> int:
     def selected(table):
         return table.where((table.frames >= start) & (table.frames < (float("inf") if frames is None else start + frames)))
 
+    def selected_truth(table, path):
+        """Of a truth that has frames, but none of these, it is said which it has."""
+        chosen = selected(table)
+        if len(table.frames) and not len(chosen.frames):
+            wanted = f"{start} on" if frames is None else f"{start} to {start + frames - 1}"
+            raise InputError(
+                f"{path}: has frames {table.frames.min()} to {table.frames.max()}, and compared are frames {wanted}: none in common; "
+                "let it count frames as the recording does, from 0, or choose others by --start and --frames"
+            )
+        return chosen
+
     estimated: PoseTable | None = selected(read_joints(joints_file)) if joints_file.exists() else None
     poses: PoseEvaluation | None = None
-    true_poses = None if truth_joints is None else selected(read_joints(truth_joints))
+    true_poses = None if truth_joints is None else selected_truth(read_joints(truth_joints), truth_joints)
     if true_poses is not None and estimated is not None:
         given: Sequence[float | Literal["auto"]] = THRESHOLDS_M
         if args.threshold:
@@ -97,11 +108,11 @@ def run(args: argparse.Namespace) -> int:
     if args.images or truth_images is not None:
         if estimated is None or (true_poses is None and truth_images is None):
             raise InputError(f"{args.directory}: scores in images need joints.csv there, and true joints or marked landmarks")
-        images = _in_images(args, estimated, true_poses, truth_images, selected)
+        images = _in_images(args, estimated, true_poses, truth_images, selected_truth)
 
     tracks: MotScores | None = None
     tracks_note, tracks_notes = "", list[str]()
-    true_tracks = None if truth_centroids is None else selected(read_tracks(truth_centroids))
+    true_tracks = None if truth_centroids is None else selected_truth(read_tracks(truth_centroids), truth_centroids)
     if true_tracks is None and true_poses is not None:
         true_tracks, tracks_note = pelvis_tracks(true_poses), " (against the true pelvis, as there are no true centroids)"
     if true_tracks is not None and tracks_file.exists():
@@ -202,7 +213,7 @@ def _in_images(args: argparse.Namespace, estimated, true_poses, truth_images: Pa
         raise InputError("scores in images need the RECORDING, for its calibration")
     rig = turn_back(read_rig(args.recording), read_turns(args.directory))
     if truth_images is not None:
-        truth = selected(read_image_landmarks(truth_images, rig.names))
+        truth = selected(read_image_landmarks(truth_images, rig.names), truth_images)
     else:
         truth = image_landmarks(true_poses, rig, inside=True)
     # With true joints a threshold that is given is theirs, in millimetres.
@@ -222,7 +233,13 @@ def find_truth(recording: Path | None, truth: Path | None) -> tuple[Path | None,
         if not truth.is_file():
             raise InputError(f"{truth}: no such file (--truth)")
         with open(truth, encoding="utf-8-sig", errors="replace") as file:
-            names = [name.strip() for name in file.readline().split(",")]
+            header = file.readline(200).strip()
+        names = [name.strip() for name in header.split(",")]
+        if not {"frame", "person"} <= set(names):
+            raise InputError(
+                f"{truth}: no table of the truth: the first line must be frame,person,joint,x,y,z (joints), frame,person,x,y,z (centroids) "
+                f"or frame,camera,person,joint,u,v (marked in images), with commas between; got {header[:80]!r}"
+            )
         if "joint" in names:
             return (None, None, truth) if "u" in names else (truth, None, None)
         return None, truth, None

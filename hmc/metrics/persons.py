@@ -8,7 +8,7 @@ from scipy.optimize import linear_sum_assignment
 from hmc.landmarks import LANDMARKS
 from hmc.metrics.landmarks import landmark_errors
 
-__all__ = ["LIMB_PAIRS", "exchange_sides", "frames_in_words", "match_persons", "runs", "swapped_frames"]
+__all__ = ["LIMB_PAIRS", "distances_apart", "exchange_sides", "frames_in_words", "match_persons", "runs", "swapped_frames"]
 
 #: Farther than this, on the mean over landmarks, an estimate does not stand for a person.
 GATE_M = 1.0
@@ -51,14 +51,11 @@ def match_persons(
     worth = np.zeros((len(true_names), len(names)))
     seen = [set(frames[persons == name].tolist()) for name in names]
     for i, true_name in enumerate(true_names):
-        true_rows = np.flatnonzero(truth_persons == true_name)
+        true_rows = truth_persons == true_name
         for j, name in enumerate(names):
-            rows = np.flatnonzero(persons == name)
-            _, a, b = np.intersect1d(truth_frames[true_rows], frames[rows], return_indices=True)
-            errors = landmark_errors(points[rows[b]], truth_points[true_rows[a]])
-            known = np.isfinite(errors)
-            mean = np.where(known, errors, 0).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
-            worth[i, j] = np.where(known.any(axis=1), np.maximum(gate_m - mean, 0), 0).sum()
+            rows = persons == name
+            apart = distances_apart(truth_frames[true_rows], truth_points[true_rows], frames[rows], points[rows])
+            worth[i, j] = np.maximum(gate_m - apart, 0).sum()
     found: dict[int, int] = {}
     covered: list[set[int]] = [set() for _ in true_names]
     first = [(i, j) for i, j in zip(*linear_sum_assignment(-worth), strict=True)]
@@ -69,6 +66,28 @@ def match_persons(
             found[name] = int(true_names[i])
             covered[i] |= seen[j]
     return found
+
+
+def distances_apart(truth_frames: np.ndarray, truth_points: np.ndarray, frames: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Mean distance of the landmarks of one person from those of another, in each frame in which both have some.
+
+    Parameters
+    ----------
+    truth_frames, frames : ndarray of int, shape (n,), (m,)
+        None twice.
+    truth_points, points : ndarray, shape (n, k, 3), (m, k, 3)
+        Metres; NaN where missing.
+
+    Returns
+    -------
+    ndarray, shape (frames in common,)
+        Metres.
+    """
+    _, a, b = np.intersect1d(truth_frames, frames, return_indices=True)
+    errors = landmark_errors(points[b], truth_points[a])
+    known = np.isfinite(errors)
+    some = known.any(axis=1)
+    return np.where(known, errors, 0)[some].sum(axis=1) / known[some].sum(axis=1)
 
 
 def exchange_sides(points: np.ndarray, limbs: str | None = None) -> np.ndarray:

@@ -235,3 +235,23 @@ def test_from_python_only_the_frames_of_the_recording_count_and_the_pelvis_will_
     (recording / "truth" / "centroids.csv").unlink()
     scores = hmc.evaluate(TrackTable(truth.frames, truth.persons, truth.positions[:, landmark_index("pelvis")]), part)
     assert scores.mota == 1 and scores.objects == 10
+
+
+def test_a_truth_of_other_frames_or_another_world_is_told(result, truth, tmp_path, capsys):
+    reference = tmp_path / "reference.csv"
+    write_run(result / "run.toml", "x", {"start": 0, "frames": 20}, 0)
+    write_joints(reference, replace(truth, frames=truth.frames + 1000))
+    assert main(["evaluate", str(result), "--truth", str(reference)]) == 2
+    assert f"{reference}: has frames 1000 to 1019, and compared are frames 0 to 19: none in common" in capsys.readouterr().err
+    write_joints(reference, replace(truth, positions=truth.positions + np.array([0, 50.0, 0])))
+    assert main(["evaluate", str(result), "--truth", str(reference)]) == 0
+    assert "the nearest estimated and true person are 50.00 m apart" in capsys.readouterr().out
+
+
+def test_what_is_no_table_of_the_truth_is_told_with_its_first_line(result, tmp_path, capsys):
+    table = tmp_path / "truth.csv"
+    for first in ("frame;person;joint;x;y;z", "PathFileType\t4\t(X/Y/Z)\ttruth.trc", "frame,pelvis_x,pelvis_y,pelvis_z"):
+        table.write_text(first + "\n0\n")
+        assert main(["evaluate", str(result), "--truth", str(table)]) == 2
+        said = capsys.readouterr().err
+        assert "the first line must be frame,person,joint,x,y,z (joints)" in said and repr(first) in said and said.count("\n") == 1

@@ -12,7 +12,7 @@ from hmc.errors import InputError
 from hmc.io.results import PoseTable
 from hmc.landmarks import LANDMARKS
 from hmc.metrics.landmarks import landmark_errors, score
-from hmc.metrics.persons import LIMB_PAIRS, exchange_sides, frames_in_words, match_persons, swapped_frames
+from hmc.metrics.persons import GATE_M, LIMB_PAIRS, distances_apart, exchange_sides, frames_in_words, match_persons, swapped_frames
 from hmc.metrics.threshold import choose_threshold
 
 __all__ = [
@@ -136,7 +136,10 @@ def evaluate_pose(estimate: PoseTable, truth: PoseTable, thresholds_m: Sequence[
     summary |= {key: value for key, value in rows[len(LANDMARKS)].items() if key not in ("person", "landmark", "frames", "true_frames")}
     summary |= chosen
     summary |= _by_trust(groups["all"], np.concatenate([person.doubtful for person in persons]), known)
-    return PoseEvaluation(persons, rows, summary, tuple(_notes(persons, frame_means, estimate.persons[unmatched])), known)
+    notes = _notes(persons, frame_means, estimate.persons[unmatched])
+    if not names:
+        notes += _apart(estimate, truth)
+    return PoseEvaluation(persons, rows, summary, tuple(notes), known)
 
 
 def known_thresholds(
@@ -237,6 +240,21 @@ def _by_trust(errors: np.ndarray, doubtful: np.ndarray, thresholds_m: Sequence[f
             matched = {f"mmta_at_{1000 * threshold:g}mm": float((chosen <= threshold).mean()) for threshold in thresholds_m}
             scores[name] = {"landmarks": len(chosen), "mean_mm": _mean_mm(chosen), **matched}
     return scores
+
+
+def _apart(estimate: PoseTable, truth: PoseTable) -> list[str]:
+    """What is said where nobody matches anybody: how far the nearest two are apart."""
+    apart = []
+    for true in (truth.of(person) for person in np.unique(truth.persons)):
+        for found in (estimate.of(person) for person in np.unique(estimate.persons)):
+            apart.append(distances_apart(true.frames, true.positions, found.frames, found.positions))
+    medians = [float(np.median(values)) for values in apart if len(values)]
+    if not medians:
+        return ["the estimate and the truth have no frame in common"]
+    return [
+        f"the nearest estimated and true person are {min(medians):.2f} m apart, median over frames, and match within {GATE_M:g} m: look "
+        "whether result and truth have the same world (origin, axes) and count the same frames"
+    ]
 
 
 def _frame_means(errors: np.ndarray) -> np.ndarray:
