@@ -50,12 +50,20 @@ __all__ = [
 T = TypeVar("T")
 
 
-def add_selection_options(parser: argparse.ArgumentParser) -> None:
-    """Add the recording itself, ``--session``, ``--start``, ``--frames``, ``--cameras`` and ``--quiet``."""
+def add_selection_options(parser: argparse.ArgumentParser, of_run: bool = False) -> None:
+    """Add the recording itself, ``--session``, ``--start``, ``--frames``, ``--cameras`` and ``--quiet``.
+
+    Parameters
+    ----------
+    parser : ArgumentParser
+    of_run : bool
+        The command is about a result: what is not asked for is as its run had it (`hmc.io.results.run_selection`), and None until then.
+    """
+    first, many = ("as the result was made",) * 2 if of_run else ("0", "all")
     parser.add_argument("recording", type=Path, help="folder of the recording")
     add_session_option(parser)
-    parser.add_argument("--start", type=whole_number, default=0, metavar="N", help="first frame (default: 0)")
-    parser.add_argument("--frames", type=whole_number, default=None, metavar="N", help="how many frames (default: all)")
+    parser.add_argument("--start", type=whole_number, default=None if of_run else 0, metavar="N", help=f"first frame (default: {first})")
+    parser.add_argument("--frames", type=whole_number, default=None, metavar="N", help=f"how many frames (default: {many})")
     parser.add_argument("--cameras", type=camera_names, default=None, metavar="A,B,...", help="use these cameras only (default: all)")
     parser.add_argument("--quiet", action="store_true", help="no progress bar")
 

@@ -79,7 +79,7 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"{args.directory}: no such folder; a result is the folder that `hmc pose` or `hmc track` wrote")
     truth_joints, truth_centroids, truth_images = find_truth(args.recording, args.truth)
     joints_file, tracks_file = args.directory / "joints.csv", args.directory / "tracks.csv"
-    start, frames = run_selection(args.directory) if args.start is None and args.frames is None else (args.start or 0, args.frames)
+    start, frames = run_selection(args.directory, args.start, args.frames)
 
     def selected(table):
         return table.where((table.frames >= start) & (table.frames < (float("inf") if frames is None else start + frames)))
@@ -138,7 +138,7 @@ def run(args: argparse.Namespace) -> int:
         write_rows(args.directory / "metrics.csv", poses.rows)
         report["pose"] = poses.summary
         notes += poses.notes
-        feet = _feet(args, poses.persons)
+        feet = _feet(args, poses.persons, selected)
         if feet:
             print(f"ends of the soles: heels {feet['heels_mm']:.1f} mm, toes {feet['toes_mm']:.1f} mm from the true ones, mean")
             report["feet"] = feet
@@ -190,7 +190,7 @@ def _beyond_truth(found: TrackTable, true: TrackTable) -> list[str]:
     return [f"{n} rows of the tracks are outside the truth's frames {first} to {last} and count as false positives (--start, --frames)"]
 
 
-def _feet(args: argparse.Namespace, persons) -> dict[str, float]:
+def _feet(args: argparse.Namespace, persons, selected) -> dict[str, float]:
     """Errors of the ends of the soles, where both the result and the recording have them."""
     from hmc.io.results import read_joints
     from hmc.landmarks import FOOT_POINTS
@@ -199,7 +199,7 @@ def _feet(args: argparse.Namespace, persons) -> dict[str, float]:
     found, true = args.directory / "feet.csv", Path(args.recording or "") / "truth" / "feet.csv"
     if args.recording is None or args.truth is not None or not found.is_file() or not true.is_file():
         return {}
-    return feet_errors(read_joints(found, FOOT_POINTS), read_joints(true, FOOT_POINTS), persons)
+    return feet_errors(selected(read_joints(found, FOOT_POINTS)), read_joints(true, FOOT_POINTS), persons)
 
 
 def _in_images(args: argparse.Namespace, estimated, true_poses, truth_images: Path | None, selected):

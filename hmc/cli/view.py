@@ -34,7 +34,7 @@ def add_parser(subparsers) -> None:
         "room to turn with the mouse, some moments' images and voxels, curves and a time line.",
     )
     parser.add_argument("directory", type=Path, metavar="DIR", help="folder of the result, with joints.csv or tracks.csv")
-    add_selection_options(parser)
+    add_selection_options(parser, of_run=True)
     parser.add_argument(
         "--out", type=output_path, required=True, metavar="FILE", help="FILE.mp4 (video), .png (picture), .html (page) or .rrd (Rerun)"
     )
@@ -57,8 +57,7 @@ def run(args: argparse.Namespace) -> int:
     if not args.directory.is_dir():
         raise InputError(f"{args.directory}: no such folder; a result is the folder that `hmc pose` or `hmc track` wrote")
     result = read_result(args.directory)
-    if not args.start and args.frames is None:
-        args.start, args.frames = run_selection(args.directory)
+    args.start, args.frames = run_selection(args.directory, args.start, args.frames)
     recording = open_selected(args)
     refuse_own_file(args.out, places_of(recording))
     problems = [*recording.problems, *unlike_its_run(args.directory), *made_from(args.directory, args.recording)]

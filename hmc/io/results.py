@@ -419,8 +419,21 @@ def read_run(path: str | Path) -> dict[str, Any]:
     return read_toml_file(path)
 
 
-def run_selection(directory: str | Path) -> tuple[int, int | None]:
-    """Which frames the run of a result was about, by its `run.toml`: the first, and how many (None: all that follow).
+def run_selection(directory: str | Path, start: int | None = None, frames: int | None = None) -> tuple[int, int | None]:
+    """Which frames of a result are meant: those that are asked for, and where nothing is asked those that its run was about.
+
+    Parameters
+    ----------
+    directory : path
+        Of the result; its `run.toml` says what the run was about, and without one that was everything.
+    start, frames : int, optional
+        The first that is asked for, and how many. From a first one behind the run's last: all that follow.
+
+    Returns
+    -------
+    start : int
+    frames : int or None
+        None: all that follow.
 
     Raises
     ------
@@ -430,5 +443,9 @@ def run_selection(directory: str | Path) -> tuple[int, int | None]:
     path = Path(directory) / "run.toml"
     parameters = read_run(path).get("parameters") if path.exists() else None
     values = [parameters.get(name) if isinstance(parameters, dict) else None for name in ("start", "frames")]
-    start, frames = (value if isinstance(value, int) else None for value in values)
-    return start or 0, frames
+    of_run, n_of_run = (value if isinstance(value, int) else None for value in values)
+    first = of_run or 0
+    begin = first if start is None else start
+    if frames is not None or n_of_run is None:
+        return begin, frames
+    return begin, first + n_of_run - begin if begin < first + n_of_run else None

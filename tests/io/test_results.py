@@ -265,6 +265,9 @@ def test_the_frames_of_a_run(tmp_path):
     assert run_selection(tmp_path) == (0, None)
     write_run(tmp_path / "run.toml", "x", {"start": 3, "frames": 7}, 0)
     assert run_selection(tmp_path) == (3, 7)
+    assert run_selection(tmp_path, start=5) == (5, 5) and run_selection(tmp_path, start=0) == (0, 10)
+    assert run_selection(tmp_path, frames=2) == (3, 2) and run_selection(tmp_path, 0, 2) == (0, 2)
+    assert run_selection(tmp_path, start=10) == (10, None)
     (tmp_path / "run.toml").write_text("parameters = 3\n")
     assert run_selection(tmp_path) == (0, None)
 

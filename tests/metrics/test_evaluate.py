@@ -14,7 +14,7 @@ import hmc
 from hmc.cli import main
 from hmc.errors import InputError
 from hmc.io.results import PoseTable, TrackTable, read_joints, write_joints, write_run, write_tracks
-from hmc.landmarks import LANDMARKS, landmark_index
+from hmc.landmarks import FOOT_POINTS, LANDMARKS, landmark_index
 from hmc.metrics.persons import exchange_sides
 from hmc.metrics.scores import evaluate_pose, evaluate_tracks, pelvis_tracks
 
@@ -135,6 +135,9 @@ def test_only_the_frames_of_the_run_count(result, recording, truth, capsys):
     assert "10 with an estimate (100.0%)" in capsys.readouterr().out
     assert main(["evaluate", str(result), str(recording), "--quiet", "--start", "8", "--frames", "1"]) == 0
     assert "2 with an estimate (100.0%)" in capsys.readouterr().out
+    for asked, n in ((["--start", "8"], 4), (["--frames", "1"], 2)):  # what is not asked for is as the run had it
+        assert main(["evaluate", str(result), str(recording), "--quiet", *asked]) == 0
+        assert f"{n} with an estimate (100.0%)" in capsys.readouterr().out
     assert main(["evaluate", str(result), str(recording), "--start", "100"]) == 2
 
 
@@ -255,3 +258,13 @@ def test_what_is_no_table_of_the_truth_is_told_with_its_first_line(result, tmp_p
         assert main(["evaluate", str(result), "--truth", str(table)]) == 2
         said = capsys.readouterr().err
         assert "the first line must be frame,person,joint,x,y,z (joints)" in said and repr(first) in said and said.count("\n") == 1
+
+
+def test_the_ends_of_the_soles_count_in_the_frames_that_are_compared(result, recording, truth, capsys):
+    feet = np.zeros((len(truth.frames), 4, 3))
+    write_joints(recording / "truth" / "feet.csv", PoseTable(truth.frames, truth.persons, feet, names=FOOT_POINTS))
+    feet[truth.frames >= 10, :, 2] = 0.1
+    write_joints(result / "feet.csv", PoseTable(truth.frames, np.array([7, 4])[truth.persons], feet, names=FOOT_POINTS))
+    for start, apart in ((0, 50), (10, 100)):
+        assert main(["evaluate", str(result), str(recording), "--quiet", "--start", str(start)]) == 0
+        assert f"heels {apart}.0 mm, toes {apart}.0 mm" in capsys.readouterr().out

@@ -324,10 +324,11 @@ def test_a_video_shows_the_frames_of_the_run(recording, result, tmp_path):
     for path in result.iterdir():
         (tmp_path / path.name).write_bytes(path.read_bytes())
     write_run(tmp_path / "run.toml", "x", {"start": 1, "frames": 1}, 0)
-    assert main(["view", str(tmp_path), str(recording), "--quiet", "--no-voxels", "--out", str(tmp_path / "x.avi")]) == 0
-    video = cv2.VideoCapture(str(tmp_path / "x.avi"))
-    assert video.read()[0] and not video.read()[0]
-    video.release()
+    for asked, n in (([], 1), (["--start", "0"], 2), (["--frames", "1"], 1)):
+        assert main(["view", str(tmp_path), str(recording), "--quiet", "--no-voxels", "--out", str(tmp_path / "x.avi"), *asked]) == 0
+        video = cv2.VideoCapture(str(tmp_path / "x.avi"))
+        assert [video.read()[0] for _ in range(n + 1)] == [True] * n + [False]
+        video.release()
 
 
 def test_a_result_of_another_recording_is_told(recording, result, tmp_path, capsys):
