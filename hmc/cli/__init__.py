@@ -75,16 +75,17 @@ def main(argv: Sequence[str] | None = None) -> int:
         if not is_utf8(word):
             print(f"hmc: {word!r} is no text in UTF-8; rename that file or folder", file=sys.stderr)
             return EXIT_INPUT
-    if argv[:1] == ["experiments"]:
-        from hmc.cli.experiments import hand_over
-
-        return hand_over(argv[1:])
-    parser = make_parser(argv[0] if argv else None)
-    args = parser.parse_args(argv)
-    if args.command is None:
-        parser.print_help()
-        return 0
+    asked = f"hmc {argv[0]}" if argv and argv[0] in COMMANDS else "hmc"
     try:
+        if argv[:1] == ["experiments"]:
+            from hmc.cli.experiments import hand_over
+
+            return hand_over(argv[1:])
+        parser = make_parser(argv[0] if argv else None)  # imports the command's module, which may take a second
+        args = parser.parse_args(argv)
+        if args.command is None:
+            parser.print_help()
+            return 0
         with as_interrupts():
             if getattr(args, "like", None) is not None:
                 args = repeated(parser, args, argv)
@@ -92,22 +93,22 @@ def main(argv: Sequence[str] | None = None) -> int:
             sys.stdout.flush()
             return code or 0
     except InputError as error:
-        print(f"hmc {args.command}: {error}", file=sys.stderr)
+        print(f"{asked}: {error}", file=sys.stderr)
         return EXIT_INPUT
     except BrokenPipeError:
         # The reader of a pipe went away (`| head`); point stdout elsewhere, or the interpreter complains when it closes.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except ChildProcessError as error:
-        print(f"hmc {args.command}: {error} Try --workers 1; what is done is kept.", file=sys.stderr)
+        print(f"{asked}: {error} Try --workers 1; what is done is kept.", file=sys.stderr)
         return EXIT_WORKER
     except OSError as error:
         if error.errno is None:
             raise
-        print(f"hmc {args.command}: {system_words(error)}", file=sys.stderr)
+        print(f"{asked}: {system_words(error)}", file=sys.stderr)
         return EXIT_INPUT
     except KeyboardInterrupt:
-        print(f"hmc {args.command}: interrupted", file=sys.stderr)
+        print(f"{asked}: interrupted", file=sys.stderr)
         return EXIT_INTERRUPTED
 
 

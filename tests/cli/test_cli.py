@@ -165,6 +165,15 @@ def test_interrupt(monkeypatch, capsys):
     assert capsys.readouterr().err.strip() == "hmc check: interrupted"
 
 
+@pytest.mark.parametrize("words", [["check", "x"], ["experiments", "list"]])
+def test_an_interrupt_while_a_command_is_imported(words, monkeypatch, capsys):
+    """Its module takes a second: Ctrl-C in it ended in a traceback."""
+    for loads in ("hmc.cli.make_parser", "hmc.cli.experiments.hand_over"):
+        monkeypatch.setattr(loads, raising(KeyboardInterrupt()))
+    assert main(words) == 130
+    assert capsys.readouterr().err == f"hmc {words[0]}: interrupted\n"
+
+
 def test_an_interrupt_that_a_library_takes_for_an_error_of_its_own_is_an_interrupt(monkeypatch, capsys):
     """A figure that was being drawn ended in a traceback: "Invalid affine transformation matrix"."""
 
