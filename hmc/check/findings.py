@@ -388,7 +388,8 @@ def _read(recording: Recording, read_all: bool) -> tuple[list[str], list[str], n
             dark.add(camera.name)
     sentences.extend(f"camera '{name}': its first image is black" for name in sorted(dark))
     masks = probe_masks(recording, probes)
-    wrong_world, ground = world_findings(recording, masks)
+    wrong_world, off_floor, ground = world_findings(recording, masks)
+    sentences.extend(off_floor)
     if not wrong_world:
-        sentences.extend(hull_findings(recording, masks))
+        sentences.extend(hull_findings(recording, masks, told_floor=bool(off_floor)))
     return sentences, wrong_world, None if ground is None else floor_lines(ground)

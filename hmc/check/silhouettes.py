@@ -91,13 +91,15 @@ def at_odds(recording: Recording, masks: Sequence[Sequence[np.ndarray | None]]) 
     )
 
 
-def hull_findings(recording: Recording, masks: Sequence[Sequence[np.ndarray | None]]) -> list[str]:
+def hull_findings(recording: Recording, masks: Sequence[Sequence[np.ndarray | None]], told_floor: bool = False) -> list[str]:
     """What a fine hull tells: people below the floor or beyond the walls, a camera that is off by a few pixels or frames.
 
     Parameters
     ----------
     recording, masks
         As for `at_odds`, to which it is left to say that cameras do not fit at all.
+    told_floor : bool
+        It was told already that the floor is elsewhere (`hmc.check.world_findings`): where people are cut off there, no more is said.
 
     Returns
     -------
@@ -115,6 +117,8 @@ def hull_findings(recording: Recording, masks: Sequence[Sequence[np.ndarray | No
     ]
     depth = float(room[0, 2]) - floor_height(hulls, float(room[0, 2]))
     if depth >= LEAST_DEPTH_M:
+        if told_floor:
+            return [*filled, *cut]
         cut.append(
             f"people's feet are {depth * 100:.0f} cm below the floor, where they are cut off; the floor must be at z = 0 in the "
             "calibration, and the room's lower limit at the floor"

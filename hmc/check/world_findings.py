@@ -22,6 +22,8 @@ __all__ = ["floor_lines", "world_findings"]
 TILTED_DEG = 25.0
 #: Who stands is between these, metres: a small child, and more than anybody.
 STATURES_M = (0.6, 2.4)
+#: Hulls of people at least so tall reach down to their feet, metres; standing so far from the floor they are not on a step or a treadmill.
+WHOLE_M, OFF_FLOOR_M = 1.4, 0.25
 #: Share of a figure that must be within the room, a little widened, metres.
 INSIDE, AROUND_M = 0.3, 0.3
 #: How tall people mostly are, metres, and how many of these metres a floor that they tell is drawn to each side.
@@ -32,8 +34,8 @@ LEFT_TO_JUDGE = 4
 IN_TIME = 0.6
 
 
-def world_findings(recording: Recording, masks: Sequence[Masks]) -> tuple[list[str], Ground | None]:
-    """Why the calibration's world cannot be the recording's room; a sentence each, with the command to run.
+def world_findings(recording: Recording, masks: Sequence[Masks]) -> tuple[list[str], list[str], Ground | None]:
+    """Why the calibration's world cannot be the recording's room, or has its floor elsewhere; a sentence each, with the command to run.
 
     Parameters
     ----------
@@ -42,20 +44,35 @@ def world_findings(recording: Recording, masks: Sequence[Masks]) -> tuple[list[s
 
     Returns
     -------
-    sentences : list of str
+    wrong : list of str
+        Why nobody would be found.
+    off_floor : list of str
+        Why people would be found, but not well: poses are held to the floor.
     ground : Ground or None
-        The floor on which people stand, where the world is wrong and it can be told.
+        The floor on which people stand, where there is a sentence and it can be told.
     """
     rig = recording.rig
     shown = [frame for frame in masks if sum(mask is not None and bool(mask.any()) for mask in frame) >= max(3, len(rig) / 2)]
     if len(rig) < 3 or not shown:
-        return [], None
+        return [], [], None
     figures = find_figures(rig, shown)
     ground = find_ground(rig, figures) if figures else None
-    sentences = _wrong_world(recording, shown, figures, ground)
-    if sentences and ground is not None:
-        ground = find_legs(rig, figures, shown, ground)[1]
-    return sentences, ground if sentences else None
+    wrong = _wrong_world(recording, shown, figures, ground)
+    _, ground, hidden = find_legs(rig, figures, shown, ground)
+    off_floor = [] if wrong or hidden or ground is None else _off_floor(recording, ground)
+    return wrong, off_floor, ground if wrong or off_floor else None
+
+
+def _off_floor(recording: Recording, ground: Ground) -> list[str]:
+    """A sentence where people of a usual stature stand off the floor, which is the room's lower limit."""
+    floor_z, feet_z = float(recording.room[0, 2]), float(ground.middle[2])
+    if abs(feet_z - floor_z) < OFF_FLOOR_M or ground.stature < WHOLE_M:
+        return []
+    where, unless = ("above", "unless they stand on something, ") if feet_z > floor_z else ("below", "")
+    return [
+        f"people stand {abs(feet_z - floor_z):.2f} m {where} z = {floor_z:g}, where the floor is by the room's lower limit; {unless}find "
+        f"up, the floor and the scale by: {world_command(places_of(recording))}"
+    ]
 
 
 def _wrong_world(recording: Recording, shown: Sequence[Masks], figures: Sequence[Figure], ground: Ground | None) -> list[str]:

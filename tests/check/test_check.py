@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import pytest
 from conftest import write_images, write_video
-from drawn import draw_recording, walk
+from drawn import draw_recording, post, walk
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
@@ -161,6 +161,22 @@ def test_feet_below_the_floor_are_told(body_folder, ring, depth):
     (warning,) = sentences(check_recording(body_folder), "warning")
     told = int(re.match(r"people's feet are (\d+) cm below the floor", warning).group(1))
     assert 100 * depth - 5 <= told <= 100 * depth + 3
+
+
+@pytest.mark.parametrize("height", [0.4, -1.0])
+def test_a_floor_that_is_elsewhere_is_told(tmp_path, ring, height):
+    """Poses are held to the floor: who stood half a metre above it came out 88 mm wrong in place of 17, without a word."""
+    folder = draw_recording(tmp_path / "walk", ring, walk(6), silhouettes=True, shape=post)
+    assert sentences(check_recording(folder), "warning") == []
+    moved = [replace(camera, translation=camera.translation - camera.rotation[:, 2] * height) for camera in ring]
+    write_calibration(folder / "calibration.toml", moved)
+    inspection = inspect_recording(folder)
+    (warning,) = sentences(inspection.findings, "warning")
+    told = re.match(r"people stand (\S+) m (above|below) z = 0", warning)
+    assert float(told[1]) == pytest.approx(abs(height), abs=0.08) and told[2] == ("above" if height > 0 else "below")
+    assert warning.endswith(f"hmc world {folder}") and inspection.floor[..., 2].mean() == pytest.approx(height, abs=0.08)
+    (folder / "recording.toml").write_text(f"room = [[-2.0, -2.0, {height}], [2.0, 2.0, {height + 2.2}]]\n")
+    assert sentences(check_recording(folder), "warning") == []
 
 
 def test_people_beyond_a_wall_are_told(tmp_path, ring):
