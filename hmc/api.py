@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from hmc.pose.method import PoseMethod
     from hmc.pose.views.person_view import PersonView
     from hmc.tracking.trackers import Tracker
+    from hmc.view.mosaic import Result
 
 __all__ = ["check", "evaluate", "export", "hulls", "pose", "silhouettes", "track", "view", "views"]
 
@@ -63,12 +64,12 @@ def check(recording: Recording | str | Path) -> list[Finding]:
     return check_opened(recording) if isinstance(recording, Recording) else check_recording(recording)
 
 
-def silhouettes(recording: Recording) -> Iterator[MaskStep]:
+def silhouettes(recording: Recording | str | Path) -> Iterator[MaskStep]:
     """The silhouettes of every frame, in order: `index`, `images` and `masks`, one entry a camera.
 
     Parameters
     ----------
-    recording : Recording
+    recording : Recording or path
 
     Examples
     --------
@@ -77,15 +78,17 @@ def silhouettes(recording: Recording) -> Iterator[MaskStep]:
     >>> [mask.shape for mask in next(hmc.silhouettes(recording)).masks[:2]]
     [(240, 320), (240, 320)]
     """
-    return stream_masks(recording)
+    return stream_masks(_opened(recording))
 
 
-def hulls(recording: Recording, voxel_size_m: float = POSE_VOXEL_M, masks: Iterable[MaskStep] | None = None) -> Iterator[HullStep]:
+def hulls(
+    recording: Recording | str | Path, voxel_size_m: float = POSE_VOXEL_M, masks: Iterable[MaskStep] | None = None
+) -> Iterator[HullStep]:
     """The visual hulls of every frame, in order: `strict`, `tolerant` and `loose`, bool, shape (nx, ny, nz), beside the silhouettes.
 
     Parameters
     ----------
-    recording : Recording
+    recording : Recording or path
     voxel_size_m : float
         Side of a voxel, metres.
     masks : iterable of MaskStep, optional
@@ -101,6 +104,7 @@ def hulls(recording: Recording, voxel_size_m: float = POSE_VOXEL_M, masks: Itera
     """
     from hmc.tracking.resumable import person_grid
 
+    recording = _opened(recording)
     return stream_hulls(recording, person_grid(recording, voxel_size_m), masks=masks)
 
 
@@ -159,7 +163,7 @@ def track(
 
 
 def views(
-    recording: Recording,
+    recording: Recording | str | Path,
     tracks: TrackTable,
     needs: Sequence[str] = ("hulls",),
     voxel_size_m: float = POSE_VOXEL_M,
@@ -169,7 +173,7 @@ def views(
 
     Parameters
     ----------
-    recording : Recording
+    recording : Recording or path
     tracks : TrackTable
         As from `track`.
     needs : sequence of str
@@ -188,6 +192,7 @@ def views(
     from hmc.pose.views.person_view import check_needs, views_of
     from hmc.tracking.resumable import person_grid
 
+    recording = _opened(recording)
     grid, wanted = person_grid(recording, voxel_size_m), check_needs(needs)
     return (views_of(recording, grid, tracks, hull, wanted) for hull in stream_hulls(recording, grid, masks=masks))
 
@@ -284,13 +289,14 @@ def pose(
         return finished_poses(recording, tracks, method, options, runs, keypoints, smooth_s)
 
 
-def evaluate(found: PosedPeople | TrackTable, recording: Recording) -> PoseEvaluation | MotScores:
+def evaluate(found: PosedPeople | TrackTable | str | Path, recording: Recording | str | Path) -> PoseEvaluation | MotScores:
     """The errors of poses or tracks against the truth in a recording's folder.
 
     Parameters
     ----------
-    found : PosedPeople or TrackTable
-    recording : Recording
+    found : PosedPeople, TrackTable or path
+        A path: the folder of a result.
+    recording : Recording or path
         With ``truth/joints.csv``, or ``truth/centroids.csv`` for tracks (the true pelvis where there is none). Only its frames count.
 
     Returns
@@ -313,28 +319,32 @@ def evaluate(found: PosedPeople | TrackTable, recording: Recording) -> PoseEvalu
     """
     from hmc.metrics.scores import evaluate_pose, evaluate_tracks, pelvis_tracks
 
+    recording, result = _opened(recording), _result_of(found)
     joints, centroids = (recording.path / "truth" / name for name in ("joints.csv", "centroids.csv"))
-    path = centroids if isinstance(found, TrackTable) and centroids.is_file() else joints
+    path = centroids if result.poses is None and centroids.is_file() else joints
     if not path.is_file():
         raise InputError(f"{path}: no such file; there is no truth to evaluate against")
 
     def selected(table):
         return table.where((table.frames >= recording.start) & (table.frames < recording.start + recording.n_frames))
 
-    if isinstance(found, TrackTable):
+    if result.poses is None:
         truth = read_tracks(path) if path == centroids else pelvis_tracks(read_joints(path))
-        return evaluate_tracks(selected(found), selected(truth))
-    return evaluate_pose(selected(found.poses), selected(read_joints(path)))
+        return evaluate_tracks(selected(result.tracks), selected(truth))
+    return evaluate_pose(selected(result.poses), selected(read_joints(path)))
 
 
-def view(found: PosedPeople | TrackTable, recording: Recording, out: str | Path, frames: Sequence[int] = ()) -> None:
+def view(
+    found: PosedPeople | TrackTable | str | Path, recording: Recording | str | Path, out: str | Path, frames: Sequence[int] = ()
+) -> None:
     """Write poses or tracks drawn over every camera: a picture (.png, .jpg) of some frames, a video (.mp4) of all, or a page
     (.html) for a browser.
 
     Parameters
     ----------
-    found : PosedPeople or TrackTable
-    recording : Recording
+    found : PosedPeople, TrackTable or path
+        A path: the folder of a result.
+    recording : Recording or path
     out : path
     frames : sequence of int
         Of a picture; by default one in the middle.
@@ -356,12 +366,11 @@ def view(found: PosedPeople | TrackTable, recording: Recording, out: str | Path,
     """
     from hmc.io.own_files import refuse_own_file
     from hmc.io.places import places_of
-    from hmc.view.mosaic import Result, with_bodies
     from hmc.view.write import write_view
 
+    recording = _opened(recording)
     refuse_own_file(out, places_of(recording))
-    result = Result(tracks=found) if isinstance(found, TrackTable) else with_bodies(Result(found.poses, turned=found.turned), found.states)
-    write_view(out, recording, result, frames)
+    write_view(out, recording, _result_of(found), frames)
 
 
 def export(
@@ -428,6 +437,14 @@ def _in_images(keypoints: KeypointSource, recording: Recording) -> KeypointSourc
 
 def _opened(recording: Recording | str | Path) -> Recording:
     return recording if isinstance(recording, Recording) else open_recording(recording)
+
+
+def _result_of(found: PosedPeople | TrackTable | str | Path) -> Result:
+    from hmc.view.mosaic import Result, read_result, with_bodies
+
+    if isinstance(found, str | Path):
+        return read_result(found)
+    return Result(tracks=found) if isinstance(found, TrackTable) else with_bodies(Result(found.poses, turned=found.turned), found.states)
 
 
 def _tracked(recording: Recording, tracker: str | Tracker, seed: int, voxel_size_m: float, masks: Path | None = None) -> TrackTable:

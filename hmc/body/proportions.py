@@ -201,6 +201,8 @@ def sole_ends(dimensions: Mapping[str, float]) -> tuple[float, float]:
 
 
 def _scaled(height_m: float, lengths: dict[str, float]) -> dict[str, float]:
+    if isinstance(height_m, str):
+        raise InputError(f"a height must be a number of metres; got {height_m!r}")
     if not 0.3 < height_m < 3.0:
         raise InputError(f"a height of {height_m:g} m is no person's; give the stature in metres")
     return {"height": height_m} | {name: value * height_m for name, value in lengths.items()} | {f"girth_{g}": 1.0 for g in GIRTHS}

@@ -256,6 +256,9 @@ def open_recording(
     if stated is not None and stated > total:
         problems.append(f"{path / 'recording.toml'}: says {stated} frames, but there are {total}")
     total = min(total, stated or total)
+    for name, value in (("start", start), ("frames", frames)):
+        if value is not None and not isinstance(value, int | np.integer):
+            raise InputError(f"`{name}` must be a whole number of frames; got {value!r}")
     if start < 0 or start >= total or (frames is not None and frames < 1):
         raise InputError(
             f"{path}: nothing to read from frame {start} on ({'all' if frames is None else frames} frames); it has {total} frames, "

@@ -180,6 +180,8 @@ def begin_session(settings: SessionSettings, background: Background) -> SessionS
         if missing:
             raise InputError(f"no background for camera '{missing[0]}'; give images of the empty scene for each of {', '.join(rig.names)}")
         background = [background[name] for name in rig.names]
+    if background is None:
+        raise InputError(f"a session needs a background: images of the empty scene for each of {', '.join(rig.names)}")
     if len(background) != len(rig):
         raise InputError(f"the background is of {len(background)} cameras, the rig has {len(rig)}: {', '.join(rig.names)}")
     models = []

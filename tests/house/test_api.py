@@ -17,7 +17,7 @@ from hmc.body.model import neutral_state
 from hmc.body.proportions import default_body
 from hmc.camera.model import project
 from hmc.io.detections import DetectionTable
-from hmc.io.results import TrackTable
+from hmc.io.results import TrackTable, read_centroids, read_joints, write_joints, write_tracks
 from hmc.pose import registry
 from hmc.tracking import trackers
 
@@ -45,6 +45,35 @@ def test_every_name_is_there():
     assert set(hmc.__all__) <= set(dir(hmc))
     with pytest.raises(AttributeError, match="no attribute 'poses'"):
         hmc.poses  # noqa: B018
+
+
+def test_a_recording_and_a_result_are_as_good_as_their_folders(tmp_path):
+    """`hmc.pose("folder")` worked, and `hmc.evaluate(people, "folder")` ended in an AttributeError."""
+    tiny, few = ROOT / "data" / "synthetic" / "tiny", hmc.open_recording(ROOT / "data" / "synthetic" / "tiny", frames=2)
+    truth = read_joints(tiny / "truth" / "joints.csv")
+    write_joints(tmp_path / "poses" / "joints.csv", truth)
+    write_tracks(tmp_path / "tracks" / "tracks.csv", read_centroids(tiny / "truth" / "centroids.csv"))
+    assert hmc.evaluate(str(tmp_path / "poses"), str(tiny)).summary["mean_mm"] == 0
+    scores = hmc.evaluate(tmp_path / "tracks", few)
+    assert scores.mota == 1 and scores.objects == 2
+    hmc.view(tmp_path / "tracks", str(tiny), tmp_path / "tracks.png")
+    assert (tmp_path / "tracks.png").is_file()
+    assert next(hmc.silhouettes(str(tiny))).index == next(hmc.hulls(tiny, 0.1)).index == 0
+    assert set(next(hmc.views(str(tiny), read_centroids(tiny / "truth" / "centroids.csv"), voxel_size_m=0.1))) == {0}
+
+
+@pytest.mark.parametrize("part", [{"start": 1.5}, {"frames": 2.5}, {"frames": "3"}])
+def test_frames_are_counted_in_whole_numbers(part):
+    with pytest.raises(hmc.InputError, match="must be a whole number of frames; got"):
+        hmc.open_recording(ROOT / "data" / "synthetic" / "tiny", **part)
+
+
+def test_what_is_left_out_or_a_text_is_told():
+    recording = hmc.open_recording(ROOT / "data" / "synthetic" / "tiny", frames=1)
+    with pytest.raises(hmc.InputError, match="a session needs a background: images of the empty scene for each of cam_00"):
+        hmc.Session(recording.rig, None, fps=5)
+    with pytest.raises(hmc.InputError, match="a height must be a number of metres"):
+        default_body("1.76")
 
 
 def test_a_package_that_is_called_stays_a_package():
