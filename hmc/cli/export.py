@@ -52,7 +52,7 @@ def read_result_asked(args: argparse.Namespace):
     import numpy as np
 
     from hmc.errors import InputError
-    from hmc.motion.smoothing import Smoothing, smooth_trajectory
+    from hmc.motion.smoothing import Smoothing, smooth_trajectory, window_too_short
     from hmc.motion.trajectory import read_trajectories
 
     for option, value, way in (("--cutoff", args.cutoff, "butterworth"), ("--window", args.window, "polynomial")):
@@ -66,7 +66,8 @@ def read_result_asked(args: argparse.Namespace):
     how = Smoothing(args.smooth, **{name: value for name, value in given.items() if value is not None})
     smoothed = [smooth_trajectory(one, how) for one in found]
     if all(np.array_equal(a.positions, b.positions, equal_nan=True) for a, b in zip(found, smoothed, strict=True)):
-        print_problems(["nothing was smoothed: no stretch without gaps is long enough"])
+        short = window_too_short(found[0].fps, how.window_s) if how.kind == "polynomial" else ""
+        print_problems([f"nothing was smoothed: {short or 'no stretch without gaps is long enough'}"])
     return smoothed
 
 

@@ -19,10 +19,21 @@ from hmc.body.kinematics import landmarks
 from hmc.errors import InputError
 from hmc.motion.trajectory import Trajectory
 
-__all__ = ["Smoothing", "butterworth", "local_polynomial", "smooth_positions", "smooth_trajectory", "stretches"]
+__all__ = [
+    "Smoothing",
+    "butterworth",
+    "local_polynomial",
+    "smooth_positions",
+    "smooth_trajectory",
+    "stretches",
+    "window_rows",
+    "window_too_short",
+]
 
 #: Degree of the polynomial: what turns round within the window is not cut off.
 DEGREE = 3
+#: A window of fewer rows is met by such a polynomial.
+LEAST_ROWS = DEGREE + 2
 #: Order of one run of the filter; it is run forwards and backwards, which makes the order twice this.
 ORDER = 2
 #: Twice run, the filter halves power at a lower frequency than once: the cutoff is raised so that it does at the one that was asked for.
@@ -106,10 +117,10 @@ def local_polynomial(values: np.ndarray, fps: float, window_s: float) -> np.ndar
     ndarray, shape (n, ...)
         As it was where the stretch is shorter than the window, or the window has fewer than five rows.
     """
-    half = round(window_s * fps / 2)
-    window = 2 * half + 1
+    window = window_rows(fps, window_s)
+    half = window // 2
     smooth = np.array(values, float)
-    if window < DEGREE + 2 or len(values) < window:
+    if window < LEAST_ROWS or len(values) < window:
         return smooth
     powers = np.vander(np.linspace(-1, 1, window), DEGREE + 1)
     fitted = powers @ np.linalg.pinv(powers)  # of a window's rows, from all of them
@@ -120,6 +131,22 @@ def local_polynomial(values: np.ndarray, fps: float, window_s: float) -> np.ndar
             around @ fitted[half],
             np.tensordot(fitted[half + 1 :], smooth[-window:], 1),
         ]
+    )
+
+
+def window_rows(fps: float, window_s: float) -> int:
+    """Rows of the polynomial's window, an odd number; fewer than `LEAST_ROWS` smooth nothing."""
+    return 2 * round(window_s * fps / 2) + 1
+
+
+def window_too_short(fps: float, window_s: float) -> str:
+    """In words, that the polynomial's window has too few rows to smooth anything; empty where it has enough."""
+    rows = window_rows(fps, window_s)
+    if rows >= LEAST_ROWS:
+        return ""
+    return (
+        f"a window of {window_s:g} s has {rows} frame{'s' * (rows > 1)} at {fps:g} a second, and a polynomial of third degree smooths "
+        f"{LEAST_ROWS} or more: give {(LEAST_ROWS - 1) / fps:.2g} s"
     )
 
 

@@ -76,7 +76,11 @@ def finished_poses(
     if tracks is not None:
         people = backward(recording, tracks, method, people, options, runs.backward)
     if smooth_s:
+        from hmc.motion.smoothing import window_too_short
+
         people = people.smoothed("polynomial", window_s=smooth_s, limits=method.limits)
+        if short := window_too_short(recording.fps, smooth_s):
+            people = replace(people, notes=(*people.notes, f"nothing was smoothed: {short}"))
     if method.needs_hulls:
         return with_trust(people, recording, runs.views)
     return people if cues is None or tracks is None else with_keypoint_views(people, recording, tracks, cues)

@@ -1,5 +1,6 @@
 """Smoothing of finished results: SciPy's own transfer function, closed forms, gaps."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +12,16 @@ from scipy.signal import butter, savgol_filter, sosfiltfilt
 from hmc.body.joints import dof_index
 from hmc.body.kinematics import landmarks
 from hmc.errors import InputError
-from hmc.motion.smoothing import DEGREE, Smoothing, butterworth, local_polynomial, smooth_positions, smooth_trajectory, stretches
+from hmc.motion.smoothing import (
+    DEGREE,
+    Smoothing,
+    butterworth,
+    local_polynomial,
+    smooth_positions,
+    smooth_trajectory,
+    stretches,
+    window_too_short,
+)
 from hmc.motion.trajectory import Trajectory
 
 
@@ -103,6 +113,16 @@ def test_feet_and_tilt_are_smoothed_too():
         left, before = ((np.unwrap(states[:, k]) - whole[:, k] + np.pi) % (2 * np.pi) - np.pi for states in (found, shaken))
         assert left[5:-5].std() < 0.6 * before[5:-5].std()
     assert np.abs(found[:, yaw] - shaken[:, yaw]).max() < 0.2
+
+
+@pytest.mark.parametrize(("fps", "window_s"), [(5, 0.4), (4, 0.7), (24, 0.1)])
+def test_a_window_that_smooths_nothing_is_told_with_one_that_does(fps, window_s):
+    noise = np.random.default_rng(0).normal(0, 0.01, (60, 15, 3))
+    assert np.array_equal(smooth_positions(noise, fps, Smoothing("polynomial", window_s=window_s)), noise)
+    told = re.fullmatch(r"a window of (\S+) s has (\d) frames? at .* smooths 5 or more: give (\S+) s", window_too_short(fps, window_s))
+    assert float(told[1]) == window_s and int(told[2]) < 5
+    assert window_too_short(fps, float(told[3])) == ""
+    assert not np.array_equal(smooth_positions(noise, fps, Smoothing("polynomial", window_s=float(told[3]))), noise)
 
 
 def test_wrong_input():
