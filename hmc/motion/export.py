@@ -15,7 +15,7 @@ from hmc.io.export.bvh import write_bvh
 from hmc.io.export.c3d import MOST_FRAMES, write_c3d
 from hmc.io.export.glb import MovingBody, write_glb
 from hmc.io.export.mot import write_mot
-from hmc.io.export.osim import write_osim
+from hmc.io.export.osim import refuse_other_model, write_osim
 from hmc.io.export.tables import write_csv, write_parquet
 from hmc.io.export.trc import write_trc
 from hmc.landmarks import FOOT_POINTS, LANDMARKS
@@ -153,6 +153,7 @@ def _bvh(path: Path, found: Sequence[Trajectory]) -> Exported:
 def _mot(path: Path, found: Sequence[Trajectory]) -> Exported:
     (one,) = found
     tree, states, notes = _moving(one)
+    refuse_other_model(path.with_suffix(".osim"))
     write_mot(path, tree.dof_names, one.times_s, states)
     write_osim(path.with_suffix(".osim"), tree)
     return Exported((path, path.with_suffix(".osim")), notes)

@@ -300,6 +300,17 @@ def test_command_line(tmp_path, capsys):
     assert main(["export", str(tmp_path / "result"), "--to", "trc", "--out", str(tmp_path / "walk.txt")]) == 0
 
 
+def test_a_model_that_is_not_ours_is_not_written_over(tmp_path):
+    """A laboratory's scaled model is called as its motion is."""
+    people, model = moving(), tmp_path / "subject01.osim"
+    model.write_text('<OpenSimDocument Version="40000"><Model name="scaled"/></OpenSimDocument>')
+    with pytest.raises(InputError, match=re.escape(f"{model}: is another model")):
+        hmc.export(people, tmp_path / "subject01.mot")
+    assert "scaled" in model.read_text() and not (tmp_path / "subject01.mot").exists()
+    for _ in range(2):  # one of ours is
+        hmc.export(people, tmp_path / "walk.mot")
+
+
 def test_tables_have_the_trust_of_landmarks_where_it_is_known(tmp_path):
     people = moving()
     trust = np.linspace(0.5, 1.0, people.positions[..., 0].size).reshape(people.positions.shape[:2]).round(3)

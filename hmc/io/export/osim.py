@@ -14,11 +14,16 @@ from xml.etree import ElementTree as ET
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from hmc.errors import InputError
+from hmc.io.door import read_text_file
 from hmc.io.export.axes import FACING_X
 from hmc.io.export.joint_tree import Joint, JointTree
 from hmc.io.files import atomic_write
 
-__all__ = ["write_osim"]
+__all__ = ["refuse_other_model", "write_osim"]
+
+#: What a model of ours says of itself.
+_CREDITS = "a body of hmc: see docs/exports.md"
 
 #: Shares of the body's mass by words in a segment's name.
 _MASS = {"pelvis": 0.142, "torso": 0.139, "chest": 0.206, "head": 0.081, "clavicle": 0.005, "upper_arm": 0.028, "forearm": 0.022,
@@ -26,6 +31,24 @@ _MASS = {"pelvis": 0.142, "torso": 0.139, "chest": 0.206, "head": 0.081, "clavic
 _LEAST_MASS = 0.005
 _BODY_MASS_INDEX = 23.0
 _STICK_RADIUS_M = 0.012
+
+
+def refuse_other_model(path: str | Path) -> None:
+    """Refuse to write a model in the place of one that is not ours, such as a user's scaled one of the same name.
+
+    Parameters
+    ----------
+    path : path
+        Of the `.osim`.
+
+    Raises
+    ------
+    InputError
+        When there is such a file, or it cannot be read.
+    """
+    path = Path(path)
+    if path.exists() and _CREDITS not in read_text_file(path, guess=True):
+        raise InputError(f"{path}: is another model, in whose place the body's would be written; choose another name for the .mot")
 
 
 def write_osim(path: str | Path, tree: JointTree) -> None:
@@ -44,7 +67,7 @@ def write_osim(path: str | Path, tree: JointTree) -> None:
     path = Path(path)
     document = ET.Element("OpenSimDocument", Version="40000")
     model = ET.SubElement(document, "Model", name=path.stem)
-    _texts(model, credits="a body of hmc: see docs/exports.md", length_units="meters", force_units="N", gravity="0 -9.80665 0")
+    _texts(model, credits=_CREDITS, length_units="meters", force_units="N", gravity="0 -9.80665 0")
     ET.SubElement(model, "Ground", name="ground")
     bodies, joints, markers = (
         ET.SubElement(ET.SubElement(model, kind, name=kind.lower()), "objects") for kind in ("BodySet", "JointSet", "MarkerSet")
