@@ -122,6 +122,8 @@ def run(args: argparse.Namespace) -> int:
         if len(comparable.frames) or not len(true_tracks.frames):
             tracks = clear_mot(comparable, found)
             tracks_notes += _beyond_truth(found, comparable)
+    if poses is None and tracks is None and images is None and tracks_notes:
+        raise InputError(f"{truth_centroids}: nothing can be scored: {tracks_notes[-1]}")
     if poses is None and tracks is None and images is None:
         raise InputError(f"{args.directory}: neither joints.csv nor tracks.csv that the truth could be compared with")
     if args.angles and poses is None and images is None:

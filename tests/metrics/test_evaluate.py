@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import tomllib
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -220,6 +219,16 @@ def test_tracks_are_compared_where_the_truth_says_where_people_are(result, truth
     assert "MOTA 1.0000" in out and "20 person-frames" in out and "the truth is of one frame in 2" in out
 
 
+def test_centroids_that_are_never_known_and_results_of_nobody_are_told(result, truth, tmp_path, capsys):
+    write_tracks(tmp_path / "where.csv", replace(centroids(truth), positions=np.full((40, 3), np.nan)))
+    assert main(["evaluate", str(result), "--truth", str(tmp_path / "where.csv")]) == 2
+    assert "where.csv: nothing can be scored: tracks are not compared in frames 0-19" in capsys.readouterr().err
+    write_joints(tmp_path / "reference.csv", truth)
+    write_joints(result / "joints.csv", truth.where(np.zeros(0, int)))
+    assert main(["evaluate", str(result), "--truth", str(tmp_path / "reference.csv")]) == 0
+    assert "note: nobody has a pose in the estimate" in capsys.readouterr().out
+
+
 def test_a_person_without_any_landmark_is_not_there(truth):
     positions = truth.positions.copy()
     positions[truth.persons == 1] = np.nan
@@ -233,7 +242,7 @@ def test_true_centroids_need_no_heads(result, truth, tmp_path, capsys):
 
 
 def test_from_python_only_the_frames_of_the_recording_count_and_the_pelvis_will_do(recording, truth):
-    part = SimpleNamespace(path=recording, start=5, n_frames=5)
+    part = replace(hmc.sample(), path=recording, start=5, n_frames=5)
     assert hmc.evaluate(centroids(truth), part).mota == 1
     (recording / "truth" / "centroids.csv").unlink()
     scores = hmc.evaluate(TrackTable(truth.frames, truth.persons, truth.positions[:, landmark_index("pelvis")]), part)

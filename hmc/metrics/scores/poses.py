@@ -250,7 +250,7 @@ def _apart(estimate: PoseTable, truth: PoseTable) -> list[str]:
             apart.append(distances_apart(true.frames, true.positions, found.frames, found.positions))
     medians = [float(np.median(values)) for values in apart if len(values)]
     if not medians:
-        return ["the estimate and the truth have no frame in common"]
+        return ["the estimate and the truth have no frame in common" if len(estimate.frames) else "nobody has a pose in the estimate"]
     return [
         f"the nearest estimated and true person are {min(medians):.2f} m apart, median over frames, and match within {GATE_M:g} m: look "
         "whether result and truth have the same world (origin, axes) and count the same frames"
