@@ -125,7 +125,8 @@ CATALOGUE = (
         "Samples of the preset `default` move on with their person: identities are kept without color too.",
     ),
     Entry(
-        "fig-4.13", CANTON, "measured and theoretical complexity (table 4.5)", "naive and PF grow with the voxels, SS with the samples",
+        "fig-4.13", CANTON, "measured and theoretical complexity (table 4.5)",
+        "naive and PF grow with the voxels as by the theory; SS with the samples and, other than by the theory, with the voxels too",
         why="What is there without any samples outweighs them at these sizes (second table). What one more sample costs is about the same "
         "at all voxels, as by the theory; a particle's cost goes with the square of the voxels and not the cube, as PF sums whole columns.",
     ),
