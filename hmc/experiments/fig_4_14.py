@@ -10,7 +10,8 @@ import numpy as np
 from hmc.experiments import table_4_3
 from hmc.experiments import tracking_runs as runs
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
-from hmc.experiments.engine.intervals import decide, interval
+from hmc.experiments.engine.intervals import decide
+from hmc.experiments.run_means import mean_interval
 from hmc.experiments.tracking_intervals import ahead, following
 
 __all__ = ["EXPERIMENT"]
@@ -68,15 +69,16 @@ def _claims(preset: str, cells: Sequence[Cell]) -> list[Claim]:
         ahead(f"{preset}: color costs time", _filters(own, color=False), _filters(own, color=True), "filter", _but("color")),
         ahead(f"{preset}: finer voxels cost time", those(voxel_m=coarse), those(voxel_m=fine), "filter", _but("voxel_m")),
     ]
-    clips = list(dict.fromkeys(one.parameters["recording"] for one in own))
-    gains = [_ahead([one for one in own if one.parameters["recording"] == clip]) for clip in clips]
-    gain = interval(clips, np.array(gains), np.ones(len(clips)))
+    clips = dict.fromkeys(one.parameters["recording"] for one in own)
+    gains = {(clip, 0): _ahead([one for one in own if one.parameters["recording"] == clip]) for clip in clips}
+    gain = mean_interval({run: value for run, value in gains.items() if np.isfinite(value)})
     followed = following([one for one in own if one.parameters["tracker"] == "sparse"])
     return [
         decide(
             f"{preset}: SS above PF at equal factor, in MOTP",
             (gain, followed),
-            f"{gain} mm less, over all voxel sizes, raw and color" + ("" if followed.above_zero else "; people may be lost"),
+            f"{gain} mm less, over the voxel sizes at which both reach one, raw and color"
+            + ("" if followed.above_zero else "; people may be lost"),
         ),
         *claims,
     ]
@@ -91,7 +93,10 @@ def _but(name: str) -> list[str]:
 
 
 def _ahead(cells: Sequence[Cell]) -> float:
-    """By how many millimetres PF's MOTP is worse than that of SS, over factors that both reach: mean of voxel sizes, raw and color."""
+    """By how many millimetres PF's MOTP is worse than that of SS, over factors that both reach: mean of voxel sizes, raw and color.
+
+    Where the slowest of one is quicker than the quickest of the other there is no equal factor; NaN where there is none at all.
+    """
     gains = []
     for voxel in dict.fromkeys(one.parameters["voxel_m"] for one in cells):
         for color in (False, True):
@@ -108,8 +113,9 @@ def _ahead(cells: Sequence[Cell]) -> float:
             if not len(x_ss) or not len(x_pf):
                 continue
             low, high = max(x_ss[0], x_pf[0]), min(x_ss[-1], x_pf[-1])
-            at = np.linspace(low, high, 50) if high > low else np.array([(low + high) / 2])
-            gains.append(float(np.mean(np.interp(at, x_pf, y_pf) - np.interp(at, x_ss, y_ss))))
+            if low <= high:
+                at = np.linspace(low, high, 50)
+                gains.append(float(np.mean(np.interp(at, x_pf, y_pf) - np.interp(at, x_ss, y_ss))))
     return float(np.mean(gains)) if gains else float("nan")
 
 

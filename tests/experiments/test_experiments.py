@@ -473,6 +473,25 @@ def test_what_the_paper_shows_holds_on_the_papers_own_figures():
             plt.close(figure)
 
 
+def test_trackers_are_compared_at_factors_that_both_reach():
+    from hmc.experiments import fig_4_14
+
+    def runs(voxel, tracker, mm, seconds):
+        return [
+            tracking_cell("default", voxel, (tracker, False), n, mm, 0.9, s, clip) for n, s in enumerate(seconds) for clip in ("a@0", "b@0")
+        ]
+
+    apart = [*runs(0.02, "sparse", 200, (1.0, 2.0)), *runs(0.02, "particle", 100, (3.0, 4.0))]
+    both = [*runs(0.05, "sparse", 100, (1.0, 3.0)), *runs(0.05, "particle", 130, (2.0, 4.0))]
+
+    def claim(cells):
+        return fig_4_14._claims("default", cells)[0]
+
+    assert claim(both).holds and claim(both).detail.startswith("30.0 ")
+    assert claim([*both, *apart]).detail.startswith("30.0 ")
+    assert claim(apart).undecided
+
+
 def test_growth_with_voxels_is_drawn_at_a_number_that_all_sizes_have():
     from hmc.experiments import fig_4_13
 
