@@ -232,6 +232,15 @@ def test_the_markdown_page_has_every_row_and_its_files(out):
     assert table.count("|") == 5
 
 
+def test_names_keep_their_capitals_on_the_markdown_page(out):
+    rows = {row.entry.id: row for row in summarise(out)}
+    lines = to_markdown([replace(rows["fig-4.9"], entry=rows["table-4.3"].entry)]).splitlines()
+    assert "Measured on CLEAR 2007: to compare figures is not possible without it." in lines
+    assert any(line.startswith("MOTP and MOTA of all trackers") for line in lines) and any(
+        line.startswith("**Quick, differs**") for line in lines
+    )
+
+
 def test_report_of_nothing(tmp_path, capsys):
     assert main(["report", "--out", str(tmp_path / "none")]) == 0
     assert "reproduced" not in capsys.readouterr().out

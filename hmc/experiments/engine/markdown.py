@@ -40,11 +40,11 @@ def to_markdown(rows: Sequence[Row], link: str = "") -> str:
 
 def _section(row: Row, link: str) -> Iterator[str]:
     entry, run = row.entry, row.results[0]
-    yield from (f"## {entry.id}", "", f"{entry.title.capitalize()}. {entry.work}: {entry.shows}.")
+    yield from (f"## {entry.id}", "", f"{_sentence(entry.title)}. {entry.work}: {entry.shows}.")
     without = without_dataset(entry)
     if without:
-        yield f"{without.capitalize()}."
-    yield from ("", f"**{row.label.capitalize()}**; {run.what}.")
+        yield f"{_sentence(without)}."
+    yield from ("", f"**{_sentence(row.label)}**; {run.what}.")
     for claim in run.claims:
         yield f"- {claim.verdict}: {claim.text}{f' ({claim.detail})' if claim.detail else ''}"
     if row.why:
@@ -65,6 +65,11 @@ def _table(table: StoredTable) -> Iterator[str]:
     for row in table.rows:
         yield f"| {' | '.join(_cell(text) for text in row)} |"
     yield ""
+
+
+def _sentence(text: str) -> str:
+    """With a capital in front; names keep theirs."""
+    return text[:1].upper() + text[1:]
 
 
 def _cell(text: str) -> str:
