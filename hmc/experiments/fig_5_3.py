@@ -4,6 +4,9 @@ Source: Canton (2009), section 5.3.1. Its poor example has both ankles exchanged
 estimated landmark lies nearer to the true place of another than to its own, and good where none does and all are estimated: neither asks
 for the threshold or for a score. The claims are about poor frames against good ones of the same run; that MMTP is the mean where all
 landmarks are matched is true by definition and is none.
+
+The thesis prints a threshold of 50 mm, and its good example cannot have had that: of errors that are all below 50 mm and 48.91 on the mean,
+the deviation is 7.3 at most (the root of 48.91 times 1.09), and it has 16.21.
 """
 
 from __future__ import annotations
