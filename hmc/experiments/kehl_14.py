@@ -1,6 +1,6 @@
-"""Figures 14 and 16: fast motion. Source: Kehl (2006), section 7.4: the shoulder's pitch changes by up to 31 degrees between frames, and
-the person is followed through all of the sequence of 375 frames, less exactly. With nothing of ours ("as printed"), also with a smaller
-tolerance, and in the house's company.
+"""Figures 14 and 16: fast motion. Source: Kehl (2006), section 7.4: the shoulder's pitch changes by up to 31 degrees between frames, by 4.1
+on the mean, and the person is followed through all of the sequence of 375 frames, less exactly. Our dance has as many frames and is faster.
+With nothing of ours ("as printed"), also with a smaller tolerance, and in the house's company.
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ from hmc.landmarks import LANDMARKS
 
 __all__ = ["EXPERIMENT"]
 
-PAPER_DEG, PAPER_FPS = 31.0, 1.27
+#: By how much the shoulder's pitch changes between frames, at most and on the mean, degrees; frames a second.
+PAPER_DEG, PAPER_MEAN_DEG, PAPER_FPS = 31.0, 4.1, 1.27
 #: Of each run so much of the end must not be lost.
 LAST = 0.1
 VARIANTS = {"SMD, as printed": COLORS["paper"], kehl_runs.QUARTER: COLORS["particle"], "SMD": COLORS["sparse"]}
@@ -43,7 +44,7 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
                 "mean_error_mm": float(errors.mean()), "last_tenth_mm": float(errors[-max(1, round(LAST * len(errors))) :].mean()),
                 "worst_frame_mm": float(errors.max()), "largest_turn_deg_per_frame": float(steps.max()),
                 "mean_turn_deg_per_frame": float(steps.mean()), "frames_per_s": 1 / float(np.mean(one.results["seconds"])),
-                "paper_largest_turn_deg": PAPER_DEG, "paper_frames_per_s": PAPER_FPS,
+                "paper_largest_turn_deg": PAPER_DEG, "paper_mean_turn_deg": PAPER_MEAN_DEG, "paper_frames_per_s": PAPER_FPS,
             })  # fmt: skip
             if k == 0:
                 true, found = (_elevation_deg(np.array(one.results[name], float)) for name in ("truth_m", "estimate_m"))
@@ -65,7 +66,9 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
         for variant, own in groups.items()
         if variant != kehl_runs.QUARTER
     )
-    caption = "Fast motion; the turn is that of the right upper arm. The paper: Kehl, Figure 14."
+    caption = (
+        "Fast motion; the turn is that of the right upper arm, the paper's that of the shoulder's pitch alone. The paper: Kehl, Figure 14."
+    )
     return Report((Table("kehl-14", caption, rows),), {"kehl-14": figure}, claims)
 
 

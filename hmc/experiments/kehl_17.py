@@ -1,5 +1,6 @@
 """Figures 7 and 17: holding an object. Source: Kehl (2006), sections 6.1.3 and 7.5: a green cube prolongs the arm, and the colors of the
-arm's patches keep the cube's voxels out of it; 200 frames are followed. With nothing of ours ("as printed") and in the house's company.
+arm's patches keep the cube's voxels out of it; 200 frames are followed. There it changes hands, is thrown, kicked and picked up; here it
+stays in the right hand. With nothing of ours ("as printed") and in the house's company.
 """
 
 from __future__ import annotations
@@ -33,7 +34,10 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
     groups, rows, figure = compared_cues(cells, CUES, ARM, "holding_arm")
     rows = [row | {"paper_frames_per_s": PAPER_FPS} for row in rows]
     claims = tuple(_colors_help(groups, ending) for ending in (", as printed", ""))
-    caption = "A cube in the right hand; holding arm: right elbow and wrist. The paper shows pictures only: Kehl, Figure 17."
+    caption = (
+        f"A cube in the right hand; holding arm: right elbow and wrist; voxels of {100 * kehl_runs.VOXEL_M:g} cm. The paper shows pictures "
+        "only, and has its frames a second at 128^3 voxels: Kehl, Figure 17."
+    )
     return Report((Table("kehl-17", caption, rows),), {"kehl-17": figure}, claims)
 
 

@@ -41,7 +41,7 @@ from hmc.tracking.resumable import person_grid
 from hmc.voxels.hulls import FrontendSettings, stream_hulls
 
 __all__ = [
-    "FAMILY", "FOLLOWED_MM", "QUARTER", "REPEATS", "TOLERANCES", "VARIANTS", "VERSION",
+    "FAMILY", "FOLLOWED_MM", "QUARTER", "REPEATS", "TOLERANCES", "VARIANTS", "VERSION", "VOXEL_M",
     "cell", "cell_grid", "error_interval", "errors_mm", "following", "joint_gain",
     "lm_name", "nearer", "observations", "of_variant", "preset_of", "seconds_gain", "shown",
 ]  # fmt: skip

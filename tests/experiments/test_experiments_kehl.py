@@ -81,6 +81,7 @@ def test_fast_motion_tells_loss():
     assert [claim.holds for claim in report.claims] == [True, False]
     lost = [row for row in report.tables[0].rows if row["method"] == "SMD"]
     assert lost[0]["last_tenth_mm"] == pytest.approx(150, rel=0.02)
+    assert (lost[0]["paper_largest_turn_deg"], lost[0]["paper_mean_turn_deg"]) == (31.0, 4.1)
 
 
 def test_displacements_are_counted():
