@@ -32,7 +32,7 @@ from hmc.pose.objectives.volume import volume_error
 from hmc.pose.spectral.reading import read_body
 from hmc.pose.spectral.skeleton import equally_spaced
 from hmc.pose.spectral.volume import FARTHEST_M, observe_volume
-from hmc.pose.steps.swarm.fit import STAGES, FitSettings, fit_flat, fit_hierarchical, rest_state, torso_moves
+from hmc.pose.steps.swarm.fit import PARTS, STAGES, FitSettings, fit_flat, fit_hierarchical, rest_state, torso_moves
 from hmc.pose.steps.swarm.heading import facing_evidence, heading_of, spin_towards
 from hmc.pose.steps.swarm.temporal import RestartSettings, SwarmSettings, is_upright, start_fits, swarm_step
 from hmc.pose.views.person_view import PersonView
@@ -430,6 +430,20 @@ def test_who_is_followed_badly_is_started_anew_and_not_where_the_fit_is_good():
         _, info = swarm_step(np.random.default_rng(1), MODEL, replace(good, state=bad), reading, 30.0, None, settings)
         costs[info.started] = info.cost_m
     assert costs[True] < 0.6 * costs[False]
+
+
+def test_evaluations_are_those_of_all_fits_of_a_frame_whichever_is_taken():
+    reading, swarm = read(BODY), SWARM_PRESETS["hsiao2008"].swarm
+    tried = start_fits(np.random.default_rng(0), MODEL, reading, None, SwarmSettings(restart=RestartSettings()))
+    state, first = swarm_step(np.random.default_rng(0), MODEL, None, reading, 30.0, None, SwarmSettings(restart=RestartSettings()))
+    assert first.evaluations == sum(one.evaluations for one in tried) > tried[0].evaluations
+    stages = sum(particles * (1 + iterations) for particles, iterations in swarm.fit.stages)
+    tuning = len(PARTS) * swarm.fit.tune_rounds * swarm.fit.tune_particles * (1 + swarm.fit.tune_iterations)
+    both = stages + swarm.particles * (1 + swarm.iterations) + 2 * tuning
+    for margin_m, started in ((np.inf, False), (-np.inf, True)):
+        settings = replace(swarm, restart=replace(swarm.restart, margin_m=margin_m))
+        _, info = swarm_step(np.random.default_rng(1), MODEL, state, reading, 30.0, None, settings)
+        assert (info.started, info.evaluations) == (started, both)
 
 
 def test_what_is_read_in_the_voxels_can_be_given():

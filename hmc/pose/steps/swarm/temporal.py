@@ -5,6 +5,7 @@ Source: Hsiao (2008), section 3.2.2.5 and Figure 3-22.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -150,6 +151,7 @@ class SwarmInfo:
     turned : bool
         Whether the skeleton was turned about, because it had faced backwards.
     evaluations : int
+        Of all fits in this frame, those that were not taken among them.
     doubts : tuple of str
         What the segmentation says is missing, touches or is left out.
     cost_m : float
@@ -256,14 +258,14 @@ def swarm_step(
         trials = start_fits(rng, model, reading, heading, settings)
         first = next((one for one in trials if (restart is not None and restart.alone) or is_upright(one.state)), None)
         if first is None:
-            return None, SwarmInfo("no fit: no person is upright in the curves", np.nan, False, False, 0, doubts)
+            return None, SwarmInfo("no fit: no person is upright in the curves", np.nan, False, False, _spent(trials), doubts)
         facing = facing_evidence(first.state, heading)
-        return SwarmState(first.state, np.zeros_like(first.state), first.cost_m, facing), _info(first, True, False, 0, doubts)
+        return SwarmState(first.state, np.zeros_like(first.state), first.cost_m, facing), _info(first, True, False, _spent(trials), doubts)
     frames = 1 + state.missed
     found = fit_near(rng, model, state, reading, fps, settings)
     facing = state.facing + facing_evidence(found.state, heading)
     started = turned = False
-    spent = 0
+    spent = found.evaluations
     backwards = restart is not None and facing < restart.backwards and facing_evidence(found.state, heading) < 0
     whole = segmentation.whole and reading.status == "read"
     # Parts that were left out because they are far away count here, where the frame shows everything.
@@ -272,8 +274,9 @@ def swarm_step(
         cost_m = float(fit_cost(model, found.state[None], _observed(model, reading, settings))[0])
     doubtful = restart is not None and cost_m > max(restart.doubt_m, restart.doubt_ratio * state.usual_m)
     if restart is not None and reading.status == "read" and (((doubtful or backwards) and whole) or restart.always):
-        trial = start_fits(rng, model, reading, heading, settings, None if backwards else state.state)[0]
-        spent = trial.evaluations
+        trials = start_fits(rng, model, reading, heading, settings, None if backwards else state.state)
+        trial = trials[0]
+        spent += _spent(trials)
         margin = -settings.facing_m if backwards and facing_evidence(trial.state, heading) > 0 else restart.margin_m
         if trial.cost_m < cost_m - margin:
             found, started, turned = trial, True, backwards
@@ -284,7 +287,7 @@ def swarm_step(
         read = reading.status == "read"
         why = FAR if read else reading.status
         error_m = found.error_m if read else np.nan
-        return missed(state), SwarmInfo(f"no fit: {why}", error_m, False, False, found.evaluations + spent, doubts, found.cost_m)
+        return missed(state), SwarmInfo(f"no fit: {why}", error_m, False, False, spent, doubts, found.cost_m)
     change = np.zeros_like(found.state) if started else (found.state - state.state) / frames
     # Sums of evidence fade, so that a wrong start can be seen after a while.
     now = SwarmState(found.state, change, 0.9 * state.usual_m + 0.1 * found.cost_m, 0.97 * facing)
@@ -338,5 +341,10 @@ def missed(state: SwarmState | None) -> SwarmState | None:
     return None if state is None else replace(state, velocity=np.zeros_like(state.velocity), missed=state.missed + 1)
 
 
+def _spent(fits: Sequence[SkeletonFit]) -> int:
+    """Evaluations of all fits that were tried, not of the one alone that is taken."""
+    return sum(one.evaluations for one in fits)
+
+
 def _info(found: SkeletonFit, started: bool, turned: bool, spent: int, doubts: tuple[str, ...]) -> SwarmInfo:
-    return SwarmInfo("fitted", found.error_m, started, turned, found.evaluations + spent, doubts, found.cost_m)
+    return SwarmInfo("fitted", found.error_m, started, turned, spent, doubts, found.cost_m)
