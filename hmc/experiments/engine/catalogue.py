@@ -194,7 +194,8 @@ CATALOGUE = (
         _OWN_VIDEOS,
         "Measured limb by limb, where the thesis has pictures. The printed filters do not follow these people, with hidden limbs or "
         "without, and their DDM drops nothing. The preset `default` drops and takes back, also on counter_unseen; its thresholds were "
-        "found on counter and workbench. Its APF does not lose the track, it only invents the hidden limbs.",
+        "found on counter and workbench. Its APF does not lose the track, it only invents the hidden limbs. Rows of the printed filters "
+        "are without the first tenth of the frames, which tells their P0.",
     ),
     Entry(
         "table-8.1", CANTON, "all methods together, with table 8.2",
