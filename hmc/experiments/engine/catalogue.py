@@ -56,8 +56,9 @@ _STEPS = (
 )
 _BY_ACTION = (
     " Of who walks and jogs both models are ahead of APF by MMTA in the means, as in the thesis, but model 2 before model 1, which is the "
-    "other way round there, and only model 2's gain on jogging is above zero by its interval; of who stands and moves the arms APF is "
-    "ahead in the means (table-8.1-gains). What APF matches is as near as what SHBM matches, where the thesis has twice the distance."
+    "other way round there; of who stands and moves the arms APF is ahead in the means; by its interval over two clips an action and "
+    "three seeds no gain is above or below zero (table-8.1-gains). What APF matches is as near as what SHBM matches, where the thesis has "
+    "twice the distance."
 )
 _MARKER_SCORE = (
     "The printed likelihood asks only whether the detections nearest to a landmark agree with one another, not where the landmark lies in "
