@@ -326,6 +326,7 @@ def evaluate(found: PosedPeople | TrackTable | str | Path, recording: Recording 
         raise InputError(f"{path}: no such file; there is no truth to evaluate against")
 
     def selected(table):
+        """Of a table the recording's frames."""
         return table.where((table.frames >= recording.start) & (table.frames < recording.start + recording.n_frames))
 
     if result.poses is None:

@@ -11,12 +11,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from hmc.body.inverse import fit_landmarks
 from hmc.body.joints import N_DOF
 from hmc.body.model import BodyModel
 from hmc.body.proportions import canton_body
 from hmc.experiments.five_actions import action_of, action_recipe
-from hmc.experiments.truth import HEIGHT_M, first_truth, standing_state, stature_m
+from hmc.experiments.truth import HEIGHT_M, first_truth, nearest_states, stature_m
 from hmc.io.recording import Recording
 from hmc.io.results import PoseTable
 from hmc.synthetic.recipe import ActorRecipe
@@ -79,11 +78,7 @@ def largest_variation(body: BodyModel, positions: np.ndarray) -> np.ndarray:
     """
     if len(positions) < 2:
         return 0.5 * LEAST_VARIATION
-    state, states = standing_state(body, positions[0]), []
-    for one in positions:
-        state, _ = fit_landmarks(body, one, state)
-        states.append(state)
-    change = turned(np.diff(states, axis=0))
+    change = turned(np.diff(nearest_states(body, positions), axis=0))
     return 0.5 * np.maximum(np.quantile(np.abs(change), USUAL_SHARE, axis=0), LEAST_VARIATION)
 
 

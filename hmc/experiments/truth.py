@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hmc.body.inverse import fit_landmarks
 from hmc.body.model import BodyModel, neutral_state
 from hmc.errors import InputError
 from hmc.experiments.engine.experiment import Cell
@@ -15,7 +16,8 @@ from hmc.landmarks import LANDMARKS
 from hmc.metrics.persons import match_persons
 
 __all__ = [
-    "HEIGHT_M", "all_truth", "estimate_of", "estimates", "first_truth", "standing_state", "stature_m", "truth_path", "truth_track",
+    "HEIGHT_M", "all_truth", "estimate_of", "estimates", "first_truth", "nearest_states", "standing_state", "stature_m", "truth_path",
+    "truth_track",
 ]  # fmt: skip
 
 #: Stature where a recording does not say it, metres.
@@ -72,6 +74,26 @@ def standing_state(body: BodyModel, points: np.ndarray) -> np.ndarray:
     across = points[LANDMARKS.index("l_hip")] - points[LANDMARKS.index("r_hip")]
     state[3] = np.arctan2(-across[0], across[1])
     return state
+
+
+def nearest_states(body: BodyModel, positions: np.ndarray) -> np.ndarray:
+    """The poses of a body that are nearest to true landmarks, each sought from the one before.
+
+    Parameters
+    ----------
+    body : BodyModel
+    positions : ndarray, shape (n, 15, 3)
+        In frames that follow one another, metres.
+
+    Returns
+    -------
+    ndarray, shape (n, 37)
+    """
+    state, states = standing_state(body, positions[0]), []
+    for points in positions:
+        state, _ = fit_landmarks(body, points, state)
+        states.append(state)
+    return np.array(states)
 
 
 def stature_m(recording: Recording) -> float | None:

@@ -29,7 +29,7 @@ from hmc.experiments.ideal_hulls import actor_masks, body_masks, body_voxels
 from hmc.experiments.markerless_runs import FRONTEND
 from hmc.experiments.pose_intervals import ahead
 from hmc.experiments.study import change_of, runs_of, score_table, table_of
-from hmc.experiments.why_slow import nearest_states
+from hmc.experiments.truth import nearest_states
 from hmc.io.recording import Recording
 from hmc.synthetic.scene import build_scene
 from hmc.voxels.grid import VoxelGrid
@@ -37,7 +37,7 @@ from hmc.voxels.hulls import HullStep, stream_hulls
 
 __all__ = ["CHANGES", "EXPERIMENT", "HULLS"]
 
-#: What hulls are made of.
+#: What hulls are made of, and under which name those that are not of images are kept.
 IMAGES, ACTOR, BODY_SILHOUETTES, BODY = HULLS = ("images", "the actor's silhouettes", "the body's silhouettes", "the body itself")
 _FOLDERS = {ACTOR: "actor", BODY_SILHOUETTES: "body-silhouettes", BODY: "body"}
 AS_PRINTED, WIDER, SYMMETRIC, LENGTHS = "as printed", "P0 twice as wide", "the symmetric likelihood", "a body of people's lengths"

@@ -17,7 +17,6 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 
-from hmc.body.inverse import fit_landmarks
 from hmc.body.kinematics import landmarks
 from hmc.body.model import BodyModel
 from hmc.body.proportions import canton_body
@@ -32,10 +31,10 @@ from hmc.experiments.five_actions import ACTIONS
 from hmc.experiments.markerless_runs import action_sources
 from hmc.experiments.pose_intervals import ahead, score_interval
 from hmc.experiments.study import change_of, runs_of, score_table, table_of
-from hmc.experiments.truth import HEIGHT_M, standing_state, stature_m
+from hmc.experiments.truth import HEIGHT_M, nearest_states, stature_m
 from hmc.search.filters import AnnealedSettings, annealed_step, particle_init
 
-__all__ = ["CHANGES", "EXPERIMENT", "PLACES", "nearest_states"]
+__all__ = ["CHANGES", "EXPERIMENT", "PLACES"]
 
 #: What is seen: the true place of every landmark; or the markers of Table 6.3.
 PLACES, SEEN_MARKERS = "true places", "markers"
@@ -106,15 +105,6 @@ def cell(parameters: Parameters, inputs: Inputs, rng: np.random.Generator) -> Re
 
 def _settings(parameters: Parameters) -> AnnealedSettings:
     return AnnealedSettings(parameters["layers"], parameters["particles"], SURVIVAL, parameters["spread"])
-
-
-def nearest_states(body: BodyModel, positions: np.ndarray) -> np.ndarray:
-    """The poses of a body that are nearest to true landmarks (n, 15, 3), each sought from the one before; (n, 37)."""
-    state, states = standing_state(body, positions[0]), []
-    for points in positions:
-        state, _ = fit_landmarks(body, points, state)
-        states.append(state)
-    return np.array(states)
 
 
 def _follow(

@@ -48,11 +48,12 @@ _STEPS = (
     "markers as without (figure 6.19 shows a walk). How much of it is the annealing is shown by a likelihood that knows every landmark's "
     "true place, of a body that fits (why-slow): who walks and jogs has 42.5 % with the marker-based filter's 3 layers of 700, of which "
     "the thesis has 90 and 96 behind a detector; and 77.7 % with the 6 of 600, which is what the thesis has on hulls (68.2 and 79.6), "
-    "where ours has 10.4 and 24.8 (table-6.4). Neither silhouettes nor carving are the cause (why-hulls): of two walks and two jogs the "
-    "printed filter has 26 % in hulls of images, 23 of faultless silhouettes, 38 of those of its own body, which it fits, and 39 in the "
-    "voxels of that body itself, where who boxes has 98. What overlap tells of a limb that is out of place is less than its true place, "
-    "and too little for spreads as narrow as ours: P0 twice as wide has 65 % there. P0 is printed without a number; no single change "
-    "cures who is seen by images (why-lost). The preset `default`, which refines what a filter finds, follows all of them."
+    "where ours has 10.4 and 24.8 (table-6.4). Most is lost even without faults of silhouettes and without carving (why-hulls): of two "
+    "walks and two jogs the printed filter has 26 % in hulls of images, 23 of faultless silhouettes, 38 of those of its own body, which "
+    "it fits, and 39 in the voxels of that body itself, where who boxes has 98. What overlap tells of a limb that is out of place is less "
+    "than its true place, and too little for spreads as narrow as ours: P0 twice as wide has 65 % there. P0 is printed without a number; "
+    "no single change cures who is seen by images (why-lost). The preset `default`, which refines what a filter finds, follows all of "
+    "them."
 )
 _BY_ACTION = (
     " Of who walks and jogs both models are ahead of APF by MMTA in the means, as in the thesis, but model 2 before model 1, which is the "
