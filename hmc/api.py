@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Literal
 from hmc.errors import InputError
 from hmc.io.masks import MaskStep
 from hmc.io.recording import Recording, for_voxels, open_recording
-from hmc.io.results import TrackTable, read_joints, read_tracks
+from hmc.io.results import PoseTable, TrackTable, read_joints, read_table, read_tracks
 from hmc.processes import one_thread
 from hmc.voxels.hulls import HullStep, stream_hulls, stream_masks
 
@@ -308,7 +308,7 @@ def evaluate(found: PosedPeople | TrackTable | str | Path, recording: Recording 
     Raises
     ------
     InputError
-        When there is no truth.
+        When there is no truth, or none of these frames.
 
     Examples
     --------
@@ -317,22 +317,19 @@ def evaluate(found: PosedPeople | TrackTable | str | Path, recording: Recording 
     >>> bool(hmc.evaluate(hmc.pose(recording), recording).summary["mean_mm"] < 40)
     True
     """
-    from hmc.metrics.scores import evaluate_pose, evaluate_tracks, pelvis_tracks
+    from hmc.metrics.scores import chosen_frames, chosen_truth, evaluate_pose, evaluate_tracks, pelvis_tracks
 
-    recording, result = _opened(recording), _result_of(found)
+    recording = _opened(recording)
+    table = _table_of(found)
     joints, centroids = (recording.path / "truth" / name for name in ("joints.csv", "centroids.csv"))
-    path = centroids if result.poses is None and centroids.is_file() else joints
+    path = centroids if isinstance(table, TrackTable) and centroids.is_file() else joints
     if not path.is_file():
         raise InputError(f"{path}: no such file; there is no truth to evaluate against")
-
-    def selected(table):
-        """Of a table the recording's frames."""
-        return table.where((table.frames >= recording.start) & (table.frames < recording.start + recording.n_frames))
-
-    if result.poses is None:
-        truth = read_tracks(path) if path == centroids else pelvis_tracks(read_joints(path))
-        return evaluate_tracks(selected(result.tracks), selected(truth))
-    return evaluate_pose(selected(result.poses), selected(read_joints(path)))
+    first, number = recording.start, recording.n_frames
+    if isinstance(table, PoseTable):
+        return evaluate_pose(chosen_frames(table, first, number), chosen_truth(read_joints(path), path, first, number))
+    truth = chosen_truth(read_tracks(path) if path == centroids else pelvis_tracks(read_joints(path)), path, first, number)
+    return evaluate_tracks(chosen_frames(table, first, number), truth)
 
 
 def view(
@@ -438,6 +435,13 @@ def _in_images(keypoints: KeypointSource, recording: Recording) -> KeypointSourc
 
 def _opened(recording: Recording | str | Path) -> Recording:
     return recording if isinstance(recording, Recording) else open_recording(recording)
+
+
+def _table_of(found: PosedPeople | TrackTable | str | Path) -> PoseTable | TrackTable:
+    """The poses of what somebody has, or the tracks where there are no poses."""
+    if isinstance(found, str | Path):
+        return read_table(found)
+    return found if isinstance(found, TrackTable) else found.poses
 
 
 def _result_of(found: PosedPeople | TrackTable | str | Path) -> Result:

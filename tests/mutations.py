@@ -211,7 +211,8 @@ def warm() -> None:
     import importlib
 
     for name in (
-        "hmc.cli.check hmc.cli.world hmc.cli.sync hmc.cli.track hmc.cli.pose hmc.cli.evaluate hmc.cli.view hmc.cli.run hmc.cli.synth hmc.pose.backward "
+        "hmc.cli.check hmc.cli.world hmc.cli.sync hmc.cli.track hmc.cli.pose hmc.cli.evaluate "
+        "hmc.cli.evaluate_input hmc.cli.evaluate_scores hmc.cli.view hmc.cli.run hmc.cli.synth hmc.pose.backward "
         "hmc.pose.follow hmc.pose.clear_views hmc.pose.registry hmc.tracking.trackers hmc.tracking.resumable hmc.check hmc.view.write hmc.view.mosaic hmc.view.plots "
         "hmc.synthetic.render hmc.synthetic.recipe hmc.metrics.landmarks hmc.trials.page hmc.experiments.__main__ hmc.experiments.fig_3_3 sklearn.tree pandas "
         "scipy.stats scipy.signal tqdm hmc.experiments.engine.page matplotlib.pyplot"

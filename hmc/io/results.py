@@ -21,8 +21,8 @@ from hmc.io.tables import frame_column, integer_column, read_columns
 from hmc.landmarks import ENOUGH_VIEWS, LANDMARKS, TRUSTED
 
 __all__ = [
-    "PoseStates", "PoseTable", "TrackTable", "read_centroids", "read_joints", "read_pose", "read_run",
-    "read_tracks", "run_selection", "write_joints", "write_pose", "write_run", "write_tracks",
+    "PoseStates", "PoseTable", "TrackTable", "no_table", "read_centroids", "read_joints", "read_pose", "read_run",
+    "read_table", "read_tracks", "run_selection", "write_joints", "write_pose", "write_run", "write_tracks",
 ]  # fmt: skip
 
 JOINT_COLUMNS = ("frame", "person", "joint", "x", "y", "z")
@@ -303,6 +303,25 @@ def _read_positions(path: Path, heads_needed: bool) -> TrackTable:
     _refuse_twice(path, cells.ravel(), lines, "this frame and person")
     order = np.lexsort([persons, frames])
     return TrackTable(frames[order], persons[order], positions[order], None if heads is None else heads[order])
+
+
+def read_table(directory: str | Path) -> PoseTable | TrackTable:
+    """The `joints.csv` of a result, or its `tracks.csv` where it has no other.
+
+    Raises
+    ------
+    InputError
+        When there is neither of them, or it is none of its kind.
+    """
+    joints, tracks = (Path(directory) / name for name in ("joints.csv", "tracks.csv"))
+    if not joints.exists() and not tracks.exists():
+        raise no_table(directory)
+    return read_joints(joints) if joints.exists() else read_tracks(tracks)
+
+
+def no_table(directory: str | Path) -> InputError:
+    """What is said of a folder that is no result."""
+    return InputError(f"{directory}: neither joints.csv nor tracks.csv; give the folder that `hmc pose` or `hmc track` wrote")
 
 
 def write_tracks(path: str | Path, table: TrackTable) -> None:

@@ -20,7 +20,7 @@ from hmc.io.camera_turns import read_turns
 from hmc.io.keypoints import KeypointSource
 from hmc.io.masks import MaskStep
 from hmc.io.recording import Frame, Recording, iterate_frames
-from hmc.io.results import PoseStates, PoseTable, TrackTable, read_joints, read_pose, read_tracks
+from hmc.io.results import PoseStates, PoseTable, TrackTable, no_table, read_joints, read_pose, read_tracks
 from hmc.io.silhouettes import KeptSilhouettes, open_silhouettes
 from hmc.landmarks import landmark_index
 from hmc.view.overlay import LEFT, RIGHT, draw_keypoints, draw_label, draw_outline, draw_paths, draw_sticks, draw_track, person_color
@@ -110,7 +110,7 @@ def read_result(directory: str | Path) -> Result:
     poses = read_joints(directory / "joints.csv") if (directory / "joints.csv").exists() else None
     tracks = read_tracks(directory / "tracks.csv") if (directory / "tracks.csv").exists() else None
     if poses is None and tracks is None:
-        raise InputError(f"{directory}: neither joints.csv nor tracks.csv; give the folder that `hmc pose` or `hmc track` wrote")
+        raise no_table(directory)
     states = read_pose(directory / "pose.npz") if (directory / "pose.npz").exists() else None
     result = Result(poses, tracks, silhouettes=open_silhouettes(directory), turned=read_turns(directory))
     if states is not None and N_CANTON <= len(states.dof_names) < N_DOF and states.dof_names == DOF_NAMES[: len(states.dof_names)]:

@@ -247,6 +247,8 @@ def test_from_python_only_the_frames_of_the_recording_count_and_the_pelvis_will_
     (recording / "truth" / "centroids.csv").unlink()
     scores = hmc.evaluate(TrackTable(truth.frames, truth.persons, truth.positions[:, landmark_index("pelvis")]), part)
     assert scores.mota == 1 and scores.objects == 10
+    with pytest.raises(InputError, match="none in common"):
+        hmc.evaluate(centroids(truth), replace(part, start=500))
 
 
 def test_a_truth_of_other_frames_or_another_world_is_told(result, truth, tmp_path, capsys):

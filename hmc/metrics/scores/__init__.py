@@ -8,6 +8,7 @@ from hmc.metrics.scores.poses import (
     PoseEvaluation,
     evaluate_pose,
 )
+from hmc.metrics.scores.selection import chosen_frames, chosen_truth
 from hmc.metrics.scores.tracks import comparable_tracks, evaluate_tracks, pelvis_tracks
 
 __all__ = [
@@ -15,6 +16,8 @@ __all__ = [
     "PersonErrors",
     "PoseEvaluation",
     "angle_rows",
+    "chosen_frames",
+    "chosen_truth",
     "comparable_tracks",
     "evaluate_images",
     "evaluate_offsets",

@@ -94,6 +94,9 @@ class FitSettings:
     tune_rounds : int
     limbs_stay : bool
         Whether limbs stay where they are while the torso is tuned (`torso_moves`); the thesis does not say.
+    anywhere : bool
+        Whether all particles of a stage, and of the swarm near the last pose, begin anywhere in their ranges, as in the thesis's pseudo
+        code; else some begin at what is known already. Fine tuning has its "initial guess" among them either way.
     """
 
     stages: tuple[tuple[int, int], ...] = ((12, 12), (24, 20), (24, 12), (40, 40), (50, 50))
@@ -104,6 +107,7 @@ class FitSettings:
     tune_rad: float = 0.6
     tune_rounds: int = 2
     limbs_stay: bool = True
+    anywhere: bool = False
 
 
 @dataclass(frozen=True)
@@ -219,7 +223,8 @@ def fit_hierarchical(
             low[index], high[index] = near[0][index], near[1][index]
         low[6], high[6] = start[6] - spin_range, start[6] + spin_range
         swarm = replace(settings.swarm, particles=particles, iterations=iterations)
-        state, more = _optimise(rng, _Goal(model, seen, prior), state[None], np.array(free), (low, high), swarm)
+        begin = None if settings.anywhere else state[None]
+        state, more = _optimise(rng, _Goal(model, seen, prior), state, np.array(free), (low, high), swarm, begin)
         evaluations += more
     tuned = fine_tune(rng, model, observed, state, settings, prior)
     return replace(tuned, evaluations=evaluations + tuned.evaluations)
@@ -233,22 +238,25 @@ def fit_around(
     box: Box,
     swarm: PsoSettings,
     prior: Prior | None = None,
+    anywhere: bool = False,
 ) -> SkeletonFit:
-    """All parameters within a box, from several starts: temporal PSO (section 3.2.2.5).
+    """All parameters within a box: temporal PSO (section 3.2.2.5).
 
     Parameters
     ----------
     rng, model, observed
         As for `fit_hierarchical`.
     starts : ndarray, shape (k, 23)
-        The first is what parameters outside the search keep.
+        Where the swarm begins, and at the first with one part moved.
     box : tuple of ndarray, shape (23,)
         Lowest and highest values, as of `bounds_around`.
     swarm : PsoSettings
     prior : Prior, optional
+    anywhere : bool
+        Whether it begins anywhere in the box instead (`FitSettings`).
     """
-    starts = np.concatenate([starts, _one_part_moved(rng, starts[0], box, swarm.particles - len(starts))])
-    state, evaluations = _optimise(rng, _Goal(model, observed, prior), starts, np.arange(N_PARAMETERS), box, swarm)
+    begin = None if anywhere else np.concatenate([starts, _one_part_moved(rng, starts[0], box, swarm.particles - len(starts))])
+    state, evaluations = _optimise(rng, _Goal(model, observed, prior), starts[0], np.arange(N_PARAMETERS), box, swarm, begin)
     return _fitted(model, observed, state, evaluations)
 
 
@@ -276,7 +284,7 @@ def fit_flat(
     low, high = bounds_around(model, start, 0.25, 4 * np.pi)
     low[6], high[6] = start[6] - spin_range, start[6] + spin_range
     state, evaluations = _optimise(
-        rng, _Goal(model, observed, Prior(start, weight)), start[None], np.arange(N_PARAMETERS), (low, high), swarm
+        rng, _Goal(model, observed, Prior(start, weight)), start, np.arange(N_PARAMETERS), (low, high), swarm, start[None]
     )
     return _fitted(model, observed, state, evaluations)
 
@@ -297,7 +305,7 @@ def fine_tune(
         for free in PARTS:
             box = bounds_around(model, state, share * settings.tune_m, share * settings.tune_rad)
             moves = torso_moves(model, state) if free == _TORSO and settings.limbs_stay else None
-            state, more = _optimise(rng, goal, state[None], np.array(free), box, swarm, moves)
+            state, more = _optimise(rng, goal, state, np.array(free), box, swarm, state[None], moves)
             evaluations += more
     return _fitted(model, observed, state, evaluations)
 
@@ -317,17 +325,18 @@ class _Goal:
 def _optimise(
     rng: np.random.Generator,
     goal: _Goal,
-    starts: np.ndarray,
+    state: np.ndarray,
     free: np.ndarray,
     box: Box,
     swarm: PsoSettings,
+    begin: np.ndarray | None = None,
     moves: np.ndarray | None = None,
 ) -> tuple[np.ndarray, int]:
-    """The first of the starts (n, 23) with some parameters optimised, and the number of evaluations.
+    """A state with some parameters optimised, and the number of evaluations.
 
-    `moves` (k, 23) says what each free parameter moves, by default itself.
+    The first particles are at `begin` (n, 23). `moves` (k, 23) says what each free parameter moves, by default itself.
     """
-    model, state, (low, high) = goal.model, starts[0], box
+    model, (low, high) = goal.model, box
     moves = np.eye(N_PARAMETERS)[free] if moves is None else moves
 
     def moved(values: np.ndarray) -> np.ndarray:
@@ -338,7 +347,7 @@ def _optimise(
     def cost(values: np.ndarray) -> np.ndarray:
         return goal.cost(moved(values))
 
-    found = pso_run(rng, cost, low[free], high[free], swarm, starts[:, free])
+    found = pso_run(rng, cost, low[free], high[free], swarm, None if begin is None else begin[:, free])
     out = moved(found.leader[None])[0]
     # Only the direction of the neck counts: keep it on the torso.
     axis = out[3:6] - out[:3]

@@ -88,8 +88,8 @@ class SwarmSettings:
         Eq. 3-27's one-to-one assignment alone does, as in the thesis, of curves and parts from end to end, feet with the legs.
     rest_weight : float
         How much the pose at rest counts in a start (`Prior`).
-    spin_weight : float
-        How much a change of the spin from one frame to the next counts, metres a radian.
+    last_weight, spin_weight : float
+        How much the last pose counts in the temporal swarm (`Prior`), and a change of the spin from one frame to the next, metres a radian.
     restart : RestartSettings or None
         None: every frame has the fit near the last pose; for methods that recover in another way.
     voxels : bool
@@ -108,6 +108,7 @@ class SwarmSettings:
     farthest_m: float = 0.25
     named: bool = True
     rest_weight: float = 0.004
+    last_weight: float = 0.004
     spin_weight: float = 0.01
     restart: RestartSettings | None = None
     voxels: bool = True
@@ -311,13 +312,13 @@ def fit_near(
     frames = 1 + state.missed
     metres = max(settings.reach_m_s * frames / fps, settings.least_reach_m)
     radians = max(settings.reach_rad_s * frames / fps, settings.least_reach_rad)
-    prior = Prior(state.state, spin_weight=settings.spin_weight / frames)
+    prior = Prior(state.state, settings.last_weight, settings.spin_weight / frames)
     box = bounds_around(model, state.state, metres, min(radians, np.pi))
     swarm = replace(settings.fit.swarm, particles=settings.particles, iterations=settings.iterations)
     starts = np.stack([state.state, state.state + state.velocity])
     near = curves_near(model, state.state, reading, settings.farthest_m) if settings.named else None
     observed = _observed(model, reading, settings, near)
-    found = fit_around(rng, model, observed, starts, box, swarm, prior)
+    found = fit_around(rng, model, observed, starts, box, swarm, prior, settings.fit.anywhere)
     tuned = fine_tune(rng, model, observed, found.state, settings.fit, prior)
     return replace(tuned, evaluations=found.evaluations + tuned.evaluations)
 
