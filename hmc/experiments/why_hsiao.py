@@ -1,8 +1,9 @@
 """Why Hsiao's printed system is lost: single changes of it, and of `default` what its swarm and the house add. Ours, not the thesis's.
 
-Is it the parts (section 3.1.4.2), which curve is which (3.2.2.1), the ranges of the joints (Table 3-4), the particles (not printed), or
-which way round the body is (3.2.1.2)? The last has no change of its own: beside the mean error is that with left and right exchanged in
-frames where that is nearer. True parts are those of the nearest point of the rendered actor's skin.
+Is it the parts (section 3.1.4.2), which curve is which (3.2.2.1), the ranges of the joints (Table 3-4), the particles (not printed), where
+swarms begin (3.2.2.2), whether the last pose draws them, or which way round the body is (3.2.1.2)? The last has no change of its own:
+beside the mean error is that with left and right exchanged in frames where that is nearer. True parts are those of the nearest point of
+the rendered actor's skin.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ from hmc.pose.spectral.segmentation import segment_body
 from hmc.pose.steps.presets import PRESETS
 from hmc.pose.steps.refine import RefineSettings
 from hmc.pose.steps.swarm.step import Read, SwarmPreset
+from hmc.pose.steps.swarm.temporal import SwarmSettings
 from hmc.pose.views.person_view import PersonView
 from hmc.synthetic.actor import PARTS
 from hmc.synthetic.truth import true_parts
@@ -68,6 +70,7 @@ CHANGES: dict[str, Callable[[str], PoseMethod]] = {
     AS_PRINTED: _plain(_PRINTED),
     "our segmentation": _plain(_with(reading={"segmentation": ReadingSettings().segmentation})),
     "four times the particles": _plain(_with(fit={"stages": _FOUR_TIMES}, swarm={"particles": 4 * _PRINTED.swarm.particles})),
+    "begun at the last pose and drawn to it": _plain(_with({"anywhere": False}, swarm={"last_weight": SwarmSettings().last_weight})),
     "anatomical ranges": _plain(_with(thesis=False)),
     "true parts": _true(_PRINTED),
     "true parts, curves named": _true(_with(swarm={"named": True})),
@@ -149,13 +152,15 @@ def report(cells: Sequence[Cell], plan: Plan) -> Report:
 
 
 def _nearer_side(cells: Sequence[Cell]) -> float:
-    """Mean error, mm, where left and right of every frame are exchanged if that is nearer."""
+    """Mean error of the frames with a fit, mm, where left and right of each are exchanged if that is nearer."""
     errors = []
     for one in cells:
         estimate, truth = estimates(one)
         both = np.array([landmark_errors(points, truth).mean(axis=1) for points in (estimate, exchange_sides(estimate))])
         errors.append(1000 * both.min(axis=0))
-    return float(np.nanmean(np.concatenate(errors)))
+    known = np.concatenate(errors)
+    known = known[np.isfinite(known)]
+    return float(known.mean()) if len(known) else np.nan
 
 
 def _draw(by_way: dict[str, list[Cell]]) -> plt.Figure:

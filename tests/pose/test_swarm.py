@@ -32,7 +32,17 @@ from hmc.pose.objectives.volume import volume_error
 from hmc.pose.spectral.reading import read_body
 from hmc.pose.spectral.skeleton import equally_spaced
 from hmc.pose.spectral.volume import FARTHEST_M, observe_volume
-from hmc.pose.steps.swarm.fit import PARTS, STAGES, FitSettings, fit_flat, fit_hierarchical, rest_state, torso_moves
+from hmc.pose.steps.swarm.fit import (
+    PARTS,
+    STAGES,
+    FitSettings,
+    bounds_around,
+    fit_around,
+    fit_flat,
+    fit_hierarchical,
+    rest_state,
+    torso_moves,
+)
 from hmc.pose.steps.swarm.heading import facing_evidence, heading_of, spin_towards
 from hmc.pose.steps.swarm.temporal import RestartSettings, SwarmSettings, is_upright, start_fits, swarm_step
 from hmc.pose.views.person_view import PersonView
@@ -282,6 +292,25 @@ def test_hierarchical_fit_finds_a_pose_and_beats_a_flat_one():
     assert (found.state[7:] >= MODEL.low - 1e-12).all() and (found.state[7:] <= MODEL.high + 1e-12).all()
     flat = fit_flat(np.random.default_rng(0), MODEL, observed, start, PsoSettings(50, found.evaluations // 50), 1.0)
     assert found.error_m < flat.error_m
+
+
+def test_as_printed_no_particle_knows_where_the_last_search_ended():
+    """With no iteration a swarm's best is its best first particle: the known pose, unless all lie anywhere in their ranges."""
+    curves = observe_curves(MODEL, model_curves(rest_state(MODEL, np.zeros(3), np.array([0.0, 0.0, 1.0]))))
+    known = rest_state(MODEL, np.zeros(3), np.array([0.0, 0.0, 1.0]))
+    box, swarm = bounds_around(MODEL, known, 0.05, 0.3), PsoSettings(12, 0)
+    near = fit_around(np.random.default_rng(0), MODEL, curves, known[None], box, swarm)
+    assert near.error_m < 1e-4 and np.allclose(near.state, known)
+    printed = fit_around(np.random.default_rng(0), MODEL, curves, known[None], box, swarm, anywhere=True)
+    rng = np.random.default_rng(0)
+    drawn_states = rng.uniform(*box, (12, N_PARAMETERS))
+    assert np.isclose(np.abs(drawn_states[:, 7:] - printed.state[7:]).max(1).min(), 0)
+    assert printed.error_m > 0.01
+
+
+def test_the_printed_preset_minimises_nothing_but_the_curves_error_from_anywhere():
+    swarm = SWARM_PRESETS["hsiao2008"].swarm
+    assert swarm.fit.anywhere and swarm.last_weight == swarm.spin_weight == swarm.rest_weight == swarm.facing_m == 0
 
 
 def test_headings():

@@ -33,9 +33,7 @@ NEEDS = frozenset({"hulls", "voxels"})
 
 #: The thesis's system as printed. What it does not print has our value: lengths of the body (average people's, by stature: Table 3-1
 #: names them), t1 to t3, particles and iterations of every stage, how far the temporal constraint reaches, and by how much the start of a
-#: frame must fit better to take the place of the pose that is followed ("some threshold", 3.2.2.5). Two things in `fit_near` are ours: the
-#: temporal swarm does not begin anywhere in its range but at the last pose, at that moved on, and at poses with one part moved; and it is
-#: drawn to the last pose by `Prior.weight`, 4 mm a radian of mean difference.
+#: frame must fit better to take the place of the pose that is followed ("some threshold", 3.2.2.5).
 PRINTED = SwarmPreset(
     reading=ReadingSettings(
         segmentation=printed_segmentation(),  # 3.1.4.2
@@ -46,8 +44,9 @@ PRINTED = SwarmPreset(
         named=False,
     ),
     swarm=SwarmSettings(
-        fit=FitSettings(limbs_stay=False),  # 3.2.2.4
-        spin_weight=0.0,  # of a start Eq. 3-27 is all that is minimised
+        fit=FitSettings(limbs_stay=False, anywhere=True),  # 3.2.2.4; the pseudo code of 3.2.2.2
+        spin_weight=0.0,  # Eq. 3-27 is all that is minimised
+        last_weight=0.0,
         rest_weight=0.0,
         facing_m=0.0,
         named=False,  # 3.2.2.1: the one-to-one assignment decides which curve is which part
