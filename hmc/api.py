@@ -12,7 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from hmc.errors import InputError
+from hmc.errors import InputError, whole_seed
 from hmc.io.masks import MaskStep
 from hmc.io.recording import Recording, for_voxels, open_recording
 from hmc.io.results import PoseTable, TrackTable, read_joints, read_table, read_tracks
@@ -142,7 +142,7 @@ def track(
     Raises
     ------
     InputError
-        When the voxels are too coarse, there is no such tracker, or one is given beside keypoints.
+        When the voxels are too coarse, the seed is none, there is no such tracker, or one is given beside keypoints.
 
     Examples
     --------
@@ -151,7 +151,7 @@ def track(
     >>> sorted(set(tracks.persons.tolist())), tracks.positions.shape
     ([0], (8, 3))
     """
-    recording = _opened(recording)
+    recording, seed = _opened(recording), whole_seed(seed)
     if keypoints is None:
         recording = recording if full_images else for_voxels(recording, voxel_size_m)
         return _tracked(recording, tracker or "sparse", seed, voxel_size_m)
@@ -247,7 +247,7 @@ def pose(
     Raises
     ------
     InputError
-        When there is no such method, what it needs is not there, or `smooth_s` is no such time.
+        When there is no such method, what it needs is not there, or `seed` or `smooth_s` is none.
 
     Examples
     --------
@@ -265,6 +265,7 @@ def pose(
 
     if smooth_s is not None and not 0 <= smooth_s < float("inf"):
         raise InputError(f"`smooth_s` must be a number of seconds, 0 or more; got {smooth_s}")
+    seed = whole_seed(seed)
     recording, method = _opened(recording), pose_method(method) if isinstance(method, str) else method
     method = method if smooth_s is None else as_found(method)
     height = None if height_m == "auto" else recording.known_height_m if height_m is None else height_m

@@ -2,6 +2,7 @@
 error of its own."""
 
 import errno
+import operator
 import signal
 import threading
 from collections.abc import Iterator
@@ -17,6 +18,23 @@ class InputError(ValueError):
 
     The command line prints it as one line and exits with code 2; from Python it is an ordinary ``ValueError``.
     """
+
+
+def whole_seed(seed: int) -> int:
+    """A seed as it was given.
+
+    Raises
+    ------
+    InputError
+        When it is no whole number of 0 or more: NumPy takes None too, and draws other numbers every time.
+    """
+    try:
+        value = operator.index(seed)
+    except TypeError:
+        value = -1
+    if value < 0:
+        raise InputError(f"`seed` must be a whole number, 0 or more; got {seed!r}")
+    return value
 
 
 def is_utf8(name: str) -> bool:

@@ -8,6 +8,7 @@ than people's; it is the preset `canton_body`.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from numbers import Real
 
 import numpy as np
 
@@ -201,7 +202,7 @@ def sole_ends(dimensions: Mapping[str, float]) -> tuple[float, float]:
 
 
 def _scaled(height_m: float, lengths: dict[str, float]) -> dict[str, float]:
-    if isinstance(height_m, str):
+    if not isinstance(height_m, Real):
         raise InputError(f"a height must be a number of metres; got {height_m!r}")
     if not 0.3 < height_m < 3.0:
         raise InputError(f"a height of {height_m:g} m is no person's; give the stature in metres")

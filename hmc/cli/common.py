@@ -40,6 +40,7 @@ __all__ = [
     "print_problems",
     "progress",
     "recording_source",
+    "refuse_no_folder",
     "selected_workers",
     "unlike_its_run",
     "was_finished",
@@ -233,6 +234,23 @@ def output_path(text: str) -> Path:
     if odd or not text:
         raise argparse.ArgumentTypeError(f"{text!r}: names of files and folders may not begin with - or have blanks around them")
     return path
+
+
+def refuse_no_folder(out: Path, recording) -> None:
+    """Refuse an ``--out`` in which no result can lie: a file, or where a recording's own parts are looked for.
+
+    Raises
+    ------
+    InputError
+        When it is one.
+    """
+    from hmc.errors import InputError
+    from hmc.io.own_files import refuse_own_folder
+    from hmc.io.places import places_of
+
+    if out.is_file():
+        raise InputError(f"--out {out}: is a file; give a folder")
+    refuse_own_folder(out, places_of(recording))
 
 
 def whole_number(text: str) -> int:

@@ -24,6 +24,7 @@ from hmc.cli.common import (
     positive_float,
     print_problems,
     recording_source,
+    refuse_no_folder,
     selected_workers,
     unlike_its_run,
     was_finished,
@@ -133,7 +134,7 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
         const=SMOOTH_S,
         metavar="S",
         help=f"smooth the finished poses over so many seconds (without a number: {SMOOTH_S}); 0: leave them as they were found "
-        "(default: .2 after two passes, 0 after one)",
+        "(default: .2 after two passes, 0 after one; a time of fewer than five frames smooths nothing)",
     )
     add_silhouette_options(parser)
     add_marker_options(parser)
@@ -148,7 +149,6 @@ def run(args: argparse.Namespace) -> int:
 
 def _run(args: argparse.Namespace, held: ExitStack) -> int:
     opened = open_meanwhile(args, held)  # and import meanwhile what poses need
-    from hmc.errors import InputError
     from hmc.io.files import to_toml
     from hmc.io.lock import only_run
     from hmc.io.results import write_run, write_tracks
@@ -170,8 +170,7 @@ def _run(args: argparse.Namespace, held: ExitStack) -> int:
     recording = opened()
     if not args.full_images:
         recording = for_method(recording, method, min(args.voxel, args.track_voxel))
-    if args.out.is_file():
-        raise InputError(f"--out {args.out}: is a file; give a folder")
+    refuse_no_folder(args.out, recording)
     height, hulls, frontend = _height(args.height, recording), method.needs_hulls, selected_frontend(args)
     source_of_keypoints = _keypoints(args.cues, recording, method)
     parameters: dict[str, Any] = {

@@ -24,6 +24,7 @@ from hmc.cli.common import (
     positive_float,
     print_problems,
     recording_source,
+    refuse_no_folder,
     selected_workers,
     was_finished,
     whole_number,
@@ -160,8 +161,7 @@ def _run(args: argparse.Namespace, held: ExitStack) -> int:
     plugins, recording = load_given_plugins(args), open_selected(args)
     work = _by_keypoints(args, recording) if args.cues == CUES[1] else _by_silhouettes(args, recording)
     tracks_path, run_path, journal = args.out / "tracks.csv", args.out / "run.toml", args.out / JOURNAL
-    if args.out.is_file():
-        raise InputError(f"--out {args.out}: is a file; give a folder")
+    refuse_no_folder(args.out, recording)
     if (args.out / "joints.csv").exists() or (args.out / "pose.npz").exists():
         raise InputError(f"--out {args.out}: holds poses, whose tracks must stay as they are; choose another folder")
     parameters: dict[str, Any] = {

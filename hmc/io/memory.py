@@ -15,7 +15,7 @@ from hmc.errors import InputError
 from hmc.io.footage import Footage
 from hmc.io.recording import DEFAULT_FPS, Recording, wrong_units
 from hmc.io.settings import check_settings
-from hmc.io.views import common_length
+from hmc.io.views import common_length, unlike_lengths
 
 __all__ = ["recording_of"]
 
@@ -89,6 +89,7 @@ def recording_of(
         raise InputError(f"camera '{lacking[0]}' has neither images nor silhouettes; give some, or leave it out of the rig")
     for problem in wrong_units(rig):
         raise InputError(problem)
+    lengths = {camera.name: view.n_frames for camera, view in zip(rig, both, strict=True) if view is not None}
     settings = _checked({"name": name, "fps": fps, "room": room, "persons": persons, "subject_height_m": height_m})
     return Recording(
         path=Path(name),
@@ -96,8 +97,9 @@ def recording_of(
         fps=float(settings["fps"]),
         rig=rig,
         room=estimate_room(rig) if room is None else settings["room"],
-        n_frames=common_length([view.n_frames for view in both if view is not None]),
+        n_frames=common_length(list(lengths.values())),
         start=0,
+        problems=tuple(unlike_lengths(name, lengths)),
         persons=settings.get("persons"),
         subject_height_m=settings.get("subject_height_m", ()),
         room_is_estimated=room is None,

@@ -12,7 +12,7 @@ from hmc.io.result_files import BESIDE, RESULT
 if TYPE_CHECKING:
     from hmc.io.places import RecordingPlaces
 
-__all__ = ["refuse_own_file", "refuse_result_file"]
+__all__ = ["refuse_own_file", "refuse_own_folder", "refuse_result_file"]
 
 
 def refuse_own_file(out: str | Path, places: RecordingPlaces) -> None:
@@ -32,6 +32,25 @@ def refuse_own_file(out: str | Path, places: RecordingPlaces) -> None:
     """
     if places.has(Path(out)):
         raise InputError(f"{out}: is, or would lie among, the recording's own files; choose another place")
+
+
+def refuse_own_folder(out: str | Path, places: RecordingPlaces) -> None:
+    """Refuse to write a result where parts of its recording are looked for: its files would be taken for the recording's.
+
+    Parameters
+    ----------
+    out : path
+        The result's folder.
+    places : RecordingPlaces
+        Where the parts of the recording lie.
+
+    Raises
+    ------
+    InputError
+        When it is a folder such as videos/ or pose/ of the recording, or lies in one.
+    """
+    if places.looked_through(Path(out)):
+        raise InputError(f"--out {out}: the recording's own parts are looked for there; choose another folder, as {places.path / 'result'}")
 
 
 def refuse_result_file(out: str | Path, result: str | Path) -> None:

@@ -45,6 +45,8 @@ SOURCES = (
     "times/*",
     "pose/*/*",
 )
+#: The folders of a recording in which they lie, and the truth.
+FOLDERS = (*dict.fromkeys(pattern.partition("/")[0] for pattern in SOURCES if "/" in pattern), "truth")
 
 
 @dataclass(frozen=True)
@@ -118,6 +120,11 @@ class RecordingPlaces:
         files = [*self._sources(), *self.path.glob("truth/**/*")]
         folders = {real_path(file.parent) for file in files} - {real_path(self.path)}
         return real_path(path.parent) in folders or any(path.exists() and path.samefile(file) for file in files if file.exists())
+
+    def looked_through(self, folder: Path) -> bool:
+        """Whether a folder is, or lies in, one of the recording's in which its parts are looked for, such as videos/."""
+        own, asked = Path(real_path(self.path)), Path(real_path(folder))
+        return any(asked.is_relative_to(own / name) for name in FOLDERS)
 
     def _sources(self) -> list[Path]:
         files = [file for pattern in SOURCES for file in self.path.glob(pattern)]

@@ -30,7 +30,18 @@ from hmc.io.places import AnyPlaces, RecordingPlaces, places_of, to_places
 from hmc.io.settings import read_settings
 from hmc.io.sizes import fit_size, size_cure
 from hmc.io.timing import go_by_time, rates_differ
-from hmc.io.views import all_rates, common_length, find_background, find_views, gaps, late_start, missing_views, put_in_time, shared_videos
+from hmc.io.views import (
+    all_rates,
+    common_length,
+    find_background,
+    find_views,
+    gaps,
+    late_start,
+    missing_views,
+    put_in_time,
+    shared_videos,
+    unlike_lengths,
+)
 from hmc.io.world import world_of
 
 __all__ = [
@@ -247,11 +258,8 @@ def open_recording(
         *gaps(footage),
         *late_start(path, both),
         *(note for view in (*footage, *silhouettes) if view is not None for note in view.notes),
+        *unlike_lengths(path, lengths),
     ]
-    if len(set(lengths.values())) > 1:
-        problems.append(
-            f"{path}: cameras differ in length ({', '.join(f'{name} {n}' for name, n in lengths.items())}); {total} frames are used"
-        )
     stated = settings.get("frames")
     if stated is not None and stated > total:
         problems.append(f"{path / 'recording.toml'}: says {stated} frames, but there are {total}")

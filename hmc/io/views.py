@@ -28,6 +28,7 @@ __all__ = [
     "missing_views",
     "put_in_time",
     "shared_videos",
+    "unlike_lengths",
 ]
 
 
@@ -248,6 +249,14 @@ def common_length(lengths: Sequence[int]) -> int:
     """Frames of which at least two cameras have an image; of the one, if there is one."""
     ordered = sorted(lengths, reverse=True)
     return ordered[min(1, len(ordered) - 1)] if ordered else 0
+
+
+def unlike_lengths(path: str | Path, lengths: Mapping[str, int]) -> list[str]:
+    """A sentence where cameras differ in how many frames they have, by name: which have how many, and how many are used."""
+    if len(set(lengths.values())) < 2:
+        return []
+    told = ", ".join(f"{name} {n}" for name, n in lengths.items())
+    return [f"{path}: cameras differ in length ({told}); {common_length(list(lengths.values()))} frames are used"]
 
 
 def shared_videos(path: Path, names: Sequence[str], views: Sequence[Footage | None]) -> list[str]:

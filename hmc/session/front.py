@@ -13,7 +13,7 @@ from hmc.camera.coverage import estimate_room
 from hmc.camera.model import Rig
 from hmc.camera.segmentation import train_background
 from hmc.camera.shade import floor_pixels
-from hmc.errors import InputError
+from hmc.errors import InputError, whole_seed
 from hmc.io.recording import Recording, for_voxels
 from hmc.pose.method import Capture, PoseMethod
 from hmc.pose.person import DecidedFrames, PoseTask
@@ -138,6 +138,7 @@ def session_settings(
     """
     if len(rig) < 2:
         raise InputError("one camera does not tell how far away people are; a session needs two at least, better four")
+    seed = whole_seed(seed)
     height = None if height_m == "auto" else float(height_m)
     if height is not None and not 0 < height < 3:
         raise InputError(f"`height_m` must be a stature in metres, or 'auto'; got {height_m}")

@@ -173,3 +173,20 @@ def test_poses_and_files_are_not_overwritten(folder, tmp_path, capsys):
     (tmp_path / "file").write_text("")
     assert track(folder, tmp_path / "file") == 2
     assert "is a file" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("inside", ["videos", "pose", "keypoints/cam_00", "truth"])
+def test_no_result_lies_where_parts_of_its_recording_are_looked_for(folder, capsys, inside):
+    """It was written there, and its files were a camera's the next time."""
+    before = sorted(folder.rglob("*"))
+    for command in (["track"], ["pose", "--height", "auto"]):
+        assert main([command[0], str(folder), "--out", str(folder / inside), "--quiet", *command[1:]]) == 2
+        error = capsys.readouterr().err
+        assert "parts are looked for there; choose another folder" in error and error.count("\n") == 1
+    assert sorted(folder.rglob("*")) == before
+
+
+def test_a_result_may_lie_beside_the_parts(folder):
+    from hmc.io.places import RecordingPlaces
+
+    assert not any(RecordingPlaces(folder).looked_through(folder / name) for name in ("", "result", "result/videos", "..", "videos2"))

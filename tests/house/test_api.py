@@ -68,6 +68,14 @@ def test_frames_are_counted_in_whole_numbers(part):
         hmc.open_recording(ROOT / "data" / "synthetic" / "tiny", **part)
 
 
+@pytest.mark.parametrize("seed", [None, -1, 1.5, "a"])
+def test_a_seed_is_a_whole_number(seed):
+    recording = hmc.open_recording(ROOT / "data" / "synthetic" / "tiny", frames=1)
+    for command in (hmc.track, hmc.pose, lambda one, seed: hmc.Session(one.rig, one, seed=seed)):
+        with pytest.raises(hmc.InputError, match="`seed` must be a whole number, 0 or more; got"):
+            command(recording, seed=seed)
+
+
 def test_what_is_left_out_or_a_text_is_told():
     recording = hmc.open_recording(ROOT / "data" / "synthetic" / "tiny", frames=1)
     with pytest.raises(hmc.InputError, match="a session needs a background: images of the empty scene for each of cam_00"):

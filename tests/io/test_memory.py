@@ -43,6 +43,13 @@ def tracks_by_masks(recording):
     return hmc.track(recording).positions
 
 
+def test_cameras_of_other_lengths_are_told(on_disk):
+    images, background, _ = arrays_of(on_disk)
+    recording = hmc.recording_of(on_disk.rig, [images[0][:3], *images[1:]], background)
+    assert len(recording.problems) == 1 and "cameras differ in length (cam_00 3, cam_01 6" in recording.problems[0]
+    assert not hmc.recording_of(on_disk.rig, images, background).problems
+
+
 def test_frames_may_be_missing_and_come_late(on_disk):
     images, background, _ = arrays_of(on_disk)
 
