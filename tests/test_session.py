@@ -252,10 +252,12 @@ def test_wrong_input_is_told_in_a_line():
         step(images[1:])
     with pytest.raises(hmc.InputError, match=r"one image a camera.*NoneType"):
         step(None)
-    with pytest.raises(hmc.InputError, match=f"'{first}': the image is 160 x 120 pixels, its calibration says 320 x 240"):
+    with pytest.raises(
+        hmc.InputError, match=rf"'{first}': its image must be uint8, shape \(240, 320, 3\), BGR; got uint8 of shape \(120, 160, 3\)"
+    ):
         step([images[0][::2, ::2], *images[1:]])
     for wrong in (images[0][..., 0], images[0] / 255, "frame.png"):
-        with pytest.raises(hmc.InputError, match=f"'{first}': an image is an array of uint8, shape"):
+        with pytest.raises(hmc.InputError, match=f"'{first}': its image must be uint8, shape"):
             step([wrong, *images[1:]])
     with pytest.raises(hmc.InputError, match=f"no background for camera '{first}'"):
         front.begin_session(settings(False), [[], *empty_scene()[1:]])
@@ -263,7 +265,7 @@ def test_wrong_input_is_told_in_a_line():
         front.begin_session(settings(False), dict(zip(clip.rig.names[1:], empty_scene()[1:], strict=True)))
     with pytest.raises(hmc.InputError, match="background is of 2 cameras, the rig has 7"):
         front.begin_session(settings(False), empty_scene()[:2])
-    with pytest.raises(hmc.InputError, match="an image of the background is an array of uint8"):
+    with pytest.raises(hmc.InputError, match="an image of its background must be uint8, shape"):
         front.begin_session(settings(False), [images[0], *empty_scene()[1:]])
     with pytest.raises(hmc.InputError, match="needs more than images"):
         front.session_settings(clip.rig, method="marker-apf")

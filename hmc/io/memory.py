@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from hmc.camera.coverage import estimate_room
+from hmc.camera.images import camera_image, is_image, wrong_image
 from hmc.camera.model import Camera, Rig
 from hmc.errors import InputError
 from hmc.io.footage import Footage
@@ -22,6 +23,8 @@ __all__ = ["recording_of"]
 #: Of one camera, frame by frame: an array (n, h, w, 3), a list of images, a memory map, or whatever tells its length and gives an item;
 #: None stands for an image that is not there.
 Images = Sequence[np.ndarray | None] | np.ndarray
+#: What images are called, where they are no pictures.
+SILHOUETTES = "silhouettes"
 
 
 def recording_of(
@@ -82,7 +85,7 @@ def recording_of(
     """
     rig = rig if isinstance(rig, Rig) else Rig(tuple(rig))
     footage = _views(rig, images, "images")
-    masks = _views(rig, silhouettes, "silhouettes")
+    masks = _views(rig, silhouettes, SILHOUETTES)
     both = [one or other for one, other in zip(footage, masks, strict=True)]
     lacking = [camera.name for camera, view in zip(rig, both, strict=True) if view is None]
     if lacking:
@@ -160,8 +163,8 @@ class _Checked(Sequence[np.ndarray | None]):
 
     def __getitem__(self, frame: Any) -> Any:
         image = self.images[frame]
-        if image is not None and not _is_image(image, self.what):
-            raise InputError(f"camera '{self.camera.name}': frame {frame} of its {self.what} {_unlike(image, self.camera, self.what)}")
+        if image is not None and not is_image(image, self.what == SILHOUETTES):
+            raise wrong_image(self.camera, image, f"frame {frame} of its {self.what}", self.what == SILHOUETTES)
         return image
 
 
@@ -170,24 +173,6 @@ def _view(camera: Camera, images: Images, what: str) -> Footage:
     first = next((image for image in found if image is not None), None)
     if first is None:
         raise InputError(f"camera '{camera.name}': all of its {what} are None; leave it out of the rig")
-    if not _is_image(first, what) or first.shape[1::-1] != camera.size:
-        raise InputError(f"camera '{camera.name}': its {what} {_unlike(first, camera, what)}")
+    camera_image(camera, first, f"its {what}", what == SILHOUETTES)
     footage = Footage(Path(camera.name), len(images), camera.size)
     return replace(footage, arrays=_Checked(images, camera, what))
-
-
-def _is_image(image: Any, what: str) -> bool:
-    """Whether it may be one, of whatever size."""
-    if not isinstance(image, np.ndarray):
-        return False
-    if what == "silhouettes":
-        return image.ndim == 2 and image.dtype in (np.bool_, np.uint8)
-    return image.ndim == 3 and image.shape[2] == 3 and image.dtype == np.uint8
-
-
-def _unlike(image: Any, camera: Camera, what: str) -> str:
-    """What a camera's images must be, and what this one is."""
-    shape, flat = camera.size[::-1], what == "silhouettes"
-    wanted = f"bool or uint8, shape {shape}" if flat else f"uint8, shape {(*shape, 3)}, BGR"
-    got = f"{image.dtype} of shape {image.shape}" if isinstance(image, np.ndarray) else type(image).__name__
-    return f"must be {wanted}; got {got}"

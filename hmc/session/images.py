@@ -7,6 +7,7 @@ from itertools import islice
 
 import numpy as np
 
+from hmc.camera.images import camera_image
 from hmc.camera.model import Camera, Rig
 from hmc.camera.reduction import reduce_image
 from hmc.errors import InputError
@@ -24,7 +25,7 @@ def frame_images(rig: Rig, images: Images, factors: Sequence[int]) -> tuple[np.n
         given = len(images) if isinstance(images, Sequence | np.ndarray) else type(images).__name__
         raise InputError(f"a frame has one image a camera, {len(rig)} of them, None where there is none; got {given}")
     return tuple(
-        None if image is None else _smaller(_image(camera, image), factor)
+        None if image is None else _smaller(camera_image(camera, image, "its image"), factor)
         for camera, image, factor in zip(rig, images, factors, strict=True)
     )
 
@@ -33,24 +34,11 @@ def _smaller(image: np.ndarray, factor: int) -> np.ndarray:
     return image.copy() if factor == 1 else reduce_image(image, factor)
 
 
-def _image(camera: Camera, image: np.ndarray, what: str = "image") -> np.ndarray:
-    """An image that may be one of a camera."""
-    if not isinstance(image, np.ndarray) or image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3:
-        got = f"{image.dtype} of shape {image.shape}" if isinstance(image, np.ndarray) else type(image).__name__
-        raise InputError(f"camera '{camera.name}': an {what} is an array of uint8, shape (height, width, 3), BGR; got {got}")
-    if image.shape[1::-1] != camera.size:
-        width, height = camera.size
-        raise InputError(
-            f"camera '{camera.name}': the {what} is {image.shape[1]} x {image.shape[0]} pixels, its calibration says {width} x {height}"
-        )
-    return image
-
-
 def background_images(camera: Camera, images: Iterable[np.ndarray], most: int, factor: int) -> Iterator[np.ndarray]:
     """Images of a camera's empty scene, one at least, so many times smaller."""
     empty = True
     for image in islice(images, most):
         empty = False
-        yield reduce_image(_image(camera, image, "image of the background"), factor)
+        yield reduce_image(camera_image(camera, image, "an image of its background"), factor)
     if empty:
         raise InputError(f"no background for camera '{camera.name}'; give images of the empty scene")
