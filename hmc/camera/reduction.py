@@ -15,11 +15,13 @@ from hmc.camera.model import Camera, Rig
 
 __all__ = ["reduce_image", "reduce_mask", "reduce_pixels", "reduced_camera", "reduction_factors"]
 
-#: The side of a voxel in the middle of the room covers so many pixels at least of a smaller image; one and a half at the far wall then.
-LEAST_VOXEL_PX = 3.0
-#: The longer side of a smaller image, pixels. For images of this size silhouettes were made, and smaller ones save little more
-#: (benchmarks/README.md).
-LEAST_SIDE_PX = 640
+#: The side of a voxel in the middle of the room covers so many pixels at least of a smaller image. Of 1.95 to 2.9 poses lost nothing, of
+#: 1.65 a millimetre or two (benchmarks/README.md).
+LEAST_VOXEL_PX = 1.9
+#: Of coarser voxels than this the images are no smaller, metres: what silhouettes lack moves the middle of a hull, however coarse it is.
+COARSEST_M = 0.03
+#: The longer side of a smaller image, pixels: a person of a third of it is still 40 pixels wide.
+LEAST_SIDE_PX = 320
 
 
 def reduction_factors(rig: Rig, room: np.ndarray, voxel_size_m: float) -> tuple[int, ...]:
@@ -36,11 +38,11 @@ def reduction_factors(rig: Rig, room: np.ndarray, voxel_size_m: float) -> tuple[
     -------
     tuple of int, one a camera
     """
-    factors = []
+    factors, side = [], min(voxel_size_m, COARSEST_M)
     for camera in rig:
         distance = float(np.linalg.norm(camera.centre - np.mean(room, axis=0)))
         focal = float(np.sqrt(camera.matrix[0, 0] * camera.matrix[1, 1]))
-        voxel_px = voxel_size_m * focal / max(distance, voxel_size_m)
+        voxel_px = side * focal / max(distance, side)
         factors.append(max(1, min(int(voxel_px / LEAST_VOXEL_PX), max(camera.size) // LEAST_SIDE_PX)))
     return tuple(factors)
 
