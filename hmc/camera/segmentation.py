@@ -25,7 +25,7 @@ from hmc.camera.noise import blur_for, blurred, is_grey, noise_floor
 from hmc.camera.segmentation_settings import SegmentationSettings
 from hmc.camera.shade import shade_features, told_by_chance
 from hmc.camera.silhouettes import GapRules, cut_halo, evidence, fill_gaps, filled_for_darkness, in_planes, without_specks
-from hmc.camera.zoom import enlarged, enlarged_mask, reduced_mask
+from hmc.camera.zoom import enlarged, enlarged_mask, reduced, reduced_mask
 from hmc.errors import InputError
 
 __all__ = [
@@ -59,6 +59,8 @@ MOST_SHADOW = 0.2
 SOLID_PX, LEAST_SOLID_PX = 4, 2
 #: Silhouettes are completed in images about this wide at least: smaller ones are enlarged, for there limbs are as thin as specks.
 COMPLETION_PX = 640
+#: Of images enlarged more than so many times the network knows nothing.
+MOST_ZOOM = 2
 #: What was found holds a piece of a person where this many standard deviations of the evidence say so too.
 SURE = 6.0
 #: How far around those squares the image is looked at, pixels of a 640 x 480 image.
@@ -114,6 +116,8 @@ class BackgroundModel:
         Which pixels look at the floor of the room, where that is known (`hmc.camera.shade.floor_pixels`).
     coarse : ndarray of uint8, shape (height / n, width / n, 3)
         The mean as a small image, BGR (`hmc.camera.mixture.coarse`).
+    large : tuple of ndarray of float32, shapes (zoom * height, zoom * width, 3) and (zoom * height, zoom * width, 2)
+        Mean and deviation as silhouettes are completed in them: enlarged, if images are small (`hmc.camera.zoom`).
     changes : int
         How often the mean has changed.
     """
@@ -123,6 +127,7 @@ class BackgroundModel:
     deviation: np.ndarray
     people: np.ndarray
     coarse: np.ndarray
+    large: tuple[np.ndarray, np.ndarray]
     frame: int = 0
     settling: int = 0
     before: np.ndarray | None = None
@@ -205,7 +210,8 @@ def train_background(
     people = np.zeros(mean.shape[:2], bool)
     empty = as_image(mean)
     planes = in_planes(mean), in_planes(deviation)
-    return BackgroundModel(mixture, *planes, people, coarse(empty), unseen=unseen, blur=blur, grey=is_grey(empty), floor=floor)
+    large = (_enlarged(planes[0]), _enlarged(planes[1]))
+    return BackgroundModel(mixture, *planes, people, coarse(empty), large, unseen=unseen, blur=blur, grey=is_grey(empty), floor=floor)
 
 
 def shades_of(model: BackgroundModel, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -338,9 +344,9 @@ def _complete(
     Only the part of the image around what was found is looked at.
     """
     scale = max(image.shape[:2]) / 640
-    zoom = max(1, round(COMPLETION_PX / max(image.shape[:2])))
-    # The network has learnt from sharp images in color of 640 x 480.
-    guesses = settings.least_chance > 0 and zoom == 1 and not model.blur and not model.grey
+    zoom = _zoom(image.shape)
+    # The network has learnt from sharp images in color of 640 x 480; images of half of that, enlarged, are sharp enough.
+    guesses = settings.least_chance > 0 and zoom <= MOST_ZOOM and not model.blur and not model.grey
     mask = np.zeros_like(found)
     filled, chance = (None, np.zeros_like(found)) if guesses else (np.zeros(found.shape, bool), None)
     # Specks are all over the image; a person has some solid part.
@@ -349,11 +355,12 @@ def _complete(
     if width == 0:
         return mask, filled, chance, np.zeros_like(found)
     margin = round(MARGIN_PX * scale)
-    rows = slice(max(0, top - margin), top + height + margin)
-    columns = slice(max(0, left - margin), left + width + margin)
+    rows = slice(max(0, top - margin), min(top + height + margin, found.shape[0]))
+    columns = slice(max(0, left - margin), min(left + width + margin, found.shape[1]))
     seeds = cv2.morphologyEx(enlarged_mask(found[rows, columns], zoom), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
-    mean = enlarged(model.mean[rows, columns], zoom)
-    seen = evidence(enlarged(image[rows, columns], zoom), mean, enlarged(model.deviation[rows, columns], zoom))
+    image = enlarged(image[rows, columns], zoom)
+    mean, deviation = (one[zoom * rows.start : zoom * rows.stop, zoom * columns.start : zoom * columns.stop] for one in model.large)
+    seen = evidence(image, mean, deviation)
     rules = GapRules(
         threshold=settings.gap_threshold,
         reach_threshold=settings.reach_threshold,
@@ -362,17 +369,30 @@ def _complete(
         least=settings.least_blob_px,
         sure=SURE,
     )
-    part = cut_halo(fill_gaps(seeds, seen, rules, scale * zoom), seen, settings.halo_share, scale * zoom)
+    scale *= zoom
+    part = cut_halo(fill_gaps(seeds, seen, rules, scale), seen, settings.halo_share, scale)
     if chance is not None:
-        floor = None if model.floor is None else model.floor[rows, columns]
-        shades = shade_features(image[rows, columns], mean, model.deviation[rows, columns], seen, seeds, scale, floor)
-        part, chance[rows, columns] = told_by_chance(part, *shades, settings.least_chance)
+        floor = None if model.floor is None else enlarged_mask(model.floor[rows, columns].view(np.uint8), zoom)
+        shades = shade_features(image, mean, deviation, seen, seeds, scale, floor)
+        part, guess = told_by_chance(part, *shades, settings.least_chance)
         part = cut_halo(without_specks(part, seeds, seen, rules, scale), seen, settings.halo_share, scale)
+        chance[rows, columns] = reduced(guess, zoom)
     elif filled is not None:
         filled[rows, columns] = reduced_mask(filled_for_darkness(part, seeds, seen, rules), zoom)
     mask[rows, columns] = reduced_mask(part, zoom)
     doubtful[rows, columns] |= reduced_mask(((seen.chroma2 > DOUBT**2) | (np.abs(seen.luma) > DOUBT)).view(np.uint8), zoom)
     return mask, filled, chance, cv2.morphologyEx(doubtful, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+
+
+def _zoom(shape: tuple[int, ...]) -> int:
+    """How many times images of a shape are enlarged before silhouettes are completed."""
+    return max(1, round(COMPLETION_PX / max(shape[:2])))
+
+
+def _enlarged(values: np.ndarray) -> np.ndarray:
+    """A map of the empty scene as silhouettes are completed in it; the very map where images are large enough."""
+    zoom = _zoom(values.shape)
+    return values if zoom == 1 else in_planes(enlarged(values, zoom))
 
 
 def _hidden(mask: np.ndarray, answer: np.ndarray, settings: SegmentationSettings) -> np.ndarray:
@@ -428,4 +448,5 @@ def _adapt_to_switch(model: BackgroundModel, image: np.ndarray, settings: Segmen
 
 def _with_new_mean(model: BackgroundModel) -> BackgroundModel:
     """The model after its mean has changed."""
-    return replace(model, coarse=coarse(as_image(model.mean)), changes=model.changes + 1)
+    large = (_enlarged(model.mean), model.large[1])
+    return replace(model, coarse=coarse(as_image(model.mean)), large=large, changes=model.changes + 1)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-__all__ = ["enlarged", "enlarged_mask", "reduced_mask"]
+__all__ = ["enlarged", "enlarged_mask", "reduced", "reduced_mask"]
 
 
 def enlarged(array: np.ndarray, zoom: int) -> np.ndarray:
@@ -24,3 +24,8 @@ def enlarged_mask(mask: np.ndarray, zoom: int) -> np.ndarray:
 def reduced_mask(mask: np.ndarray, zoom: int) -> np.ndarray:
     """The mask as it was before it was enlarged: 1 where half of a pixel is."""
     return mask if zoom == 1 else cv2.resize(mask * 255, None, fx=1 / zoom, fy=1 / zoom, interpolation=cv2.INTER_AREA) // 128
+
+
+def reduced(array: np.ndarray, zoom: int) -> np.ndarray:
+    """A map as it was before it was enlarged: means of squares."""
+    return array if zoom == 1 else cv2.resize(array, None, fx=1 / zoom, fy=1 / zoom, interpolation=cv2.INTER_AREA)
