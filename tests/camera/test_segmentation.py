@@ -85,14 +85,14 @@ def test_a_person_is_found_and_the_shadow_is_not():
 
 
 def test_a_pale_band_is_filled_in_that_the_mixture_takes_for_shadow():
-    """Stripes of two thirds of the wall's color pass for a shadow of it; between dark stripes they are clothes."""
-    scene = Scene(1, noise=1.0)
-    model = trained(scene)
+    """Stripes of two thirds of the wall's color pass for a shadow of it; by rules, between dark stripes they are clothes."""
+    scene, rules = Scene(1, noise=1.0), SegmentationSettings(least_chance=0)
+    model = trained(scene, settings=rules)
     image, truth = scene.person()
     for top in (90, 105, 120):
         image[top : top + 7, 142:178] = scene.wall[top : top + 7, 142:178] * 0.66
     raw = model.mixture.apply(image, learningRate=0) == 255
-    mask, _ = segment(model, image)
+    mask, _ = segment(model, image, rules)
     assert np.mean(raw[truth]) < 0.88
     assert np.mean(mask[truth]) > 0.97
     assert np.mean(mask & ~truth) < 0.01
@@ -100,20 +100,34 @@ def test_a_pale_band_is_filled_in_that_the_mixture_takes_for_shadow():
 
 def test_what_was_filled_for_its_darkness_alone_is_told():
     """Stripes as above, and dark ones beside them, of which the mixture is sure."""
-    scene = Scene(1, noise=1.0)
-    model = trained(scene)
+    scene, rules = Scene(1, noise=1.0), SegmentationSettings(least_chance=0)
+    model = trained(scene, settings=rules)
     image, _ = scene.person()
     for top in (90, 105, 120):
         image[top : top + 7, 142:178] = scene.wall[top : top + 7, 142:178] * 0.66
-    mask, model = segment(model, image)
+    mask, model = segment(model, image, rules)
     assert model.chance is None and model.filled is not None and not (model.filled & ~mask).any()
     assert np.mean(model.filled[91:96, 145:175]) > 0.95  # but for a rim that the evidence mixes with what is beside it
     assert not model.filled[100:103, 145:175].any() and not model.filled[150:185].any()
-    assert not segment(model, scene.empty())[1].filled.any()
+    assert not segment(model, scene.empty(), rules)[1].filled.any()
+
+
+def test_the_network_guesses_in_images_of_half_the_size_as_in_whole_ones():
+    """They are enlarged for it, and what it says is made smaller again; of a quarter it knows nothing."""
+    scene = Scene(1, noise=1.0)
+    empty, image = [scene.empty() for _ in range(10)], scene.person()[0]
+    image[91:96, 142:178] = scene.wall[91:96, 142:178] * 0.66
+    small = segment(train_background(empty), image)[1]
+    whole = segment(train_background([cv2.resize(one, (640, 480)) for one in empty]), cv2.resize(image, (640, 480)))[1]
+    assert small.filled is None and small.chance.shape == image.shape[:2] and small.chance[92:95, 145:175].all()
+    there = cv2.resize(whole.chance, (320, 240), interpolation=cv2.INTER_AREA)[92:95, 145:175].astype(float)
+    assert np.abs(small.chance[92:95, 145:175] - there).mean() < 40
+    tiny = segment(train_background([cv2.resize(one, (160, 120)) for one in empty]), cv2.resize(image, (160, 120)))[1]
+    assert tiny.chance is None and tiny.filled is not None
 
 
 def test_where_the_network_guesses_it_says_so_and_nothing_is_filled_by_rules():
-    """In images of the size that it has learnt from; where it is not asked, what is filled is told as in small ones."""
+    """Where it is not asked, what is filled is told."""
     scene = Scene(1, noise=1.0)
     empty = [cv2.resize(scene.empty(), (640, 480)) for _ in range(10)]
     image = scene.person()[0]
