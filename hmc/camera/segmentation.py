@@ -21,11 +21,11 @@ import numpy as np
 from hmc.camera.image_signs import is_dark
 from hmc.camera.light import FEW, as_image, brought_back, gains_of, is_same_light, light_gains, luma_chroma
 from hmc.camera.mixture import SHADOW, ask_mixture, coarse
-from hmc.camera.noise import blur_for, blurred, is_grey, noise_floor
+from hmc.camera.noise import blur_for, blurred, is_grey, left_of_noise, noise_floor
 from hmc.camera.segmentation_settings import SegmentationSettings
 from hmc.camera.shade import shade_features, told_by_chance
 from hmc.camera.silhouettes import GapRules, cut_halo, evidence, fill_gaps, filled_for_darkness, in_planes, without_specks
-from hmc.camera.zoom import enlarged, enlarged_mask, reduced, reduced_mask
+from hmc.camera.zoom import enlarged, enlarged_mask, largest_in, reduced_mask
 from hmc.errors import InputError
 
 __all__ = [
@@ -147,6 +147,7 @@ def train_background(
     settings: SegmentationSettings | None = None,
     unseen: np.ndarray | None = None,
     floor: np.ndarray | None = None,
+    factor: int = 1,
 ) -> BackgroundModel:
     """Learn the empty scene.
 
@@ -159,6 +160,8 @@ def train_background(
         Where a person stood in all frames.
     floor : ndarray of bool, shape (height, width), optional
         Which pixels look at the floor (`hmc.camera.shade.floor_pixels`).
+    factor : int
+        How many times smaller the images are than the camera's (`hmc.camera.reduction`): they have less noise for it.
 
     Returns
     -------
@@ -201,8 +204,9 @@ def train_background(
         variance = cv2.blur((squares / (count - 1)).astype(np.float32), (9, 9))
         variance = np.stack([variance[..., 0], variance[..., 1:].mean(axis=2)], axis=-1)
         deviation = np.sqrt(variance)
-        noise = noise_floor(deviation)
-        deviation = np.maximum(np.maximum(deviation, noise.deviation), np.array(LEAST_DEVIATION, np.float32))
+        noise = noise_floor(deviation, factor)
+        least = np.array(LEAST_DEVIATION, np.float32) * left_of_noise(factor)
+        deviation = np.maximum(np.maximum(deviation, noise.deviation), least)
         mixture.setVarMin(noise.variance)
         mixture.setVarMax(max(MOST_VARIANCE, VARIANCE_RANGE * noise.variance))
         mixture.apply(as_image(mean), learningRate=0)  # raises the variances that are smaller, and changes nothing else
@@ -376,7 +380,7 @@ def _complete(
         shades = shade_features(image, mean, deviation, seen, seeds, scale, floor)
         part, guess = told_by_chance(part, *shades, settings.least_chance)
         part = cut_halo(without_specks(part, seeds, seen, rules, scale), seen, settings.halo_share, scale)
-        chance[rows, columns] = reduced(guess, zoom)
+        chance[rows, columns] = largest_in(guess, zoom)
     elif filled is not None:
         filled[rows, columns] = reduced_mask(filled_for_darkness(part, seeds, seen, rules), zoom)
     mask[rows, columns] = reduced_mask(part, zoom)

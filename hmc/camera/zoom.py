@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-__all__ = ["enlarged", "enlarged_mask", "reduced", "reduced_mask"]
+__all__ = ["enlarged", "enlarged_mask", "largest_in", "reduced_mask"]
 
 
 def enlarged(array: np.ndarray, zoom: int) -> np.ndarray:
@@ -26,6 +26,9 @@ def reduced_mask(mask: np.ndarray, zoom: int) -> np.ndarray:
     return mask if zoom == 1 else cv2.resize(mask * 255, None, fx=1 / zoom, fy=1 / zoom, interpolation=cv2.INTER_AREA) // 128
 
 
-def reduced(array: np.ndarray, zoom: int) -> np.ndarray:
-    """A map as it was before it was enlarged: means of squares."""
-    return array if zoom == 1 else cv2.resize(array, None, fx=1 / zoom, fy=1 / zoom, interpolation=cv2.INTER_AREA)
+def largest_in(array: np.ndarray, zoom: int) -> np.ndarray:
+    """A map as large as before it was enlarged: the largest value in each square."""
+    if zoom == 1:
+        return array
+    height, width = (side // zoom for side in array.shape)
+    return np.asarray(array.reshape(height, zoom, width, zoom).max(axis=(1, 3)))

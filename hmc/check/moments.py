@@ -64,7 +64,7 @@ def learn_background(recording: Recording, index: int, frames: Sequence[Frame]) 
     """The empty scene of one camera: of its own frames, or else the median of some of the recording's, if there are three or more."""
     if recording.n_background_frames[index]:
         floor = floor_pixels(recording.rig.cameras[index], recording.room)
-        return train_background(background_frames(recording, index, LEARNT_FRAMES), floor=floor)
+        return train_background(background_frames(recording, index, LEARNT_FRAMES), floor=floor, factor=recording.factors[index])
     images = [image for frame in frames if (image := frame.images[index]) is not None]
     if len(images) < 3:
         return None

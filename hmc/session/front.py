@@ -188,5 +188,6 @@ def begin_session(settings: SessionSettings, background: Background) -> SessionS
     models = []
     for camera, images, factor in zip(rig, background, settings.scene.factors, strict=True):
         seen = background_images(camera, images, settings.frontend.background_frames, factor)
-        models.append(train_background(seen, settings.frontend.segmentation, floor=floor_pixels(camera, settings.scene.room)))
+        floor = floor_pixels(camera, settings.scene.room)
+        models.append(train_background(seen, settings.frontend.segmentation, floor=floor, factor=factor))
     return SessionState(tuple(models), init(settings.scene.fps, settings.scene.persons))

@@ -121,7 +121,8 @@ def learn_from_people(
     for i, c in enumerate(cameras):
         # Each image is let go once it is learnt from: large ones and the growing models would not fit side by side.
         images = (replace_people(image, scenes[i].image) for image in _take(samples, i) if image is not None)
-        models[c] = train_background(images, settings, scenes[i].unseen, floor_pixels(recording.rig.cameras[c], recording.room))
+        floor = floor_pixels(recording.rig.cameras[c], recording.room)
+        models[c] = train_background(images, settings, scenes[i].unseen, floor, recording.factors[c])
     unseen = tuple(scene.unseen for scene in scenes)
     small_unseen = tuple(_resize(mask, camera.size) for mask, camera in zip(unseen, rig, strict=True))
     asked = tuple(_asked(mask, camera.size) for mask, camera in zip(unseen, rig, strict=True))

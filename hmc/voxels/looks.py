@@ -213,7 +213,7 @@ def _look(
     for c in sorted(background):
         empty = background_frames(recording, c, settings.background_frames)
         floor = floor_pixels(recording.rig.cameras[c], recording.room)
-        known[c] = train_background(empty, segmentation, floor=floor)
+        known[c] = train_background(empty, segmentation, floor=floor, factor=recording.factors[c])
     with ExitStack() as stack:
         frames: Iterable = iterate_frames(recording, first, last, lines.append)
         if pool is not None:
