@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from test_segmentation import SIZE, Scene, overlap
 
-from hmc.camera.noise import blur_for, blurred, is_grey, noise_floor
+from hmc.camera.noise import blur_for, blurred, is_grey, left_of_noise, noise_floor
+from hmc.camera.reduction import reduce_image
 from hmc.camera.segmentation import segment, train_background
 
 
@@ -49,6 +50,32 @@ def test_the_floor_is_that_of_the_camera():
     assert rare.variance == pytest.approx(3 * 25 + 5.7 * 4, rel=1e-5)
     np.testing.assert_allclose(rare.deviation, [4.0, 1.6], rtol=1e-5)
     assert noise_floor(np.zeros((8, 8, 2), np.float32)).variance > even.variance
+
+
+def test_averaging_hides_no_noise_that_was_recorded():
+    """Images of a sensor's noise made smaller keep the mixture's floor; as recorded, so little noise would be a codec's doing."""
+    recorded = np.full((80, 80, 2), (2.0, 0.6), np.float32)
+    averaged = (recorded * left_of_noise(2)).astype(np.float32)
+    assert noise_floor(averaged, 2).variance == pytest.approx(noise_floor(recorded).variance)
+    assert noise_floor(averaged).variance > 2 * noise_floor(recorded).variance
+    assert left_of_noise(1) == 1 and left_of_noise(2) == pytest.approx(2**-0.5) and left_of_noise(3) == left_of_noise(6)
+
+
+def test_an_averaged_camera_is_as_sensitive_as_it_was():
+    """A person of little contrast before a noisy wall, as recorded and of half the size: both have a silhouette."""
+    rng = np.random.default_rng(3)
+
+    def taken(person):
+        image = np.full((480, 640, 3), 120.0)
+        image[160:320, 280:360] += 9 * person
+        return np.clip(image + rng.normal(0, 2, image.shape), 0, 255).astype(np.uint8)
+
+    for factor in (1, 2):
+        model = train_background([reduce_image(taken(False), factor) for _ in range(30)], factor=factor)
+        mask, _ = segment(model, reduce_image(taken(True), factor))
+        truth = np.zeros(mask.shape, bool)
+        truth[160 // factor : 320 // factor, 280 // factor : 360 // factor] = True
+        assert (mask & truth).sum() / (mask | truth).sum() > 0.9
 
 
 def test_grey_is_told_from_color():
