@@ -65,7 +65,8 @@ def test_large_images_are_made_smaller_unless_they_are_asked_for(folder, tmp_pat
     assert track(folder, tmp_path / "1", "--full-images") == 0
     assert "starting anew" in capsys.readouterr().out
     assert "image_factors" not in read_run(tmp_path / "1" / "run.toml")["parameters"]
-    assert 0 < np.abs(smaller - places()).max() < 0.07
+    apart = np.abs(smaller - places()).max(axis=1)
+    assert 0 < np.median(apart) < 0.04 and apart.max() < 0.15  # at the end the hull joins the two
 
 
 @pytest.mark.skipif(not may_fork(), reason="there is one process only")

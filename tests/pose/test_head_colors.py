@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from methods import HEIGHT_M, VOXEL_M, followed, tiny_clip, true_tracks
+from methods import BY_RULES, HEIGHT_M, VOXEL_M, followed, tiny_clip, true_tracks
 from standing import BODY, RIG, SIDES, SKIN, STATE
 
 from hmc.body.exchange import swapped_pose
@@ -117,8 +117,8 @@ def test_only_the_height_of_the_face_counts_and_another_before_it_hides_it():
 
 @pytest.mark.parametrize("colored", [True, False])
 def test_in_a_moment_of_a_recording_the_face_tells_who_is_the_wrong_way_round(colored, tmp_path, monkeypatch):
-    """Three frames, too few for shapes to turn anybody about; grey images leave it so."""
-    run = RunOptions(masks=tmp_path / "masks", key="clip")
+    """Three frames of silhouettes by rules, of which shapes turn nobody about; grey images leave it so."""
+    run = RunOptions(BY_RULES, masks=tmp_path / "masks", key="clip")
     people = followed(("apf", "default"), 3, run)
     (body,) = make_bodies(people.states.bodies).values()
     states = np.array([swapped_pose(body, state, "all") for state in people.states.states])

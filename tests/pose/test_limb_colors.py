@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from methods import HEIGHT_M, VOXEL_M, followed, tiny_clip, true_joints, true_tracks
+from methods import BY_RULES, HEIGHT_M, VOXEL_M, followed, tiny_clip, true_joints, true_tracks
 
 from hmc.body.kinematics import landmarks
 from hmc.body.limbs import LIMBS
@@ -29,7 +29,7 @@ ARM = [LANDMARKS.index(name) for name in ("l_elbow", "l_wrist")]
 
 @pytest.fixture(scope="module")
 def one_pass(tmp_path_factory):
-    run = RunOptions(masks=tmp_path_factory.mktemp("kept") / "masks", key="clip")
+    run = RunOptions(BY_RULES, masks=tmp_path_factory.mktemp("kept") / "masks", key="clip")
     return followed(("apf", "default"), FRAMES, run), run
 
 
