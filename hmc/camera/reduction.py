@@ -20,7 +20,8 @@ __all__ = ["reduce_image", "reduce_mask", "reduce_pixels", "reduced_camera", "re
 LEAST_VOXEL_PX = 1.9
 #: Of coarser voxels than this the images are no smaller, metres: what silhouettes lack moves the middle of a hull, however coarse it is.
 COARSEST_M = 0.03
-#: The longer side of a smaller image, pixels: a person of a third of it is still 40 pixels wide.
+#: The longer side of a smaller image, pixels: silhouettes of smaller ones are completed without the network that tells shades
+#: (`hmc.camera.segmentation.MOST_ZOOM`).
 LEAST_SIDE_PX = 320
 
 

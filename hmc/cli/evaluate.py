@@ -74,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
     for score in scores:
         if score.rows:
             write_rows(args.directory / score.file, score.rows)
-    report = {score.name: score.summary for score in scores} | {"notes": notes}
+    report = {score.name: score.summary for score in scores if score.summary} | {"notes": notes}
     counted = {"truth": str(args.truth or args.recording), "start": compared.start, "frames": compared.n_frames}
     write_toml(args.directory / "metrics.toml", counted | report)
     return 0

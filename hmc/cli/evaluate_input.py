@@ -105,7 +105,7 @@ def read_compared(
         true_poses=None if true_joints is None else chosen_truth(read_joints(true_joints), true_joints, first, number),
         tracks=chosen_frames(read_tracks(tracks), first, number) if tracks.exists() else None,
         true_tracks=None if true_centroids is None else chosen_truth(read_tracks(true_centroids), true_centroids, first, number),
-        truth=true_centroids,
+        truth=true_centroids or true_joints,
         feet=chosen_frames(read_joints(feet, FOOT_POINTS), first, number) if has_feet else None,
         true_feet=read_joints(true_feet, FOOT_POINTS) if has_feet and true_feet is not None else None,
         marked=marked,

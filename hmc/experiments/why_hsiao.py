@@ -33,6 +33,7 @@ from hmc.pose.steps.refine import RefineSettings
 from hmc.pose.steps.swarm.step import Read, SwarmPreset
 from hmc.pose.steps.swarm.temporal import SwarmSettings
 from hmc.pose.views.person_view import PersonView
+from hmc.search.swarm import PsoSettings
 from hmc.synthetic.actor import PARTS
 from hmc.synthetic.truth import true_parts
 
@@ -70,7 +71,7 @@ CHANGES: dict[str, Callable[[str], PoseMethod]] = {
     AS_PRINTED: _plain(_PRINTED),
     "our segmentation": _plain(_with(reading={"segmentation": ReadingSettings().segmentation})),
     "four times the particles": _plain(_with(fit={"stages": _FOUR_TIMES}, swarm={"particles": 4 * _PRINTED.swarm.particles})),
-    "begun at the last pose and drawn to it": _plain(_with({"anywhere": False}, swarm={"last_weight": SwarmSettings().last_weight})),
+    "begun at the last pose and drawn to it": _plain(_with({"swarm": PsoSettings()}, swarm={"last_weight": SwarmSettings().last_weight})),
     "anatomical ranges": _plain(_with(thesis=False)),
     "true parts": _true(_PRINTED),
     "true parts, curves named": _true(_with(swarm={"named": True})),

@@ -32,6 +32,8 @@ class PsoSettings:
         Number of swarms.
     fastest : float
         Largest velocity as a share of the range.
+    anywhere : bool
+        Whether all particles begin anywhere in the box, as in the thesis's pseudo code; else the first at places that are known.
     stop_spread : float
         The run ends when no best place is farther from the best of all than this share of the range; 0: never.
     """
@@ -44,6 +46,7 @@ class PsoSettings:
     topology: Literal["global", "ring", "swarms"] = "global"
     swarms: int = 3
     fastest: float = 0.5
+    anywhere: bool = False
     stop_spread: float = 0.0
 
 
@@ -90,10 +93,10 @@ def pso_init(
     low, high : ndarray, shape (d,)
     settings : PsoSettings
     starts : ndarray, shape (k, d), optional
-        Places that the first particles take.
+        Places that the first particles take, unless all begin anywhere.
     """
     positions = rng.uniform(low, high, (settings.particles, len(low)))
-    if starts is not None:
+    if starts is not None and not settings.anywhere:
         k = min(len(starts), len(positions))
         positions[:k] = np.clip(starts[:k], low, high)
     return PsoState(positions, np.zeros_like(positions), positions, cost(positions), len(positions))

@@ -49,7 +49,8 @@ def test_tracks_are_the_same_bytes_whatever_the_number_of_processes(folder, tmp_
         assert (tmp_path / workers / "tracks.csv").read_bytes() == (tmp_path / "1" / "tracks.csv").read_bytes()
 
 
-def test_large_images_are_made_smaller_unless_they_are_asked_for(folder, tmp_path, capsys, halved_images):
+def test_large_images_are_made_smaller_unless_they_are_asked_for(folder, tmp_path, capsys, halved_images, monkeypatch):
+    monkeypatch.setattr("hmc.camera.noise.LEAST_LEFT", 1.0)  # drawn images have no noise that averaging could lower
     for workers in ("1", "2"):
         assert track(folder, tmp_path / workers, "--workers", workers) == 0
         assert read_run(tmp_path / workers / "run.toml")["parameters"]["image_factors"] == [2] * 5
@@ -65,8 +66,7 @@ def test_large_images_are_made_smaller_unless_they_are_asked_for(folder, tmp_pat
     assert track(folder, tmp_path / "1", "--full-images") == 0
     assert "starting anew" in capsys.readouterr().out
     assert "image_factors" not in read_run(tmp_path / "1" / "run.toml")["parameters"]
-    apart = np.abs(smaller - places()).max(axis=1)
-    assert 0 < np.median(apart) < 0.04 and apart.max() < 0.15  # at the end the hull joins the two
+    assert 0 < np.abs(smaller - places()).max() < 0.07
 
 
 @pytest.mark.skipif(not may_fork(), reason="there is one process only")

@@ -223,6 +223,17 @@ def test_centroids_that_are_never_known_and_results_of_nobody_are_told(result, t
     write_tracks(tmp_path / "where.csv", replace(centroids(truth), positions=np.full((40, 3), np.nan)))
     assert main(["evaluate", str(result), "--truth", str(tmp_path / "where.csv")]) == 2
     assert "where.csv: nothing can be scored: tracks are not compared in frames 0-19" in capsys.readouterr().err
+    # Poses are scored all the same, of which alone the report then tells.
+    positions = truth.positions.copy()
+    positions[:, [landmark_index(name) for name in ("pelvis", "l_hip", "r_hip")]] = np.nan
+    write_joints(tmp_path / "joints.csv", replace(truth, positions=positions))
+    given = ["--truth", str(tmp_path / "joints.csv")]
+    assert main(["evaluate", str(result), *given]) == 0
+    report = tomllib.loads((result / "metrics.toml").read_text())
+    assert "tracks" not in report and report["pose"] and "tracks are not compared in frames 0-19" in report["notes"][-1]
+    (result / "joints.csv").unlink()
+    assert main(["evaluate", str(result), *given]) == 2
+    assert "joints.csv: nothing can be scored: tracks are not compared" in capsys.readouterr().err
     write_joints(tmp_path / "reference.csv", truth)
     write_joints(result / "joints.csv", truth.where(np.zeros(0, int)))
     assert main(["evaluate", str(result), "--truth", str(tmp_path / "reference.csv")]) == 0

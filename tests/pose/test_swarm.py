@@ -301,7 +301,7 @@ def test_as_printed_no_particle_knows_where_the_last_search_ended():
     box, swarm = bounds_around(MODEL, known, 0.05, 0.3), PsoSettings(12, 0)
     near = fit_around(np.random.default_rng(0), MODEL, curves, known[None], box, swarm)
     assert near.error_m < 1e-4 and np.allclose(near.state, known)
-    printed = fit_around(np.random.default_rng(0), MODEL, curves, known[None], box, swarm, anywhere=True)
+    printed = fit_around(np.random.default_rng(0), MODEL, curves, known[None], box, replace(swarm, anywhere=True))
     rng = np.random.default_rng(0)
     drawn_states = rng.uniform(*box, (12, N_PARAMETERS))
     assert np.isclose(np.abs(drawn_states[:, 7:] - printed.state[7:]).max(1).min(), 0)
@@ -310,7 +310,7 @@ def test_as_printed_no_particle_knows_where_the_last_search_ended():
 
 def test_the_printed_preset_minimises_nothing_but_the_curves_error_from_anywhere():
     swarm = SWARM_PRESETS["hsiao2008"].swarm
-    assert swarm.fit.anywhere and swarm.last_weight == swarm.spin_weight == swarm.rest_weight == swarm.facing_m == 0
+    assert swarm.fit.swarm.anywhere and swarm.last_weight == swarm.spin_weight == swarm.rest_weight == swarm.facing_m == 0
 
 
 def test_headings():

@@ -26,6 +26,7 @@ from hmc.pose.steps.swarm.fit import FitSettings
 from hmc.pose.steps.swarm.step import Read, SwarmPreset, read_view, swarm_memory, swarm_subject, swarmed, swarmed_near
 from hmc.pose.steps.swarm.temporal import RestartSettings, SwarmSettings, swarm_step
 from hmc.pose.views.person_view import PersonView
+from hmc.search.swarm import PsoSettings
 
 __all__ = ["SWARM_PRESETS", "ReadingStart", "pso_method"]
 
@@ -44,7 +45,7 @@ PRINTED = SwarmPreset(
         named=False,
     ),
     swarm=SwarmSettings(
-        fit=FitSettings(limbs_stay=False, anywhere=True),  # 3.2.2.4; the pseudo code of 3.2.2.2
+        fit=FitSettings(swarm=PsoSettings(anywhere=True), limbs_stay=False),  # the pseudo code of 3.2.2.2; 3.2.2.4
         spin_weight=0.0,  # Eq. 3-27 is all that is minimised
         last_weight=0.0,
         rest_weight=0.0,

@@ -94,9 +94,6 @@ class FitSettings:
     tune_rounds : int
     limbs_stay : bool
         Whether limbs stay where they are while the torso is tuned (`torso_moves`); the thesis does not say.
-    anywhere : bool
-        Whether all particles of a stage, and of the swarm near the last pose, begin anywhere in their ranges, as in the thesis's pseudo
-        code; else some begin at what is known already. Fine tuning has its "initial guess" among them either way.
     """
 
     stages: tuple[tuple[int, int], ...] = ((12, 12), (24, 20), (24, 12), (40, 40), (50, 50))
@@ -107,7 +104,6 @@ class FitSettings:
     tune_rad: float = 0.6
     tune_rounds: int = 2
     limbs_stay: bool = True
-    anywhere: bool = False
 
 
 @dataclass(frozen=True)
@@ -223,8 +219,7 @@ def fit_hierarchical(
             low[index], high[index] = near[0][index], near[1][index]
         low[6], high[6] = start[6] - spin_range, start[6] + spin_range
         swarm = replace(settings.swarm, particles=particles, iterations=iterations)
-        begin = None if settings.anywhere else state[None]
-        state, more = _optimise(rng, _Goal(model, seen, prior), state, np.array(free), (low, high), swarm, begin)
+        state, more = _optimise(rng, _Goal(model, seen, prior), state[None], np.array(free), (low, high), swarm)
         evaluations += more
     tuned = fine_tune(rng, model, observed, state, settings, prior)
     return replace(tuned, evaluations=evaluations + tuned.evaluations)
@@ -238,7 +233,6 @@ def fit_around(
     box: Box,
     swarm: PsoSettings,
     prior: Prior | None = None,
-    anywhere: bool = False,
 ) -> SkeletonFit:
     """All parameters within a box: temporal PSO (section 3.2.2.5).
 
@@ -247,16 +241,15 @@ def fit_around(
     rng, model, observed
         As for `fit_hierarchical`.
     starts : ndarray, shape (k, 23)
-        Where the swarm begins, and at the first with one part moved.
+        Where the swarm begins, and at the first with one part moved, unless it begins anywhere.
     box : tuple of ndarray, shape (23,)
         Lowest and highest values, as of `bounds_around`.
     swarm : PsoSettings
     prior : Prior, optional
-    anywhere : bool
-        Whether it begins anywhere in the box instead (`FitSettings`).
     """
-    begin = None if anywhere else np.concatenate([starts, _one_part_moved(rng, starts[0], box, swarm.particles - len(starts))])
-    state, evaluations = _optimise(rng, _Goal(model, observed, prior), starts[0], np.arange(N_PARAMETERS), box, swarm, begin)
+    if not swarm.anywhere:
+        starts = np.concatenate([starts, _one_part_moved(rng, starts[0], box, swarm.particles - len(starts))])
+    state, evaluations = _optimise(rng, _Goal(model, observed, prior), starts, np.arange(N_PARAMETERS), box, swarm)
     return _fitted(model, observed, state, evaluations)
 
 
@@ -284,7 +277,7 @@ def fit_flat(
     low, high = bounds_around(model, start, 0.25, 4 * np.pi)
     low[6], high[6] = start[6] - spin_range, start[6] + spin_range
     state, evaluations = _optimise(
-        rng, _Goal(model, observed, Prior(start, weight)), start, np.arange(N_PARAMETERS), (low, high), swarm, start[None]
+        rng, _Goal(model, observed, Prior(start, weight)), start[None], np.arange(N_PARAMETERS), (low, high), swarm
     )
     return _fitted(model, observed, state, evaluations)
 
@@ -299,13 +292,14 @@ def fine_tune(
 ) -> SkeletonFit:
     """Section 3.2.2.4: torso, head, arms and legs one after the other, near where they are."""
     evaluations, goal = 0, _Goal(model, observed, prior)
-    swarm = replace(settings.swarm, particles=settings.tune_particles, iterations=settings.tune_iterations)
+    # The thesis's "initial guess" is among the particles.
+    swarm = replace(settings.swarm, particles=settings.tune_particles, iterations=settings.tune_iterations, anywhere=False)
     for number in range(settings.tune_rounds):
         share = 0.5**number
         for free in PARTS:
             box = bounds_around(model, state, share * settings.tune_m, share * settings.tune_rad)
             moves = torso_moves(model, state) if free == _TORSO and settings.limbs_stay else None
-            state, more = _optimise(rng, goal, state, np.array(free), box, swarm, state[None], moves)
+            state, more = _optimise(rng, goal, state[None], np.array(free), box, swarm, moves)
             evaluations += more
     return _fitted(model, observed, state, evaluations)
 
@@ -325,18 +319,17 @@ class _Goal:
 def _optimise(
     rng: np.random.Generator,
     goal: _Goal,
-    state: np.ndarray,
+    starts: np.ndarray,
     free: np.ndarray,
     box: Box,
     swarm: PsoSettings,
-    begin: np.ndarray | None = None,
     moves: np.ndarray | None = None,
 ) -> tuple[np.ndarray, int]:
-    """A state with some parameters optimised, and the number of evaluations.
+    """The first of the starts (n, 23) with some parameters optimised, and the number of evaluations.
 
-    The first particles are at `begin` (n, 23). `moves` (k, 23) says what each free parameter moves, by default itself.
+    `moves` (k, 23) says what each free parameter moves, by default itself.
     """
-    model, (low, high) = goal.model, box
+    model, state, (low, high) = goal.model, starts[0], box
     moves = np.eye(N_PARAMETERS)[free] if moves is None else moves
 
     def moved(values: np.ndarray) -> np.ndarray:
@@ -347,7 +340,7 @@ def _optimise(
     def cost(values: np.ndarray) -> np.ndarray:
         return goal.cost(moved(values))
 
-    found = pso_run(rng, cost, low[free], high[free], swarm, None if begin is None else begin[:, free])
+    found = pso_run(rng, cost, low[free], high[free], swarm, starts[:, free])
     out = moved(found.leader[None])[0]
     # Only the direction of the neck counts: keep it on the torso.
     axis = out[3:6] - out[:3]

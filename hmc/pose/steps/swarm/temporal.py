@@ -318,7 +318,7 @@ def fit_near(
     starts = np.stack([state.state, state.state + state.velocity])
     near = curves_near(model, state.state, reading, settings.farthest_m) if settings.named else None
     observed = _observed(model, reading, settings, near)
-    found = fit_around(rng, model, observed, starts, box, swarm, prior, settings.fit.anywhere)
+    found = fit_around(rng, model, observed, starts, box, swarm, prior)
     tuned = fine_tune(rng, model, observed, found.state, settings.fit, prior)
     return replace(tuned, evaluations=found.evaluations + tuned.evaluations)
 
