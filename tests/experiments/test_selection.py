@@ -1,14 +1,20 @@
 """Other seeds, frames, cameras and actions than an experiment has by itself."""
 
+import contextlib
 import json
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from results_at_random import RESULTS
 
 from hmc.errors import InputError
-from hmc.experiments import EXPERIMENTS, Experiment, Plan, find_experiment
+from hmc.experiments import EXPERIMENTS, Cell, Experiment, Plan, find_experiment
 from hmc.experiments.__main__ import main
+from hmc.experiments.engine.experiment import Report
 from hmc.experiments.engine.selection import changed_plan, grid_of, read_settings
+from hmc.experiments.engine.style import house_style
+from hmc.experiments.engine.sweep import report_on
 from hmc.experiments.engine.writing import report_folder
 
 NAMES = ("walk_man", "walk_woman", "box_man", "walker")
@@ -115,3 +121,19 @@ def test_from_the_command_line_and_beside_the_full_report(tmp_path, capsys):
     experiment = find_experiment("fig-6.18")
     folders = {report_folder(tmp_path, experiment, plan) for plan in (Plan(), Plan(quick=True), changed_plan(Plan(), 5))}
     assert len(folders) == 3
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")  # means of nothing
+@pytest.mark.parametrize("name", EXPERIMENTS)
+def test_a_report_on_a_part_of_the_cells_is_there_or_says_in_a_line_why_not(name):
+    """With one value alone of each parameter, of results that are drawn at random."""
+    experiment, rng = find_experiment(name), np.random.default_rng(0)
+    grid = grid_of(experiment, Plan(quick=True))
+    draw = RESULTS[experiment.store_name]
+    cells = [Cell(parameters, draw(rng, parameters, False)) for parameters in grid]
+    for key in dict.fromkeys(key for parameters in grid for key in parameters):
+        last = grid[-1].get(key)
+        some = [one for one in cells if one.parameters.get(key) == last]
+        with house_style(), np.errstate(all="ignore"), contextlib.suppress(InputError):
+            assert isinstance(report_on(experiment, some, changed_plan(Plan(quick=True), kept=[(key, last)])), Report)
+        plt.close("all")

@@ -12,6 +12,7 @@ from sklearn.manifold import spectral_embedding
 from hmc.camera.model import Rig, look_at
 from hmc.pose.spectral.eigenmap import eigenmap
 from hmc.pose.spectral.graph import GraphSettings, adjacency, build_graph, color_votes, core_nodes, face_neighbours
+from hmc.pose.spectral.growing import grow_branches, printed_growing
 from hmc.pose.spectral.parts import PART_NAMES
 from hmc.pose.spectral.pieces import PieceSettings, limb_pieces
 from hmc.pose.spectral.reading import cut_foot, read_body
@@ -176,6 +177,23 @@ def test_printed_branches_end_by_their_distance_from_the_origin_alone():
     assert 3 <= len(branches) <= 5
     assert all(far[branch.nodes].min() > radius for branch in branches)
     assert (found.labels[far < radius] <= 0).all()
+
+
+@given(st.integers(0, 10**6), st.integers(2, 5))
+@settings(max_examples=15, deadline=None)
+def test_printed_branches_do_not_grow_through_the_origin_into_others(seed, count):
+    """B-3: what is as near to the origin as the radius ends a branch; beyond it another one begins."""
+    rng = np.random.default_rng(seed)
+    directions = np.linalg.qr(rng.normal(size=(6, 6)))[0][:count] * rng.choice([-1, 1], (count, 1))
+    distances = rng.uniform(0.0, rng.uniform(0.6, 1.0, count), (400, count)).T
+    places = (distances[..., None] * directions[:, None] + rng.normal(0, 0.002, (count, 400, 6))).reshape(-1, 6)
+    ray, far = np.repeat(np.arange(count), 400), np.linalg.norm(places, axis=1)
+    branches = grow_branches(places, None, printed_growing(), radius=0.1)
+    assert len(branches) == count
+    for branch in branches:
+        own = ray[branch.nodes[0]]
+        assert (ray[branch.nodes] == own).all()
+        assert len(branch.nodes) == np.count_nonzero((ray == own) & (far > 0.1))
 
 
 def test_touching_hands_are_told_and_parted():

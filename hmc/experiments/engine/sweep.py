@@ -13,7 +13,7 @@ import functools
 import os
 import time
 import traceback
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -30,7 +30,7 @@ from hmc.io.provenance import code_state, machine
 from hmc.plugins import add_plugins, plugin_files
 from hmc.processes import end_with
 
-__all__ = ["Outcome", "compute_cells", "plan_for", "plan_of", "run_experiment", "stored_cells"]
+__all__ = ["Outcome", "compute_cells", "plan_for", "plan_of", "report_on", "run_experiment", "stored_cells"]
 
 Progress = Callable[[int, int], None]
 
@@ -135,9 +135,20 @@ def run_experiment(
     cells = [cell for cell in stored_cells(experiment, out, grid) if cell is not None]
     if len(cells) < len(grid):
         raise InputError(f"{out}: cells vanished while the experiment ran; start it again")
+    return Outcome(report_on(experiment, cells, plan), len(missing), found)
+
+
+def report_on(experiment: Experiment, cells: Sequence[Cell], plan: Plan) -> Report:
+    """An experiment's report on the cells of a plan.
+
+    Raises
+    ------
+    InputError
+        When cells are left out by the plan without which there is no report.
+    """
     try:
-        return Outcome(experiment.report(cells, plan), len(missing), found)
-    except (KeyError, IndexError, StopIteration, ValueError) as error:
+        return experiment.report(cells, plan)
+    except Exception as error:  # what a report needs of the other cells shows in any way
         if isinstance(error, InputError) or not plan.changed:
             raise
         raise InputError(

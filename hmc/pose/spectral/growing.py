@@ -38,7 +38,8 @@ class GrowSettings:
     outlier_error, most_outliers : float, int
         OT2, in median distances of all nodes from the origin, and OT1, nodes of a branch.
     reach : float
-        How far a step looks for the next nodes of a branch, as a share of its first node's distance from the origin.
+        How far a branch looks for its next nodes and for those beside it, as a share of the distance from the origin there: branches come
+        close to one another as they come near to it.
     most_branches, least_nodes : int
         How many branches are grown where they do not meet, and how small they may be.
     """
@@ -51,7 +52,7 @@ class GrowSettings:
     pieces: PieceSettings = field(default_factory=PieceSettings)
     outlier_error: float = 0.05
     most_outliers: int = 15
-    reach: float = 0.15
+    reach: float = 0.3
     most_branches: int = 8
     least_nodes: int = 10
 
@@ -134,11 +135,11 @@ def grow_branches(
             branch = _grow(places[own], far[own], np.ones(len(own), bool), settings)
             branches.append(_with_rest(places[own], branch, own))
         return branches
-    branches, free = [], far > radius
-    while len(branches) < settings.most_branches and np.count_nonzero(free) > settings.first_nodes:
-        branch = _grow(places, far, free, settings)
+    branches, free, outside = [], np.ones(len(places), bool), far > radius
+    while len(branches) < settings.most_branches and np.count_nonzero(free & outside) > settings.first_nodes:
+        branch = _grow(places, far, free, settings, radius)
         if settings.stop == "radius":
-            branch = _with_near(places, branch, free, settings.reach * far[branch.nodes[0]])
+            branch = _with_near(places, far, _where(branch, outside), free & outside, settings.reach)
         free[branch.nodes] = False
         if len(branch.nodes) >= settings.least_nodes:
             branches.append(branch)
@@ -152,31 +153,39 @@ def _with_rest(places: np.ndarray, branch: Branch, nodes: np.ndarray) -> Branch:
     return Branch(nodes[np.concatenate([branch.nodes, rest])], np.concatenate([branch.sites, branch.sites[nearest]]))
 
 
-def _with_near(places: np.ndarray, branch: Branch, free: np.ndarray, reach: float) -> Branch:
+def _where(branch: Branch, kept: np.ndarray) -> Branch:
+    """A branch without some of its nodes; `kept` is of all nodes of the embedding."""
+    own = kept[branch.nodes]
+    return Branch(branch.nodes[own], branch.sites[own])
+
+
+def _with_near(places: np.ndarray, far: np.ndarray, branch: Branch, free: np.ndarray, reach: float) -> Branch:
     """A branch with the free nodes beside it: what steps of N nodes left out would be branches of its own."""
     own = free.copy()
     own[branch.nodes] = False
     rest = np.flatnonzero(own)
     away, nearest = cKDTree(places[branch.nodes]).query(places[rest]) if len(rest) else (np.zeros(0), rest)
-    near = away < reach
+    near = away < reach * far[rest]
     return Branch(np.concatenate([branch.nodes, rest[near]]), np.concatenate([branch.sites, branch.sites[nearest[near]]]))
 
 
-def _grow(places: np.ndarray, far: np.ndarray, free: np.ndarray, settings: GrowSettings) -> Branch:
-    """One branch of the free nodes, from the farthest one inwards."""
+def _grow(places: np.ndarray, far: np.ndarray, free: np.ndarray, settings: GrowSettings, radius: float = 0.0) -> Branch:
+    """One branch of the free nodes, from the farthest one inwards, until its end is as near to the origin as the radius."""
     free = free.copy()
     tip = int(np.argmax(np.where(free, far, -1.0)))
     nodes = _nearest(places, free, places[tip], settings.first_nodes + 1)
     direction = _principal(places[nodes], places[nodes].mean(0) - places[tip])
     sites = (places[nodes] - places[tip]) @ direction
     free[nodes] = False
-    limit, reach = settings.outlier_error * float(np.median(far)), settings.reach * far[tip]
+    limit = settings.outlier_error * float(np.median(far))
     outliers: int = 0
     while True:
         end = int(np.argmax(sites))
         here = places[nodes[end]]
+        if far[nodes[end]] <= radius:
+            break
         new = _nearest(places, free, here, settings.next_nodes)
-        new = new[np.linalg.norm(places[new] - here, axis=1) < reach]
+        new = new[np.linalg.norm(places[new] - here, axis=1) < settings.reach * far[nodes[end]]]
         if len(new) == 0:
             break
         recent = np.argsort(sites)[-2 * settings.next_nodes :]
