@@ -20,6 +20,8 @@ __all__ = ["SCORES", "WORTH_MM", "ahead", "following", "is_followed", "none_bett
 SCORES = ("mean_mm", "MMTP_mm", "MMTA_percent", "MMTP_70_mm", "MMTA_70_percent", "MMTA_50_percent")
 #: Mean errors that differ by less are as good as each other, millimetres.
 WORTH_MM = 1.0
+#: A wider interval of MMTA says of no figure that it is in it, percent.
+TELLS_PERCENT = 30.0
 #: By what a score's name says, how far a landmark may be to be matched.
 _WITHIN = {"_70_": STRICT_MM, "_50_": NEAR_MM}
 
@@ -95,7 +97,7 @@ def none_better(text: str, chosen: Sequence[Cell], others: Mapping[str, Sequence
 
 
 def reaches(text: str, cells: Sequence[Cell], paper: Sequence[float]) -> Claim:
-    """The claim that MMTA at 100 mm is that of a paper or better, or that the paper's is in its interval, of people who are followed.
+    """The claim that MMTA at 100 mm, of people who are followed, is that of a paper or better by an interval that tells something.
 
     Parameters
     ----------
@@ -107,7 +109,7 @@ def reaches(text: str, cells: Sequence[Cell], paper: Sequence[float]) -> Claim:
     """
     found, mmtp = score_interval(cells, "MMTA_percent"), paper[COLUMNS.index("MMTP_mm")]
     mmta = paper[COLUMNS.index("MMTA_percent")]
-    holds = bool(found.value >= mmta or (found.high >= mmta and is_followed(cells)))
+    holds = bool(found.high >= mmta and found.high - found.low <= TELLS_PERCENT and is_followed(cells))
     detail = f"MMTA {found} %, MMTP {score_interval(cells, 'MMTP_mm')} mm; the paper {mmta} %, {mmtp} mm"
     return Claim(text, holds, detail, undecided=bool(not holds and found.high >= mmta))
 

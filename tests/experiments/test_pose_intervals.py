@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from hmc.errors import InputError
-from hmc.experiments.by_action import pose_scores
+from hmc.experiments.by_action import COLUMNS, pose_scores
 from hmc.experiments.engine.experiment import Cell
-from hmc.experiments.pose_intervals import SCORES, is_followed, none_better, score_difference, score_interval
+from hmc.experiments.pose_intervals import SCORES, is_followed, none_better, reaches, score_difference, score_interval
 
 
 def cells(scatter_m, rng, clips=6, seeds=3, lost=0.0, frames=12):
@@ -76,3 +76,24 @@ def test_what_differs_is_left_out_of_what_must_agree():
 def test_noise_is_not_followed():
     rng = np.random.default_rng(4)
     assert is_followed(cells(0.02, rng)) and not is_followed(cells(2.0, rng))
+
+
+def some_lost(shares, rng, seeds=3):
+    """Runs of as many clips, each with its share of frames in which everything is half a metre off."""
+    made = []
+    for clip, share in enumerate(shares):
+        for seed in range(seeds):
+            truth = rng.normal(size=(200, 15, 3))
+            off = np.where(rng.random(200) < share, 0.5, 0.01)[:, None, None]
+            made.append(Cell({"recording": f"clip{clip}@1", "repeat": seed}, {"estimate_m": truth + off / np.sqrt(3), "truth_m": truth}))
+    return made
+
+
+def test_a_figure_is_reached_by_an_interval_that_tells_something():
+    rng = np.random.default_rng(5)
+    paper = [{"MMTA_percent": 76.0, "MMTP_mm": 60.0}.get(column, 0.0) for column in COLUMNS]
+    assert reaches("", some_lost([0.2, 0.25, 0.25, 0.3], rng), paper).holds
+    far = reaches("", some_lost([0.4, 0.45, 0.45, 0.5], rng), paper)
+    assert not far.holds and not far.undecided
+    wide = reaches("", some_lost([0.0, 0.05, 0.45, 0.5], rng), paper)  # the same mean as the first, of clips that say different things
+    assert not wide.holds and wide.undecided
