@@ -123,6 +123,7 @@ def test_from_the_command_line_and_beside_the_full_report(tmp_path, capsys):
     assert len(folders) == 3
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")  # means of nothing
 @pytest.mark.parametrize("name", EXPERIMENTS)
 def test_a_report_on_a_part_of_the_cells_is_there_or_says_in_a_line_why_not(name):
