@@ -30,26 +30,30 @@ FLOW = (
     ("tracking", "pose.views", "person_voxels", 0.0),
     ("pose.views", "pose.person", "PersonView", 0.0),
     ("pose.person", "pose.follow", "DecidedFrames", 0.0),
-    ("pose.follow", "cli", "follow", 0.0),
+    ("pose.follow", "pose.chain", "follow", -0.35),
+    ("pose.chain", "cli", "finished_poses", 0.0),
 )
 #: Where boxes stand: columns from left to right as a frame goes, rows from above.
 PLACES = {
-    "camera": (0, 2), "io": (0, 1),
+    "camera": (0, 2), "io": (0, 1), "processes": (0, 3),
     "search": (1, 3), "body": (1, 2), "voxels": (1, 1),
     "pose.spectral": (2, 3), "pose.objectives": (2, 2), "pose.views": (2, 1), "tracking": (2, 0),
-    "pose.steps": (3, 3), "pose.method": (3, 2), "pose.person": (3, 1),
+    "pose.steps": (3, 3), "pose.method": (3, 2), "pose.person": (3, 1), "pose.finished": (3, 0),
     "pose.starts": (4, 3), "pose.legs": (4, 2), "pose.follow": (4, 1), "pose.records": (4, 0),
-    "pose.recovery": (5, 3), "pose.methods": (5, 2), "cli": (5, 1),
-    "pose.registry": (6, 2),
-    "processes": (0, 3), "pose.keypoint_tracks": (2, -1), "pose.keypoint_sides": (3, -1), "pose.keypoint_cues": (4, -1),
-    "pose.keypoint_views": (5, -1), "pose.occluders": (3, 0), "pose.clear_views": (5, 0), "pose.mixtures": (6, 3), "pose.backward": (6, 0),
-    "pose.trust": (6, -1),
+    "pose.recovery": (5, 3), "pose.methods": (5, 2), "pose.clear_views": (5, 1),
+    "pose.part_colors": (3, 4), "pose.turned": (4, 4), "pose.anew": (5, 4), "pose.back_settings": (6, 4),
+    "pose.registry": (6, 2), "pose.second_pass": (6, 3), "pose.trust": (6, 1),
+    "pose.occluders": (5, 0), "pose.contacts": (6, 0), "pose.head_colors": (7, 3), "pose.limb_colors": (7, 2), "pose.backward": (7, 1),
+    "pose.keypoint_tracks": (2, -1), "pose.keypoint_sides": (3, -1), "pose.keypoint_cues": (4, -1), "pose.keypoint_views": (5, -1),
+    "pose.turned_by_silhouettes": (6, -1), "pose.turned_by_keypoints": (7, -1), "pose.turned_back": (7, 0),
+    "pose.chain": (8, 1), "cli": (9, 1),
 }  # fmt: skip
 #: Rooms around the way of a frame, which may use all that they need of it: no arrows.
 AROUND = ("check", "synthetic", "metrics", "view", "motion", "api", "session", "trials", "experiments")
 #: Of everybody's use, or too small for a box.
-LEFT_OUT = {"errors", "landmarks", "plugins", "callable_package", "__init__", "__main__", "pose.__init__", "pose.trust_model"}
+LEFT_OUT = {"errors", "landmarks", "plugins", "callable_package", "citations", "__init__", "__main__", "pose.__init__", "pose.trust_model"}
 WIDTH, HEIGHT, COLUMN, ROW = 2.2, 0.72, 3.05, 1.0
+AROUND_ROW = 5.15
 INK, GREY, BLUE, FILL = "#1c2430", "#b9c2cf", "#1f5fbf", "#f2f5f9"
 
 
@@ -87,7 +91,7 @@ def reduced(edges: set[tuple[str, str]]) -> set[tuple[str, str]]:
 
 def middle_of(name: str) -> tuple[float, float]:
     """Of a box."""
-    column, row = (AROUND.index(name), 4.15) if name in AROUND else PLACES[name]
+    column, row = (AROUND.index(name), AROUND_ROW) if name in AROUND else PLACES[name]
     return column * COLUMN, -row * ROW * 1.35
 
 
@@ -100,7 +104,7 @@ def draw(out: Path) -> None:
     for one, other, name, _ in FLOW:
         if name not in imports.get((one, other), ()):
             raise SystemExit(f"hmc.{other} does not import {name} from hmc.{one}")
-    figure, axes = plt.subplots(figsize=(19, 7.6))
+    figure, axes = plt.subplots(figsize=(20, 8.4))
     known = {edge for edge in imports if set(edge) <= set(PLACES) and edge[1] != "cli"} | {("pose.registry", "cli")}
     for one, other in sorted(reduced(known) - {flow[:2] for flow in FLOW}):
         arrow(axes, one, other, GREY, 1.0, 0.12)
@@ -110,16 +114,19 @@ def draw(out: Path) -> None:
         x, y = middle_of(name)
         box = plt.Rectangle((x - WIDTH / 2, y - HEIGHT / 2), WIDTH, HEIGHT, facecolor=FILL, edgecolor=INK, linewidth=1.1, zorder=3)
         axes.add_patch(box)
-        axes.text(x, y + 0.11, name, ha="center", va="center", fontsize=10 if len(name) < 15 else 7.5, color=INK, zorder=4, weight="bold")
+        axes.text(x, y + 0.11, name, ha="center", va="center", fontsize=min(10, 125 / len(name)), color=INK, zorder=4, weight="bold")
         axes.text(x, y - 0.18, f"{sizes[name]:,} lines", ha="center", va="center", fontsize=8.5, color="#566072", zorder=4)
     x, y = middle_of("io")
     axes.annotate(
         "videos", (x - WIDTH / 2, y), (x - WIDTH / 2 - 0.85, y), ha="center", va="center", arrowprops=_line(BLUE, 2.4), color=BLUE
     )
-    axes.set(xlim=(-2.3, (len(AROUND) - 1) * COLUMN + 1.4), ylim=(-4.15 * ROW * 1.35 - 0.5, ROW * 1.35 + 0.5))
+    axes.set(
+        xlim=(-2.3, max(len(AROUND) - 1, *(column for column, _ in PLACES.values())) * COLUMN + 1.4),
+        ylim=(-AROUND_ROW * ROW * 1.35 - 0.5, ROW * 1.35 + 0.5),
+    )
     axes.text(*_below("cli"), "joints.csv, tracks.csv, pose.npz", ha="center", va="top", fontsize=9, color=BLUE, zorder=5)
-    axes.axhline(-3.6 * ROW * 1.35, color=GREY, linewidth=0.8, linestyle=":")
-    axes.text(-2.2, -3.6 * ROW * 1.35 - 0.06, "around it", va="top", fontsize=9, color="#566072")
+    axes.axhline(-(AROUND_ROW - 0.55) * ROW * 1.35, color=GREY, linewidth=0.8, linestyle=":")
+    axes.text(-2.2, -(AROUND_ROW - 0.55) * ROW * 1.35 - 0.06, "around it", va="top", fontsize=9, color="#566072")
     axes.axis("off")
     figure.savefig(out, dpi=110, bbox_inches="tight", metadata={"Software": None})
 

@@ -59,7 +59,7 @@ class Part:
     frontend, preset, method : mapping of str to object
         Fields of `FrontendSettings`, of the preset ``default`` and of the method that is made of it.
     back : mapping of str to object, or None
-        Fields of the second pass's `hmc.pose.mixtures.BackwardSettings`; None: there is no second pass.
+        Fields of the second pass's `hmc.pose.back_settings.BackwardSettings`; None: there is no second pass.
     """
 
     frontend: Mapping[str, Any] = field(default_factory=dict)
@@ -79,7 +79,6 @@ PARTS: dict[str, Part] = {
     "own body of the whole run": Part(back={"fit_body": None}),
     "what furniture hides": Part(back={"hidden_places": False}),
     "others' rays": Part(back={"own_rays": False}),
-    "best way through both passes": Part(back={"best_way": False}),
     "a trunk that bends": Part(preset={"body": "stiff"}),
     "recovery": Part(method={"recover": None}),
     "legs told apart": Part(method={"legs": None, "alternatives": None}),

@@ -11,12 +11,10 @@ first second and a half. When the recording is over more is known:
 4. Each person is followed from the last frame to the first. Nothing is drawn at random but limbs that are lost: the pose of the frame after
    and the first pass's are refined side by side, so that a limb that was found again is followed back to where it was lost. Where a
    person was lost for long, so is a pose that is found anew (`hmc.pose.anew`).
-5. Each frame then has two poses, and more with limbs of one on the other; the best way through all of them is taken
-   (`hmc.pose.mixtures`). Where nothing shows a limb, the way in from before and the way out to after are joined where they meet best.
-6. Limbs that are still in doubt are looked for by the colors of the person's own parts (`hmc.pose.limb_colors`).
-7. Each frame's pose was found by itself, with an error of its own; what differs from frame to frame is smoothed (`hmc.motion.smoothing`).
+5. Limbs that are still in doubt are looked for by the colors of the person's own parts (`hmc.pose.limb_colors`).
+6. Each frame's pose was found by itself, with an error of its own; what differs from frame to frame is smoothed (`hmc.motion.smoothing`).
 
-The third, fourth and sixth go on where they were when a run was stopped; the others take a moment. Ours; the papers follow forward only.
+The third, fourth and fifth go on where they were when a run was stopped; the others take a moment. Ours; the papers follow forward only.
 """
 
 from __future__ import annotations
@@ -36,13 +34,13 @@ from hmc.io.masks import kept_frames
 from hmc.io.recording import Recording, spread_frames
 from hmc.io.results import TrackTable
 from hmc.pose.anew import doubtful_frames, pose_anew
+from hmc.pose.back_settings import BackwardSettings
 from hmc.pose.contacts import ground_notes, standing_feet
 from hmc.pose.follow import FollowOptions, PosedPeople, persons_of
 from hmc.pose.head_colors import turned_by_heads
 from hmc.pose.keypoint_cues import beside_body, learn_beside
 from hmc.pose.limb_colors import Found, OtherLimb, limbs_by_color
 from hmc.pose.method import SURFACE_POINTS, Capture, PoseMethod, Subject, make_subject, other_rng
-from hmc.pose.mixtures import N_MIXTURES, BackwardSettings, choose_path, mixed_poses, mixture
 from hmc.pose.objectives.objective import Objective
 from hmc.pose.occluders import learn_hidden_places
 from hmc.pose.records import with_angles
@@ -80,8 +78,8 @@ class _Person:
         Frame to its place in `rows`.
     own, back : ndarray, shape (n, 37)
         The first pass's poses, refined, and those of the backward one.
-    costs : ndarray, shape (n, 32)
-        Of `mixed_poses` of both; zero where nothing tells them apart.
+    costs : ndarray, shape (n,)
+        Of those of the backward pass, square metres; NaN where nothing showed enough of the person.
     anew : frozenset of int
         Frames in which a pose is looked for anew.
     """
@@ -156,11 +154,11 @@ def backward(
             number: replace(person, anew=frozenset(people.frames[person.rows[lost[number]]].tolist())) for number, person in persons.items()
         }
     for record in [record for record in records if "rows" in record]:
-        for person, own, back, costs in record["rows"]:
-            _put(persons[person], record["frame"], np.array(own), np.array(back), np.array(costs))
+        for person, own, back, cost in record["rows"]:
+            _put(persons[person], record["frame"], np.array(own), np.array(back), cost)
         end = record["frame"]
     _sweep(pass_, persons, first, end)
-    people = _joined(people, persons, recording.fps, settings)
+    people = _joined(people, persons)
     if settings.colors is not None:
         run.say("asking colors")
         subjects = {number: person.subject for number, person in persons.items()}
@@ -273,12 +271,12 @@ def _begun(people: PosedPeople, fitted: np.ndarray, person: int, subject: Subjec
     rows = rows[np.argsort(people.frames[rows])]
     own = people.states.states[rows].copy()
     row_of = {int(frame): k for k, frame in enumerate(people.frames[rows])}
-    return _Person(rows, subject, row_of, own, own.copy(), np.zeros((len(rows), N_MIXTURES)))
+    return _Person(rows, subject, row_of, own, own.copy(), np.full(len(rows), np.nan))
 
 
-def _put(person: _Person, frame: int, own: np.ndarray, back: np.ndarray, costs: np.ndarray) -> None:
+def _put(person: _Person, frame: int, own: np.ndarray, back: np.ndarray, cost: float) -> None:
     k = person.row_of[frame]
-    person.own[k], person.back[k], person.costs[k] = own, back, costs
+    person.own[k], person.back[k], person.costs[k] = own, back, cost
 
 
 def _sweep(pass_: SecondPass, persons: Mapping[int, _Person], first: int, end: int) -> None:
@@ -289,9 +287,9 @@ def _sweep(pass_: SecondPass, persons: Mapping[int, _Person], first: int, end: i
         for number, (view, own) in refined.items():
             person, k = persons[number], persons[number].row_of[frame]
             after = person.back[k + 1] if k + 1 < len(person.rows) else person.own[k]
-            back, costs = _back(pass_.rng(number, frame), person.subject, own, after, view, pass_.settings.polish)
-            _put(person, frame, own[0], back, costs)
-            rows.append((number, own[0], back, costs))
+            back, cost = _back(pass_.rng(number, frame), person.subject, own, after, view, pass_.settings.polish)
+            _put(person, frame, own[0], back, cost)
+            rows.append((number, own[0], back, cost))
         if pass_.run.journal is not None:
             append_journal(pass_.run.journal, {"frame": frame, "rows": rows})
 
@@ -338,11 +336,11 @@ def _own(rng: np.random.Generator, person: _Person, view: PersonView, settings: 
 
 def _back(
     rng: np.random.Generator, subject: Subject, own: Sequence[np.ndarray], after: np.ndarray, view: PersonView, settings: PolishSettings
-) -> tuple[np.ndarray, np.ndarray]:
-    """The better of a frame's own poses (`_own`) and the next frame's, with lost limbs looked for; and what their mixtures cost."""
+) -> tuple[np.ndarray, float]:
+    """The better of a frame's own poses (`_own`) and the next frame's, with lost limbs looked for; and its cost."""
     objective = fine_objective(rng, subject, view, settings)
-    back, _, _ = polish(rng, objective, [own[0], after, *own[1:]], after, settings)
-    return back, objective.cost(mixed_poses(own[0], back))
+    back, cost, _ = polish(rng, objective, [own[0], after, *own[1:]], after, settings)
+    return back, cost
 
 
 def _kept_colors(records: Sequence[Mapping], run: RunOptions) -> tuple[Found, Callable[[int, Sequence[OtherLimb]], None]]:
@@ -360,20 +358,15 @@ def _kept_colors(records: Sequence[Mapping], run: RunOptions) -> tuple[Found, Ca
     return known, keep
 
 
-def _joined(people: PosedPeople, persons: Mapping[int, _Person], fps: float, settings: BackwardSettings) -> PosedPeople:
-    """The tables with everybody's path through the poses of both passes."""
+def _joined(people: PosedPeople, persons: Mapping[int, _Person]) -> PosedPeople:
+    """The tables with everybody's poses of the backward pass."""
     positions, states, costs = people.positions.copy(), people.states.states.copy(), people.costs.copy()
     apart = np.full(positions.shape[:2], np.nan)
     for person in persons.values():
-        frames, body = people.frames[person.rows], person.subject.body
-        if settings.best_way:
-            picks = choose_path(body, frames, person.own, person.back, person.costs, fps, settings.path)
-        else:
-            picks = np.full(len(frames), N_MIXTURES - 1)
-        states[person.rows] = mixture(person.own, person.back, picks)
-        told = person.costs.any(axis=1)
-        costs[person.rows[told]] = person.costs[np.arange(len(picks)), picks][told]
-        positions[person.rows] = landmarks(body, states[person.rows])
+        body, told = person.subject.body, np.isfinite(person.costs)
+        states[person.rows] = person.back
+        costs[person.rows[told]] = person.costs[told]
+        positions[person.rows] = landmarks(body, person.back)
         apart[person.rows[told]] = np.linalg.norm(landmarks(body, person.own[told]) - landmarks(body, person.back[told]), axis=2)
     bodies = {**people.states.bodies, **{number: person.subject.body.dimensions for number, person in persons.items()}}
     return replace(

@@ -325,7 +325,7 @@ class PoseMethod:
 
 
 def as_found(method: PoseMethod) -> PoseMethod:
-    """The method without smoothing of its own (`hmc.pose.mixtures.BackwardSettings.smooth_s`), for who smooths otherwise, or not."""
+    """The method without smoothing of its own (`hmc.pose.back_settings.BackwardSettings.smooth_s`), for who smooths otherwise, or not."""
     return method if method.back is None else replace(method, back=replace(method.back, smooth_s=None))
 
 

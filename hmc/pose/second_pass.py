@@ -12,11 +12,11 @@ from hmc.body.model import BodyModel
 from hmc.io.masks import MaskStep, kept_frames
 from hmc.io.recording import Frame, Recording, iterate_frames
 from hmc.io.results import PoseStates, TrackTable
+from hmc.pose.back_settings import BackwardSettings
 from hmc.pose.contacts import Footing
 from hmc.pose.follow import FollowOptions
 from hmc.pose.keypoint_cues import with_keypoints
 from hmc.pose.method import Capture
-from hmc.pose.mixtures import BackwardSettings
 from hmc.pose.objectives.symmetric import body_distance
 from hmc.pose.occluders import HiddenPlaces, unseen_voxels
 from hmc.pose.person import PersonTrack

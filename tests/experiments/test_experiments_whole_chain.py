@@ -26,7 +26,7 @@ LABEL = "tiny@0"
 FRAMES, SEED = 8, 2
 #: Parts of the second pass, whose first pass is the whole's.
 SECOND = (
-    "second pass", "own body of the whole run", "what furniture hides", "others' rays", "best way through both passes",
+    "second pass", "own body of the whole run", "what furniture hides", "others' rays",
     "fresh starts for who is lost",
     "turning about who faces backwards",
     "colors of a person's parts",

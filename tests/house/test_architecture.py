@@ -29,10 +29,10 @@ METHOD = OBJECTIVES | {"pose.method"}
 STEPS = METHOD | {"pose.steps"}
 STARTS = STEPS | {"pose.starts"}
 PERSON = STARTS | {"pose.legs", "pose.person"}
-MIXTURES = STEPS | {"pose.anew", "pose.legs", "pose.mixtures", "pose.part_colors", "pose.turned"}
+BACK = STEPS | {"pose.anew", "pose.back_settings", "pose.part_colors", "pose.turned"}
 FINISHED = MOTION | {"view"}
 FOLLOWING = PERSON | FINISHED | {"pose.finished", "pose.records", "pose.follow", "pose.keypoint_cues", "pose.keypoint_sides"}
-METHODS = STARTS | MIXTURES | {"pose.recovery", "pose.methods"}
+METHODS = STARTS | BACK | {"pose.legs", "pose.recovery", "pose.methods"}
 POSE = METHODS | FOLLOWING | {"pose.backward", "pose.clear_views", "pose.keypoint_tracks", "pose.occluders", "pose.registry"}
 POSE |= {"pose.contacts", "pose.keypoint_views", "pose.limb_colors", "pose.second_pass", "pose.trust", "pose.trust_model"}
 POSE |= {"pose.chain", "pose.head_colors", "pose.turned_back", "pose.turned_by_keypoints", "pose.turned_by_silhouettes"}
@@ -67,14 +67,14 @@ MAY_IMPORT = {
     "pose.keypoint_views": FOLLOWING | {"pose.trust"},
     "pose.anew": STARTS,
     "pose.turned": STARTS,
-    "pose.mixtures": MIXTURES,
+    "pose.back_settings": BACK,
     "pose.occluders": VIEWS,
     "pose.part_colors": VIEWS,
-    "pose.second_pass": FOLLOWING | MIXTURES | {"pose.contacts", "pose.occluders"},
+    "pose.second_pass": FOLLOWING | BACK | {"pose.contacts", "pose.occluders"},
     "pose.head_colors": VIEWS | {"pose.part_colors", "pose.second_pass"},
-    "pose.limb_colors": FOLLOWING | MIXTURES | {"pose.clear_views", "pose.second_pass", "pose.trust"},
+    "pose.limb_colors": FOLLOWING | BACK | {"pose.clear_views", "pose.second_pass", "pose.trust"},
     "pose.backward": FOLLOWING
-    | MIXTURES
+    | BACK
     | {"pose.backward", "pose.contacts", "pose.head_colors", "pose.limb_colors", "pose.occluders", "pose.second_pass"},
     "pose.contacts": BODY | IO,
     "pose.turned_by_keypoints": OBJECTIVES | {"pose.keypoint_cues"},

@@ -82,6 +82,13 @@ def test_tests_that_pages_name_are_there():
     assert not sorted((page, code) for page, code in tests if code not in there)
 
 
+def test_the_picture_of_the_house_has_all_rooms(tmp_path):
+    command = [sys.executable, "docs/draw_house.py", "--out", str(tmp_path / "house.png")]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "house.png").stat().st_size > 10_000
+
+
 def test_tables_are_those_of_the_stored_results():
     done = subprocess.run([sys.executable, "docs/make_tables.py", "--check"], cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr

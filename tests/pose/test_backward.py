@@ -13,17 +13,14 @@ from methods import HEIGHT_M, VOXEL_M, followed, tiny_clip, true_joints, true_tr
 
 import hmc
 from hmc.body.exchange import swapped_pose
-from hmc.body.joints import N_DOF
 from hmc.body.kinematics import landmarks
 from hmc.body.limbs import LIMBS
 from hmc.body.proportions import make_bodies
 from hmc.errors import InputError
 from hmc.io.masks import kept_frames
 from hmc.landmarks import LANDMARKS
-from hmc.pose import mixtures
 from hmc.pose.backward import backward
 from hmc.pose.follow import FollowOptions
-from hmc.pose.mixtures import mixed_poses, mixture
 from hmc.pose.registry import pose_method
 from hmc.pose.starts.own_body import LEAST_BODY_FRAMES, choose_frames
 from hmc.pose.turned import turn_about
@@ -78,7 +75,7 @@ def turned_about(people, wrong):
 
 @pytest.mark.parametrize(
     ("switch", "function"),
-    [("hidden_places", "backward.learn_hidden_places"), ("own_rays", "second_pass.with_own_rays"), ("best_way", "backward.choose_path")],
+    [("hidden_places", "backward.learn_hidden_places"), ("own_rays", "second_pass.with_own_rays")],
 )
 def test_what_is_switched_off_is_not_done(one_pass, monkeypatch, switch, function):
     people, run = one_pass
@@ -217,36 +214,6 @@ def test_without_silhouettes_on_disk_the_poses_stay_and_a_note_says_so(one_pass)
         found = second(people, without)
         assert found.poses is people.poses and "one pass" in found.notes[-1]
     assert second(people, run, pose_method("apf", passes=1)) is people
-
-
-def test_long_runs_are_joined_block_by_block(one_pass, monkeypatch):
-    people, run = one_pass
-    lost = with_a_lost_arm(people)
-    whole = second(lost, run)
-    monkeypatch.setattr(mixtures, "BLOCK", 4)
-    monkeypatch.setattr(mixtures, "CONTEXT", 3)
-    monkeypatch.setattr(mixtures, "AHEAD", 3)
-    np.testing.assert_allclose(second(lost, run).positions, whole.positions, atol=0.03)
-
-
-def test_mixtures_take_each_limb_from_one_pose_or_the_other():
-    rng = np.random.default_rng(0)
-    one, other = rng.normal(size=(2, N_DOF))
-    mixed = mixed_poses(one, other)
-    limbs = [{*limb.dofs.tolist(), *limb.end_dofs.tolist()} for limb in LIMBS.values()]
-    rest = set(range(N_DOF)) - set().union(*limbs)
-    expected = set()
-    for number in range(2 ** (1 + len(limbs))):
-        pose = np.empty(N_DOF)
-        for bit, part in enumerate([rest, *limbs]):
-            for dof in part:
-                pose[dof] = other[dof] if number >> bit & 1 else one[dof]
-        expected.add(pose.tobytes())
-    assert {pose.tobytes() for pose in mixed} == expected
-    np.testing.assert_array_equal(mixed[0], one)
-    np.testing.assert_array_equal(mixed[-1], other)
-    picks = np.arange(len(mixed))
-    np.testing.assert_array_equal(mixture(np.tile(one, (len(mixed), 1)), np.tile(other, (len(mixed), 1)), picks), mixed)
 
 
 @given(st.lists(st.one_of(st.floats(1e-6, 1e-2), st.just(float("nan"))), max_size=80), st.integers(1, 30))

@@ -5,9 +5,9 @@ from __future__ import annotations
 from functools import partial
 
 from hmc.body.joints import canton_limits, default_limits, stiff_limits
+from hmc.pose.back_settings import BackwardSettings
 from hmc.pose.legs import LegSettings, TellLegs
 from hmc.pose.method import PoseMethod
-from hmc.pose.mixtures import BackwardSettings
 from hmc.pose.recovery import Recovery
 from hmc.pose.starts.window import WindowStart
 from hmc.pose.steps.annealed import annealed, annealed_subject

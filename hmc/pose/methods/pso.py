@@ -9,9 +9,9 @@ from functools import partial
 import numpy as np
 
 from hmc.body.spin_skeleton import model_of_body, skeleton_landmarks, thesis_body
+from hmc.pose.back_settings import BackwardSettings
 from hmc.pose.legs import LegSettings, TellLegs
 from hmc.pose.method import Capture, FrameRng, PoseMethod, StartPose
-from hmc.pose.mixtures import BackwardSettings
 from hmc.pose.recovery import Recovery
 from hmc.pose.spectral.reading import ReadingSettings
 from hmc.pose.spectral.segmentation import printed_segmentation

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
+from hmc.pose.back_settings import BackwardSettings
 from hmc.pose.legs import LegSettings, TellLegs
 from hmc.pose.method import Capture, FrameRng, PoseMethod, StartPose, make_subject, other_rng
-from hmc.pose.mixtures import BackwardSettings
 from hmc.pose.objectives.multicue import CueSettings
 from hmc.pose.recovery import Recovery
 from hmc.pose.starts.da_vinci import find_da_vinci
