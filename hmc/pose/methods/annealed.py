@@ -35,9 +35,12 @@ def annealed_pose_step(preset: PosePreset):
         `hmc.pose.method.PoseStep`.
     """
     propose = structured(preset) if preset.models else annealed(preset)
-    step = as_proposed(propose) if preset.refine is None else polished(propose, preset.polish)
-    if preset.sparing is not None:
-        step = sparing(step, preset.polish, preset.sparing)
+    if preset.refine is None:
+        step = as_proposed(propose)
+    elif preset.sparing is None:
+        step = polished(propose, preset.polish)
+    else:
+        step = sparing(propose, preset.polish, preset.sparing)
     return step if preset.limbs is None else with_hidden_limbs(step, preset.limbs, preset.hull)
 
 

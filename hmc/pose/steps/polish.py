@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import TypeAlias
 
 import numpy as np
 
@@ -15,13 +16,25 @@ from hmc.pose.objectives.keypoints import KeypointCost, KeypointSettings
 from hmc.pose.objectives.objective import Objective, Sum
 from hmc.pose.objectives.symmetric import Symmetric, SymmetricSettings
 from hmc.pose.steps.limb_search import SearchSettings, lost_limbs, search_limbs
-from hmc.pose.steps.proposal import Propose, shows_enough
+from hmc.pose.steps.proposal import Proposal, Propose, shows_enough
 from hmc.pose.steps.refine import RefineInfo, RefineSettings, refine_all
 from hmc.pose.views.keypoint_pose import keypoint_pose
 from hmc.pose.views.person_view import PersonView
 from hmc.pose.views.rays import points_to_cover
 
-__all__ = ["MakeObjective", "PolishSettings", "fine_objective", "polish", "polished", "refined_starts", "searched"]
+__all__ = [
+    "MakeObjective",
+    "PolishSettings",
+    "after_proposal",
+    "best_searched",
+    "best_trial",
+    "fine_objective",
+    "polish",
+    "polished",
+]
+
+#: A refined start, and what its refinement came to.
+Trial: TypeAlias = tuple[np.ndarray, RefineInfo]
 
 
 @dataclass(frozen=True)
@@ -90,29 +103,26 @@ def polish(
         Square metres.
     evaluations : int
     """
-    estimate, info, evaluations = refined_starts(objective, starts, anchor, settings)
-    estimate, cost, more = searched(rng, objective, estimate, info, settings)
+    # Each to the end: a start that has moved a limb across costs more than one that has lost it until late in the refinement.
+    return best_searched(rng, objective, refine_all(objective, starts, settings.refine, anchor=anchor), settings)
+
+
+def best_searched(
+    rng: np.random.Generator, objective: Objective, trials: Sequence[Trial], settings: PolishSettings
+) -> tuple[np.ndarray, float, int]:
+    """The best of several refined starts, with limbs that the hulls contradict looked for; as `polish`, which refines them first."""
+    estimate, info = best_trial(trials)
+    evaluations = sum(one.evaluations for _, one in trials)
+    if settings.search is None or info.misfit is None:
+        return estimate, info.cost, evaluations
+    limbs = lost_limbs(rng, objective.body, estimate, info.misfit, settings.search)
+    estimate, cost, more = search_limbs(rng, objective, (estimate, info.cost), limbs, settings.refine, settings.search, info.misfit)
     return estimate, cost, evaluations + more
 
 
-def refined_starts(
-    objective: Objective, starts: Sequence[np.ndarray], anchor: np.ndarray, settings: PolishSettings
-) -> tuple[np.ndarray, RefineInfo, int]:
-    """The best of several starts, refined, with what its refinement came to, and the evaluations of all; as for `polish`."""
-    # Each to the end: a start that has moved a limb across costs more than one that has lost it until late in the refinement.
-    trials = refine_all(objective, starts, settings.refine, anchor=anchor)
-    estimate, info = min(trials, key=lambda trial: trial[1].cost_after)
-    return estimate, info, sum(one.evaluations for _, one in trials)
-
-
-def searched(
-    rng: np.random.Generator, objective: Objective, estimate: np.ndarray, info: RefineInfo, settings: PolishSettings
-) -> tuple[np.ndarray, float, int]:
-    """A refined pose with limbs that the hulls contradict looked for; state, cost and evaluations as for `polish`."""
-    if settings.search is None or info.misfit is None:
-        return estimate, info.cost, 0
-    limbs = lost_limbs(rng, objective.body, estimate, info.misfit, settings.search)
-    return search_limbs(rng, objective, (estimate, info.cost), limbs, settings.refine, settings.search, info.misfit)
+def best_trial(trials: Sequence[Trial]) -> Trial:
+    """The refined start of least cost."""
+    return min(trials, key=lambda trial: trial[1].cost_after)
 
 
 def polished(propose: Propose, settings: PolishSettings, make_objective: MakeObjective | None = None) -> PoseStep:
@@ -137,11 +147,21 @@ def polished(propose: Propose, settings: PolishSettings, make_objective: MakeObj
             objective: Objective = fine_objective(rng, tracked.subject, view, settings)
         else:
             objective = make_objective(rng, tracked.subject, view)
-        estimate, cost, more = polish(rng, objective, starts, tracked.state, settings)
-        after = Tracked(tracked.subject, estimate, estimate - tracked.state, found.memory)
-        evaluations = found.evaluations + more
-        return after, StepInfo(
-            "fitted", cost, evaluations, annealed=found.annealed, structural=found.structural, levels=found.levels, details=found.details
-        )
+        return after_proposal(tracked, found, polish(rng, objective, starts, tracked.state, settings))
 
     return step
+
+
+def after_proposal(tracked: Tracked, found: Proposal, refined: tuple[np.ndarray, float, int]) -> tuple[Tracked, StepInfo]:
+    """What a step gives back of a proposal that was refined; state, cost and evaluations as from `polish`."""
+    estimate, cost, more = refined
+    info = StepInfo(
+        "fitted",
+        cost,
+        found.evaluations + more,
+        annealed=found.annealed,
+        structural=found.structural,
+        levels=found.levels,
+        details=found.details,
+    )
+    return Tracked(tracked.subject, estimate, estimate - tracked.state, found.memory), info

@@ -142,6 +142,7 @@ def refine_all(
     anchor: np.ndarray | None = None,
     trial_steps: int = 3,
     same_m: float = 0.03,
+    ended_before: Sequence[np.ndarray] = (),
 ) -> list[tuple[np.ndarray, RefineInfo]]:
     """Several starts, each refined to the end unless its first steps bring it to where an earlier one ended: it would end there too.
 
@@ -154,6 +155,8 @@ def refine_all(
         As for `refine_best`.
     same_m : float
         Poses are at the same place when no landmark is farther apart, metres.
+    ended_before : sequence of ndarray, shape (37,), optional
+        Where other starts of the same objective ended.
 
     Returns
     -------
@@ -162,7 +165,7 @@ def refine_all(
     """
     problem, steps = _problem(objective, settings), _steps(settings)
     ended: list[_Trial] = []
-    places: list[np.ndarray] = []
+    places = [landmarks(objective.body, state) for state in ended_before]
     for start in starts:
         begun = gauss_newton_init(problem, start, steps, anchor, ended[-1].found.near if ended else None)
         trial = gauss_newton_run(problem, begun, steps, trial_steps)

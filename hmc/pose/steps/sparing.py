@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from hmc.body.limbs import LIMBS
-from hmc.pose.method import PoseStep, StepInfo, Tracked
+from hmc.pose.method import PoseStep, StepInfo, Tracked, unseen
 from hmc.pose.objectives.objective import Misfit
-from hmc.pose.steps.polish import PolishSettings, fine_objective, refined_starts, searched
-from hmc.pose.steps.proposal import shows_enough
-from hmc.pose.steps.refine import RefineInfo
+from hmc.pose.steps.polish import PolishSettings, after_proposal, best_searched, best_trial, fine_objective
+from hmc.pose.steps.proposal import Proposal, Propose, shows_enough
+from hmc.pose.steps.refine import RefineInfo, refine_all
 from hmc.pose.views.keypoint_pose import keypoint_pose
 from hmc.pose.views.person_view import PersonView
 
@@ -47,24 +47,30 @@ class SparingSettings:
     memory_s: float = 1.0
 
 
-def sparing(step: PoseStep, settings: PolishSettings, when: SparingSettings) -> PoseStep:
-    """A step that is done only in frames that are not as expected.
+def sparing(propose: Propose, settings: PolishSettings, when: SparingSettings) -> PoseStep:
+    """A step that searches only in frames that are not as expected, and refines what a search proposes.
 
     Parameters
     ----------
-    step : callable
-        `PoseStep`, of a cost in the terms of `settings`.
+    propose : callable
+        `hmc.pose.steps.proposal.Propose`: the search.
     settings : PolishSettings
-        How the expected pose is refined, and limbs looked for.
+        How expected and proposed poses are refined, and limbs looked for.
     when : SparingSettings
     """
 
-    def spared(rng: np.random.Generator, tracked: Tracked, view: PersonView) -> tuple[Tracked, StepInfo]:
+    def step(rng: np.random.Generator, tracked: Tracked, view: PersonView) -> tuple[Tracked, StepInfo]:
         if not shows_enough(view.target):
-            return step(rng, tracked, view)
+            return unseen(tracked)
         usual = float(tracked.memory.get(_NAME, np.nan))
-        found = _as_expected(rng, tracked, view, settings, when, usual) if np.isfinite(usual) else None
-        after, info = found or step(rng, tracked, view)
+        objective = fine_objective(rng, tracked.subject, view, settings)
+        found = Proposal(tracked.state, tracked.state)  # of no search
+        trials = refine_all(objective, _expected(tracked, view), settings.refine, tracked.state)
+        if not _fits(best_trial(trials)[1], usual, when):
+            found = propose(rng, tracked, view)
+            if found.status == "fitted":
+                trials += refine_all(objective, [found.best], settings.refine, tracked.state, ended_before=[state for state, _ in trials])
+        after, info = after_proposal(tracked, found, best_searched(rng, objective, trials, settings))
         if not info.cost > 0:
             return after, info
         level = float(np.log(info.cost))
@@ -72,25 +78,18 @@ def sparing(step: PoseStep, settings: PolishSettings, when: SparingSettings) -> 
         usual = level if np.isnan(usual) else usual + share * (level - usual)
         return Tracked(after.subject, after.state, after.velocity, {**after.memory, _NAME: np.array(usual)}), info
 
-    return spared
+    return step
 
 
-def _as_expected(
-    rng: np.random.Generator, tracked: Tracked, view: PersonView, settings: PolishSettings, when: SparingSettings, usual: float
-) -> tuple[Tracked, StepInfo] | None:
-    """The pose to which the last motion leads, refined; None where it does not fit as usual. The random numbers go on either way."""
+def _expected(tracked: Tracked, view: PersonView) -> list[np.ndarray]:
+    """Where the last motion leads, the last pose, and the pose of a detector's keypoints where there are any."""
     limits = tracked.subject.body.limits
     moved = np.clip(tracked.state + tracked.velocity, limits.low, limits.high)
-    objective = fine_objective(rng, tracked.subject, view, settings)
-    starts = [moved, tracked.state, *keypoint_pose(tracked.subject.body, view.keypoints, tracked.state)]
-    estimate, info, evaluations = refined_starts(objective, starts, tracked.state, settings)
-    if not _fits(info, usual, when):
-        return None
-    estimate, cost, more = searched(rng, objective, estimate, info, settings)
-    return Tracked(tracked.subject, estimate, estimate - tracked.state), StepInfo("fitted", cost, evaluations + more)
+    return [moved, tracked.state, *keypoint_pose(tracked.subject.body, view.keypoints, tracked.state)]
 
 
 def _fits(info: RefineInfo, usual: float, when: SparingSettings) -> bool:
+    """Whether a refined pose is as good as the frames before; never in the first one, whose usual cost is not a number."""
     if info.misfit is None or not 0 < info.cost <= when.ratio * np.exp(usual):
         return False
     return _largest_outside(info.misfit, when.far_m) <= when.outside_share
