@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import chain
 
 import numpy as np
 
@@ -25,6 +24,9 @@ from hmc.processes import share_out
 __all__ = ["DecidedFrames", "PersonState", "PersonTrack", "PoseTask", "end_person", "person_step", "resumed", "starts_with"]
 
 NO_START = "nothing to start from"
+#: Frames of which alternatives are found at once by several processes, which cost a hundredth of a second to start: their views are kept
+#: for so long.
+TOGETHER = 15
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,11 @@ class PoseTask:
         """Frames after which a frame is decided; 0: at once."""
         legs = self.method.legs
         return 0 if legs is None else max(1, round(legs.lag_s * self.capture.fps))
+
+    @property
+    def together(self) -> int:
+        """Frames of which alternatives are found at once: as they come, where nobody shares the work."""
+        return TOGETHER if self.capture.workers > 1 else 1
 
     def rng(self, person: int, frame: int) -> np.random.Generator:
         """The random numbers of a person's frame."""
@@ -89,12 +96,18 @@ class PersonTrack:
 
 @dataclass(frozen=True)
 class FollowedFrame:
-    """A frame that is followed and not decided yet."""
+    """A frame that is followed and not decided yet; its alternatives may still be to be found, from the random numbers and the view."""
 
     frame: int
     tracked: Tracked
     info: StepInfo
-    alternatives: Alternatives
+    find_from: tuple[np.random.Generator, PersonView] | None
+    found: Alternatives | None = None
+
+    @property
+    def alternatives(self) -> Alternatives:
+        """The poses between which later frames decide: that of the step, where there are no others."""
+        return self.found or self.info.alternatives or Alternatives(self.tracked.state[None], np.array([self.info.cost]))
 
 
 @dataclass(frozen=True)
@@ -188,11 +201,8 @@ def person_step(task: PoseTask, person: PersonTrack, state: PersonState, view: P
         stepped = task.method.step(rng, state.tracked, view)
         if task.method.recover is not None:
             stepped = task.method.recover(rng, state.tracked, stepped, view)
-        state = replace(
-            state,
-            tracked=stepped[0],
-            followed=(*state.followed, FollowedFrame(view.frame, *stepped, _alternatives(task, rng, stepped, view))),
-        )
+        followed = (*state.followed, _followed(task, rng, stepped, view))
+        state = replace(state, tracked=stepped[0], followed=_with_alternatives(task, followed, task.together))
     return _decide(task, person, state, is_last)
 
 
@@ -235,24 +245,24 @@ def _start(task: PoseTask, person: PersonTrack, state: PersonState) -> PersonSta
     if method.recover is not None:
         usual = method.recover.first(np.array([info.cost for _, info in path]))
         path = [(replace(tracked, memory={**tracked.memory, **usual}), info) for tracked, info in path]
-
-    def alternatives(some: range) -> list[Alternatives]:
-        return [_alternatives(task, frame_rng(k), path[k], views[k]) for k in some]
-
-    lots = [range(k, len(views), workers) for k in range(min(workers, len(views)))]
-    found = dict(
-        zip([k for lot in lots for k in lot], chain(*share_out([partial(alternatives, lot) for lot in lots], workers)), strict=True)
-    )
-    followed = tuple(FollowedFrame(view.frame, *path[k], found[k]) for k, view in enumerate(views))
+    followed = tuple(_followed(task, frame_rng(k), path[k], view) for k, view in enumerate(views))
+    followed = _with_alternatives(task, followed)
     return replace(state, subject=subject, tracked=path[-1][0], watched=(), followed=followed)
 
 
-def _alternatives(task: PoseTask, rng: np.random.Generator, stepped: StepResult, view: PersonView) -> Alternatives:
-    """The poses of a frame between which later ones decide: that of the step, where there are no others."""
-    tracked, info = stepped
+def _followed(task: PoseTask, rng: np.random.Generator, stepped: StepResult, view: PersonView) -> FollowedFrame:
+    return FollowedFrame(view.frame, *stepped, None if task.method.alternatives is None else (rng, view))
+
+
+def _with_alternatives(task: PoseTask, followed: tuple[FollowedFrame, ...], at_least: int = 1) -> tuple[FollowedFrame, ...]:
+    """The same frames with the alternatives of all, shared out, once so many lack them. No later frame is followed from them."""
     find = task.method.alternatives
-    found = info.alternatives if find is None else find(rng, stepped, view)
-    return found or Alternatives(tracked.state[None], np.array([info.cost]))
+    lacking = [] if find is None else [(row, *row.find_from) for row in followed if row.find_from is not None]
+    if find is None or len(lacking) < at_least:
+        return followed
+    tasks = [partial(find, rng, (row.tracked, row.info), view) for row, rng, view in lacking]
+    found = iter(share_out(tasks, task.capture.workers))
+    return tuple(row if row.find_from is None else replace(row, find_from=None, found=next(found)) for row in followed)
 
 
 def _decide(task: PoseTask, person: PersonTrack, state: PersonState, is_last: bool) -> tuple[PersonState, list[DecidedFrames]]:
@@ -260,8 +270,10 @@ def _decide(task: PoseTask, person: PersonTrack, state: PersonState, is_last: bo
     lag = task.lag
     # The window's frames were followed from its middle on; a run goes on from frames that were followed one after the other.
     enough = 2 * lag if state.context else task.window + lag
-    if state.subject is None or (lag and len(state.followed) < enough and not is_last):
+    subject = state.subject
+    if subject is None or (lag and len(state.followed) < enough and not is_last):
         return state, []
+    state = replace(state, followed=_with_alternatives(task, state.followed))
     picks = _picks(task, state)
     rows = state.followed if is_last else state.followed[: len(state.followed) - lag]
     chosen = [(row, int(pick)) for row, pick in zip(rows, picks, strict=False)]
@@ -271,7 +283,7 @@ def _decide(task: PoseTask, person: PersonTrack, state: PersonState, is_last: bo
         np.array([row.alternatives.states[pick] for row, pick in chosen]),
         tuple(replace(row.info, cost=float(row.alternatives.costs[pick])) if pick else row.info for row, pick in chosen),
         rows[-1].tracked,
-        state.subject.body,
+        subject.body,
     )
     state = replace(state, followed=state.followed[len(rows) :], context=_context(task, state.context, decided), done_to=rows[-1].frame)
     return state, [decided]
