@@ -120,11 +120,16 @@ class _FrameBorneOut:
 
 @dataclass(frozen=True)
 class _Placed:
-    """A person in one frame: the surface, its points in the world, and the landmarks, metres."""
+    """The people in one frame: points of all surfaces in the world, metres, whose each is, of which chain, and whether it is known where;
+    person by person the points' landmarks and how many each landmark has, and where landmarks are."""
 
-    flesh: _Flesh
     points: np.ndarray
-    landmarks: np.ndarray
+    person: np.ndarray
+    chain: np.ndarray
+    known: np.ndarray
+    of_landmark: list[np.ndarray]
+    counts: np.ndarray
+    landmarks: list[np.ndarray]
 
 
 def _frames_borne_out(rig: Rig, steps: Iterable[MaskStep], states: PoseStates) -> Iterator[_FrameBorneOut]:
@@ -134,18 +139,14 @@ def _frames_borne_out(rig: Rig, steps: Iterable[MaskStep], states: PoseStates) -
     for step in steps:
         rows = np.flatnonzero((states.frames == step.index) & posed).tolist()
         whole = np.array([0 if mask is None else np.count_nonzero(mask) for mask in step.masks])
-        people = []
-        for row in rows:
-            # What is not known of a limb is NaN, and so is where its flesh is: it falls on no pixel.
-            body, own = bodies[int(states.persons[row])], flesh[int(states.persons[row])]
-            points = place_points(*segment_transforms(body, states.states[row]), own.points, own.segment)
-            people.append(_Placed(own, points, landmarks(body, states.states[row])))
+        people = [(flesh[number], bodies[number], states.states[row]) for row in rows for number in [int(states.persons[row])]]
+        placed = _placed(people) if people else None
         views = np.zeros((len(rows), len(LANDMARKS)), int)
         shown, denied, bare_m2 = np.zeros((3, *views.shape))
         covered = np.zeros(len(rig))
         for k, (camera, mask) in enumerate(zip(rig, step.masks, strict=True)):
-            if rows and mask is not None:
-                seen = _seen_by(camera, mask, people)
+            if placed is not None and mask is not None:
+                seen = _seen_by(camera, mask, placed)
                 views += seen.shown > CLEAR_SHARE
                 shown += seen.shown
                 denied += seen.denied
@@ -222,24 +223,37 @@ class _Seen:
     covered: int
 
 
-def _seen_by(camera: Camera, mask: np.ndarray, people: Sequence[_Placed]) -> _Seen:
-    points = np.concatenate([one.points for one in people])
-    person = np.repeat(np.arange(len(people)), [len(one.points) for one in people])
-    chain = np.concatenate([one.flesh.chain for one in people])
+def _placed(people: Sequence[tuple[_Flesh, BodyModel, np.ndarray]]) -> _Placed:
+    """Some people, each with body and pose (37,)."""
+    # What is not known of a limb is NaN, and so is where its flesh is: it falls on no pixel.
+    of_each = [place_points(*segment_transforms(body, state), own.points, own.segment) for own, body, state in people]
+    points = np.concatenate(of_each)
     known = np.isfinite(points).all(axis=1)
-    column, row, seen = pixel_of_voxel(camera, np.where(known[:, None], points, 0.0))
-    seen &= known
-    side, (n_rows, n_columns) = cell_grid(camera, points[known], CELL_M)
+    return _Placed(
+        np.where(known[:, None], points, 0.0),
+        np.repeat(np.arange(len(people)), [len(one) for one in of_each]),
+        np.concatenate([own.chain for own, _, _ in people]),
+        known,
+        [own.of_landmark for own, _, _ in people],
+        np.array([np.maximum(own.of_landmark.sum(axis=0), 1) for own, _, _ in people]),
+        [landmarks(body, state) for _, body, state in people],
+    )
+
+
+def _seen_by(camera: Camera, mask: np.ndarray, people: _Placed) -> _Seen:
+    person, chain, n_people = people.person, people.chain, len(people.landmarks)
+    column, row, seen = pixel_of_voxel(camera, people.points)
+    seen &= people.known
+    side, (n_rows, n_columns) = cell_grid(camera, people.points[people.known], CELL_M)
     cell = row // side * n_columns + column // side
-    there = np.zeros((len(people), _N_CHAINS, n_rows * n_columns), bool)
+    there = np.zeros((n_people, _N_CHAINS, n_rows * n_columns), bool)
     there[person[seen], chain[seen], cell[seen]] = True
     chains_in, people_in = there.sum(axis=(0, 1))[cell], there.any(axis=1).sum(axis=0)[cell]
     alone = seen & np.where(chain > 0, chains_in == 1, people_in == 1)
     inside = mask[row, column]
-    counts = np.array([np.maximum(one.flesh.of_landmark.sum(axis=0), 1) for one in people])
     shown, denied = (
         # Counts, whole numbers that single precision holds.
-        np.array([clear[person == k].astype(np.float32) @ one.flesh.of_landmark for k, one in enumerate(people)], float) / counts
+        np.array([clear[person == k].astype(np.float32) @ own for k, own in enumerate(people.of_landmark)], float) / people.counts
         for clear in (alone & inside, alone & ~inside)
     )
     cells = np.zeros((n_rows, n_columns), np.uint8)
@@ -249,7 +263,7 @@ def _seen_by(camera: Camera, mask: np.ndarray, people: Sequence[_Placed]) -> _Se
     pixels = _in_cells(mask, side, (n_rows, n_columns))
     full = 2 * pixels > side**2
     bare = (np.argwhere(full & (wide == 0))[:, ::-1] + 0.5) * side
-    bare_m2 = np.array([_bare_near(camera, one.landmarks, bare, side) for one in people])
+    bare_m2 = np.array([_bare_near(camera, places, bare, side) for places in people.landmarks])
     return _Seen(shown, denied, bare_m2, int(pixels[wide > 0].sum()))
 
 
