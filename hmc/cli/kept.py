@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from hmc.cli.common import selected_workers
 from hmc.io.files import real_path
 
 __all__ = ["MASKS", "add_silhouette_options", "given_silhouettes", "leave_silhouettes", "silhouettes_source", "take_silhouettes"]
@@ -86,7 +87,7 @@ def take_silhouettes(given, recording, masks: Path, key: str, on_problem: Callab
 
 def leave_silhouettes(args: argparse.Namespace, recording, key: str, on_problem: Callable[[str], None]) -> None:
     """Leave the silhouettes of a run that is over in its folder, unless they are not wanted."""
-    from hmc.io.masks import kept_masks
+    from hmc.io.masks import kept_frames, kept_masks
     from hmc.io.silhouettes import SILHOUETTES, remove_silhouettes, write_silhouettes
 
     if real_path(args.out) == real_path(recording.path):
@@ -94,9 +95,10 @@ def leave_silhouettes(args: argparse.Namespace, recording, key: str, on_problem:
             on_problem(f"{args.out / SILHOUETTES}: is the recording's own; silhouettes are not kept; give --out another folder")
         return
     first, last = recording.start, recording.start + recording.n_frames
-    steps = kept_masks(args.out / MASKS, key, first, last) if args.silhouettes else None
-    if steps is not None:
-        write_silhouettes(args.out, recording, steps)
+    masks, workers = args.out / MASKS, selected_workers(args)
+    if args.silhouettes and kept_masks(masks, key, first, last) is not None:
+        lots = [kept_frames(masks, key, range(first + k, last, workers)) or () for k in range(workers)]
+        write_silhouettes(args.out, recording, lots, workers)
         return
     remove_silhouettes(args.out)
     if args.silhouettes:

@@ -9,8 +9,9 @@ A camera that told nothing in a frame has no file of it. ``doubtful/CAMERA/`` ha
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -22,6 +23,7 @@ from hmc.io.door import read_image
 from hmc.io.masks import MaskStep
 from hmc.io.recording import Recording
 from hmc.io.results import read_run
+from hmc.processes import share_out
 
 __all__ = ["DOUBTFUL", "SILHOUETTES", "KeptSilhouettes", "open_silhouettes", "remove_silhouettes", "write_silhouettes"]
 
@@ -118,7 +120,7 @@ def open_silhouettes(directory: str | Path) -> KeptSilhouettes | None:
     return KeptSilhouettes(directory, tuple(names), first, first + n_frames)
 
 
-def write_silhouettes(directory: str | Path, recording: Recording, steps: Iterable[MaskStep]) -> int:
+def write_silhouettes(directory: str | Path, recording: Recording, lots: Sequence[Iterable[MaskStep]], workers: int = 1) -> int:
     """Write silhouettes into a result's folder. They appear there when all are written, in place of others from before.
 
     Parameters
@@ -127,7 +129,10 @@ def write_silhouettes(directory: str | Path, recording: Recording, steps: Iterab
         Of the result.
     recording : Recording
         Of which they are; its images may be smaller than recorded.
-    steps : iterable of MaskStep
+    lots : sequence of iterable of MaskStep
+        Each frame in one of them.
+    workers : int
+        Processes that share the lots, at most.
 
     Returns
     -------
@@ -139,17 +144,13 @@ def write_silhouettes(directory: str | Path, recording: Recording, steps: Iterab
     InputError
         When they cannot be written.
     """
-    directory, written = Path(directory), 0
+    directory = Path(directory)
     part = directory / PART
     try:
         shutil.rmtree(part, ignore_errors=True)
         for name in recording.rig.names:
             (part / SILHOUETTES / name).mkdir(parents=True)
-        for step in steps:
-            for kind, masks in ((SILHOUETTES, step.masks), (DOUBTFUL, step.doubtful)):
-                for name, mask, factor, size in zip(recording.rig.names, masks, recording.factors, recording.file_sizes, strict=True):
-                    if mask is not None:
-                        written += _write(_file(part, kind, name, step.index), _as_recorded(mask, factor, size))
+        written = sum(share_out([partial(_write_lot, part, recording, steps) for steps in lots], workers))
         remove_silhouettes(directory)
         for folder in (part / DOUBTFUL, part / SILHOUETTES):
             if folder.is_dir():
@@ -160,6 +161,17 @@ def write_silhouettes(directory: str | Path, recording: Recording, steps: Iterab
         ) from None
     finally:
         shutil.rmtree(part, ignore_errors=True)
+    return written
+
+
+def _write_lot(directory: Path, recording: Recording, steps: Iterable[MaskStep]) -> int:
+    """Write some frames, and tell the bytes of their files."""
+    written = 0
+    for step in steps:
+        for kind, masks in ((SILHOUETTES, step.masks), (DOUBTFUL, step.doubtful)):
+            for name, mask, factor, size in zip(recording.rig.names, masks, recording.factors, recording.file_sizes, strict=True):
+                if mask is not None:
+                    written += _write(_file(directory, kind, name, step.index), _as_recorded(mask, factor, size))
     return written
 
 
@@ -178,7 +190,7 @@ def _as_recorded(mask: np.ndarray, factor: int, size: tuple[int, int]) -> np.nda
     white = mask.view(np.uint8) * np.uint8(255)
     if factor == 1:
         return white
-    blocks = np.repeat(np.repeat(white, factor, axis=0), factor, axis=1)
+    blocks = cv2.resize(white, None, fx=factor, fy=factor, interpolation=cv2.INTER_NEAREST)
     out = np.zeros(size[::-1], np.uint8)
     out[: blocks.shape[0], : blocks.shape[1]] = blocks
     return out

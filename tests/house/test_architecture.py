@@ -43,7 +43,7 @@ MAY_IMPORT = {
     "errors": set(),
     "landmarks": {"errors"},
     "camera": BASE,
-    "io": IO,
+    "io": IO | {"processes"},
     "search": BASE,
     "voxels": VOXELS,
     "tracking": TRACKING | {"plugins"},

@@ -1,7 +1,9 @@
 """Silhouettes kept with a result: what Pillow and the recording's own reader see in them, and what comes back."""
 
+import errno
 import shutil
 from dataclasses import replace
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -30,7 +32,7 @@ def steps_of(recording, seed, doubts=()):
 
 
 def keep(out, recording, steps):
-    written = write_silhouettes(out, recording, steps)
+    written = write_silhouettes(out, recording, [steps])
     told = {"cameras": list(recording.rig.names), "start": recording.start, "frames": recording.n_frames}
     write_toml(out / "run.toml", {"parameters": told})
     return written
@@ -98,11 +100,36 @@ def test_others_take_the_place_of_those_from_before_whole_or_not_at_all(recordin
         raise RuntimeError
 
     with pytest.raises(RuntimeError):
-        write_silhouettes(tmp_path, recording, killed())
+        write_silhouettes(tmp_path, recording, [killed()])
     assert {path: path.read_bytes() for path in tmp_path.rglob("*.png")} == before
     keep(tmp_path, recording, steps_of(recording, 2))
     after = {path: path.read_bytes() for path in tmp_path.rglob("*.png")}
     assert len(after) == 6 * 5 - 1 and all(after[path] != before[path] for path in after)
+
+
+def test_processes_that_share_the_frames_write_the_same(recording_folder, tmp_path):
+    recording = open_recording(recording_folder, frames=6)
+    steps = list(steps_of(recording, 1, doubts=(4,)))
+    sizes = [write_silhouettes(tmp_path / str(n), recording, [steps[k::n] for k in range(n)], workers=n) for n in (1, 2, 4)]
+    alone, *shared = [
+        {path.relative_to(tmp_path / str(n)): path.read_bytes() for path in (tmp_path / str(n)).rglob("*.png")} for n in (1, 2, 4)
+    ]
+    assert len(alone) == 7 * 5 - 1 and shared == [alone, alone] and sizes == [sum(map(len, alone.values()))] * 3
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_disk_that_takes_no_more_is_told_by_whoever_writes(recording_folder, tmp_path, monkeypatch, workers):
+    recording = open_recording(recording_folder, frames=6)
+    steps = list(steps_of(recording, 1))
+
+    def full(path, data):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    out = tmp_path / "result"
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(InputError, match=r"silhouettes: cannot be written \(No space left on device\); --no-silhouettes leaves it out"):
+        write_silhouettes(out, recording, [steps[:3], steps[3:]], workers)
+    assert not list(out.iterdir())
 
 
 def test_what_they_lack_of_a_selection_is_said(recording_folder, tmp_path):
