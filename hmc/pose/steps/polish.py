@@ -25,6 +25,7 @@ from hmc.pose.views.rays import points_to_cover
 __all__ = [
     "MakeObjective",
     "PolishSettings",
+    "Trial",
     "after_proposal",
     "best_searched",
     "best_trial",
