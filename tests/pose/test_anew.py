@@ -51,7 +51,7 @@ def with_states(people, states):
 def with_an_arm_for_a_head(people):
     """The same, but from a frame on the head is bent into the chest, and an arm is where it was."""
     states = people.states.states.copy()
-    states[ASTRAY, dof_index("torso_y", "neck_y", "r_shoulder_x")] += np.radians([50, 60, -140])
+    states[ASTRAY, dof_index("torso_y", "neck_y", "r_shoulder_x")] += np.radians([60, 60, -140])
     return with_states(people, states)
 
 
