@@ -9,7 +9,7 @@ import numpy as np
 from hmc.body.model import BodyModel
 from hmc.body.proportions import DEFAULT_LENGTHS, make_body
 
-__all__ = ["FITTED", "FitBodySettings", "highest_shape", "prior_deviations", "reshaped"]
+__all__ = ["FITTED", "FitBodySettings", "highest_shape", "prior_deviations", "reshaped", "whole_deviations"]
 
 #: Fitted dimensions. Foot and ankle height only follow the common scale: hulls show them badly.
 _BONES = ("trunk", "head", "shoulder_half_width", "shoulder_drop", "hip_half_width", "upper_arm", "forearm", "thigh", "shank")
@@ -49,6 +49,19 @@ def prior_deviations(settings: FitBodySettings) -> np.ndarray:
     own = {"height": settings.scale_deviation, "hand": settings.hand_deviation}
     own |= dict.fromkeys(_BONES, settings.length_deviation) | dict.fromkeys(_GIRTHS, settings.girth_deviation)
     return np.array([own[name] for name in FITTED])
+
+
+def whole_deviations(covariance: np.ndarray) -> np.ndarray:
+    """How well each of `FITTED` is known as a whole, where lengths are their own factor times the common scale, shape (17,).
+
+    Parameters
+    ----------
+    covariance : ndarray, shape (17, 17)
+        Of the logarithms of the factors.
+    """
+    whole = np.eye(len(FITTED))
+    whole[[FITTED.index(name) for name in (*_BONES, "hand")], FITTED.index("height")] = 1
+    return np.asarray(np.sqrt(np.einsum("ij,jk,ik->i", whole, covariance, whole)))
 
 
 def highest_shape(body: BodyModel) -> np.ndarray:

@@ -263,6 +263,9 @@ def _run(args: argparse.Namespace, held: ExitStack) -> int:
     trust = trust_summary(people.poses)
     said = ({"trust": trust} if trust else {}) | {"options": told_options(args), "problems": gather_problems(problems)}
     said |= cameras_table(faults)
+    if people.known:
+        in_percent = {str(person): {name: round(100 * one, 1) for name, one in told.items()} for person, told in people.known.items()}
+        said["bodies"] = {"known_to_percent": in_percent}
     said["written"] = written_digests([paths[result] for result in RESULT[:3]])
     write_run(paths["run.toml"], name, parameters, args.seed, **source, **said)
     for name in (JOURNAL, POSE_JOURNAL, BACK_JOURNAL, MARKERS_JOURNAL, MASKS):

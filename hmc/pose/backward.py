@@ -25,6 +25,7 @@ from functools import partial
 
 import numpy as np
 
+from hmc.body.dimensions import FITTED
 from hmc.body.exchange import swapped_pose
 from hmc.body.kinematics import landmarks
 from hmc.body.model import BodyModel
@@ -142,10 +143,13 @@ def backward(
     pass_ = replace(pass_, states=people.states, footing=footing)
     if records:
         bodies = make_bodies({int(person): body for person, body in records[0]["bodies"].items()}, method.limits)
+        known = {int(person): told for person, told in records[0]["known"].items()}
     else:
-        bodies = _bodies(pass_, people, fitted)
+        bodies, known = _bodies(pass_, people, fitted)
         if run.journal is not None:
-            append_journal(run.journal, {"turned_frames": turned, "bodies": {person: body.dimensions for person, body in bodies.items()}})
+            dimensions = {person: body.dimensions for person, body in bodies.items()}
+            append_journal(run.journal, {"turned_frames": turned, "bodies": dimensions, "known": known})
+    people = replace(people, known=known)
     pass_ = _with_beside(pass_, people, fitted, bodies)
     persons = {person: _begun(people, fitted, person, make_subject(body, pass_.capture)) for person, body in bodies.items()}
     if settings.anew is not None:
@@ -190,12 +194,12 @@ def _with_beside(pass_: SecondPass, people: PosedPeople, fitted: np.ndarray, bod
     return replace(pass_, capture=replace(pass_.capture, beside=learn_beside([beside for beside, _ in found], [cost for _, cost in found])))
 
 
-def _bodies(pass_: SecondPass, people: PosedPeople, fitted: np.ndarray) -> dict[int, BodyModel]:
-    """Every person's body, fitted to frames of the whole run where others bear it out."""
-    settings, bodies = pass_.settings, dict(pass_.bodies)
+def _bodies(pass_: SecondPass, people: PosedPeople, fitted: np.ndarray) -> tuple[dict[int, BodyModel], dict[int, dict[str, float]]]:
+    """Every person's body, fitted to frames of the whole run where others bear it out, and how well each dimension is known."""
+    settings, bodies, known = pass_.settings, dict(pass_.bodies), dict[int, dict[str, float]]()
     persons = {number: _begun(people, fitted, number, make_subject(body, pass_.capture)) for number, body in bodies.items()}
     if settings.fit_body is None:
-        return bodies
+        return bodies, known
     chosen = {number: choose_frames(people.costs[person.rows], settings.body_frames) for number, person in persons.items()}
     wanted = {number: {int(people.frames[persons[number].rows[k]]) for part in parts for k in part} for number, parts in chosen.items()}
     poses: dict[int, dict[int, tuple[Objective, np.ndarray]]] = {number: {} for number in persons}
@@ -211,7 +215,7 @@ def _bodies(pass_: SecondPass, people: PosedPeople, fitted: np.ndarray) -> dict[
             poses[number][persons[number].row_of[frame]] = objective, own
     for number, person in persons.items():
         picks, held_out = ([k for k in part if k in poses[number]] for part in chosen[number])
-        bodies[number] = own_body(
+        subject, deviations = own_body(
             person.subject,
             poses[number],
             (picks, held_out),
@@ -219,8 +223,9 @@ def _bodies(pass_: SecondPass, people: PosedPeople, fitted: np.ndarray) -> dict[
             settings.polish.refine,
             SURFACE_POINTS,
             partial(make_subject, capture=pass_.capture),
-        ).body
-    return bodies
+        )
+        bodies[number], known[number] = subject.body, dict(zip(FITTED, deviations, strict=True))
+    return bodies, known
 
 
 def _followed_wrongly(pass_: SecondPass, people: PosedPeople, fitted: np.ndarray) -> dict[int, list[int]]:

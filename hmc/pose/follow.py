@@ -77,6 +77,9 @@ class PosedPeople(FinishedPeople):
         What trust rests on (`hmc.io.evidence.EVIDENCE`); None where silhouettes were not asked.
     turned : mapping of str to ndarray, shape (3,)
         Cameras that were turned back before poses were found (`hmc.pose.turned_back`).
+    known : mapping of int to mapping of str to float
+        How well each fitted dimension of each person's body is known: deviation of its logarithm. Of methods that fit none over the run
+        none.
     """
 
     poses: PoseTable
@@ -89,6 +92,7 @@ class PosedPeople(FinishedPeople):
     passes_apart: np.ndarray | None = None
     evidence: Mapping[str, np.ndarray] | None = None
     turned: Mapping[str, np.ndarray] = field(default_factory=dict)
+    known: Mapping[int, Mapping[str, float]] = field(default_factory=dict)
 
     @property
     def frames(self) -> np.ndarray:

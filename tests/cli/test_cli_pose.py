@@ -11,6 +11,7 @@ from drawn import draw_recording
 from methods import TINY, lean_method
 from numpy.testing import assert_array_equal
 
+from hmc.body.dimensions import FITTED, FitBodySettings, prior_deviations, whole_deviations
 from hmc.cli import main
 from hmc.cli import pose as command
 from hmc.io.recording import open_recording
@@ -79,6 +80,8 @@ def test_a_run_leaves_its_files_and_its_silhouettes_and_nothing_else(finished):
         assert_array_equal(table.frames, joints.frames)
         assert_array_equal(table.persons, joints.persons)
     assert run["method"] == "apf" and run["seed"] == 0
+    known = run["bodies"]["known_to_percent"]["0"]
+    assert list(known) == list(FITTED) and known["height"] == 10.0 and known["girth_arms"] == 20.0  # five frames tell too little
     # Of five coarse frames, with little work, the one or the other landmark is not trusted; nothing else is odd.
     assert len(run["problems"]) <= 1 and all("by their trust" in line for line in run["problems"])
     assert run["parameters"]["voxel_size_m"] == 0.05 and run["parameters"]["preset"]["name"] == "default"
@@ -93,6 +96,8 @@ def test_of_a_good_run_nothing_is_told(tmp_path, monkeypatch):
     assert pose(tmp_path, "--frames", "8") == 0
     run, joints, truth = read_run(tmp_path / "run.toml"), read_joints(tmp_path / "joints.csv"), read_joints(TINY / "truth" / "joints.csv")
     assert run["problems"] == []
+    by_the_prior = 100 * whole_deviations(np.diag(prior_deviations(FitBodySettings()) ** 2))
+    assert all(0 < told < prior for told, prior in zip(run["bodies"]["known_to_percent"]["0"].values(), by_the_prior, strict=True))
     assert np.median(np.linalg.norm(joints.positions - truth.where(truth.frames < 8).positions, axis=-1)) < 0.03
 
 

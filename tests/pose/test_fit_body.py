@@ -8,13 +8,13 @@ from acted import act
 from numpy.testing import assert_allclose
 from posed import COST, body_of, mean_error, true_state
 
-from hmc.body.dimensions import FITTED, FitBodySettings, reshaped
+from hmc.body.dimensions import FITTED, FitBodySettings, prior_deviations, reshaped, whole_deviations
 from hmc.body.flesh import surface_coordinates
 from hmc.body.joints import N_DOF
 from hmc.body.kinematics import landmarks
 from hmc.body.proportions import DEFAULT_LENGTHS, default_body
 from hmc.pose.objectives.symmetric import Symmetric, body_points
-from hmc.pose.starts.fit_body import fit_body
+from hmc.pose.starts.fit_body import _Prior, _without_poses, fit_body
 from hmc.pose.steps.refine import RefineSettings, refine
 from hmc.pose.views.rays import points_to_cover
 
@@ -157,3 +157,49 @@ def test_pairs_chosen_for_another_body_give_the_same_distances():
         found, fresh = there.linearise(state, near), there.linearise(state)
         assert_allclose(np.minimum(found.nearest.distance, COST.cap_m), np.minimum(fresh.nearest.distance, COST.cap_m), atol=1e-9)
         assert_allclose(found.residuals, fresh.residuals, atol=1e-9)
+
+
+def test_how_well_dimensions_are_known_is_what_the_whole_problem_says():
+    """Poses and dimensions of three frames in one dense matrix, inverted: what is left for the dimensions when poses are not known."""
+    rng, n_frames, n_shape = np.random.default_rng(0), 3, len(FITTED)
+    frames = [(rng.normal(size=200), rng.normal(size=(200, N_DOF)), rng.normal(size=(200, n_shape))) for _ in range(n_frames)]
+    precision, hold = rng.uniform(1, 50, n_shape), rng.uniform(1, 9, N_DOF)
+    limits = default_body(1.7).limits
+    states = np.repeat((np.maximum(limits.low, -9) + np.minimum(limits.high, 9))[None] / 2, n_frames, axis=0)
+    prior = _Prior(states, hold, precision, np.full(n_shape, np.inf))
+    told, _, _ = _without_poses(frames, np.zeros(n_shape), states, prior, 0.0, limits)
+    n = n_shape + n_frames * N_DOF
+    dense = np.zeros((n, n))
+    dense[:n_shape, :n_shape] = np.diag(n_frames * precision)
+    for k, (_, by_pose, by_shape) in enumerate(frames):
+        own = slice(n_shape + k * N_DOF, n_shape + (k + 1) * N_DOF)
+        rows = np.zeros((len(by_pose), n))
+        rows[:, :n_shape], rows[:, own] = by_shape, by_pose
+        dense += rows.T @ rows
+        dense[own, own] += np.diag(hold)
+    assert_allclose(np.linalg.inv(told), np.linalg.inv(dense)[:n_shape, :n_shape], rtol=1e-8)
+
+
+def test_a_length_is_known_with_the_scale_that_it_follows():
+    settings = FitBodySettings()
+    by_the_prior = dict(zip(FITTED, whole_deviations(np.diag(prior_deviations(settings) ** 2)), strict=True))
+    assert by_the_prior["height"] == settings.scale_deviation and by_the_prior["girth_arms"] == settings.girth_deviation
+    assert by_the_prior["thigh"] == pytest.approx(np.hypot(settings.scale_deviation, settings.length_deviation))
+    # A thigh that grows as the scale shrinks is known however little is known of either.
+    covariance = np.diag(prior_deviations(settings) ** 2)
+    height, thigh = FITTED.index("height"), FITTED.index("thigh")
+    covariance[np.ix_([height, thigh], [height, thigh])] = [[0.01, -0.01], [-0.01, 0.01]]
+    assert whole_deviations(covariance)[thigh] == pytest.approx(0, abs=1e-12)
+
+
+def test_what_frames_show_is_known_better_than_by_the_prior_and_no_frame_makes_it_worse():
+    acted = act("gesture", cameras=7, height_m=1.75)
+    objectives, states = start(acted, 1.7)
+    coordinates, settings = surface_coordinates(objectives[0].body, 200), FitBodySettings(iterations=1)
+    by_the_prior = whole_deviations(np.diag(prior_deviations(settings) ** 2))
+    few, many = (np.array(fit_body(objectives[:n], states[:n], coordinates, settings)[2].deviations) for n in (1, 6))
+    assert (few < by_the_prior).all() and (many < by_the_prior).all()
+    shown = [FITTED.index(name) for name in ("height", "thigh", "shank", "trunk", "girth_torso")]
+    assert (many[shown] < 0.5 * by_the_prior[shown]).all()
+    nothing = fit_body(objectives, states, coordinates, FitBodySettings(iterations=0))[2].deviations
+    assert_allclose(nothing, by_the_prior)

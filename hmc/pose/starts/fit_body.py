@@ -14,7 +14,7 @@ from functools import partial
 
 import numpy as np
 
-from hmc.body.dimensions import FITTED, FitBodySettings, highest_shape, prior_deviations, reshaped
+from hmc.body.dimensions import FITTED, FitBodySettings, highest_shape, prior_deviations, reshaped, whole_deviations
 from hmc.body.joints import N_DOF, JointLimits
 from hmc.body.model import BodyModel
 from hmc.pose.objectives.objective import Objective
@@ -35,10 +35,19 @@ Coordinates = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 @dataclass(frozen=True)
 class FitBodyInfo:
-    """Mean cost a frame (square metres) before and after."""
+    """What a fit came to.
+
+    Parameters
+    ----------
+    cost_before, cost_after : float
+        Mean of a frame, square metres.
+    deviations : tuple of n_fitted floats
+        How well the frames and the prior tell each dimension: deviation of its logarithm, by the weight of the prior against the cost.
+    """
 
     cost_before: float
     cost_after: float
+    deviations: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -130,8 +139,11 @@ def fit_body(
 
     total, before, found = costs(shape, states, [None] * len(states))
     after, damping = before, 1e-2
+    covariance = np.diag(prior_deviations(settings) ** 2)
     for _ in range(settings.iterations):
         frames, near = rows(shape, states, found), [one.near for one in found]
+        told, _, _ = _without_poses(frames, shape, states, prior, 0.0, body.limits)
+        covariance = len(states) * settings.prior_weight * np.linalg.inv(told)
         for _ in range(4):
             trial_shape, trial_states = _gauss_newton(frames, shape, states, prior, damping, body.limits)
             trial_total, trial_fit, trial_found = costs(trial_shape, trial_states, near)
@@ -145,11 +157,11 @@ def fit_body(
         damping = max(0.3 * damping, 1e-3)
         if gain < 3e-3:
             break
-    return reshaped(body, shape), states, FitBodyInfo(before, after)
+    return reshaped(body, shape), states, FitBodyInfo(before, after, tuple(whole_deviations(covariance).tolist()))
 
 
-def _gauss_newton(frames, shape: np.ndarray, states: np.ndarray, prior: _Prior, damping: float, limits: JointLimits):
-    """One damped step of shape and poses together, the poses eliminated."""
+def _without_poses(frames, shape: np.ndarray, states: np.ndarray, prior: _Prior, damping: float, limits: JointLimits):
+    """Normal matrix and gradient of the shape, the poses eliminated; and of each frame what moves, and how by the shape and by itself."""
     n_shape = len(shape)
     matrix = np.diag(len(states) * prior.precision)
     gradient = len(states) * prior.precision * shape
@@ -163,6 +175,13 @@ def _gauss_newton(frames, shape: np.ndarray, states: np.ndarray, prior: _Prior, 
         matrix += by_shape.T @ by_shape - cross.T @ inverse[:, :n_shape]
         gradient += by_shape.T @ residual - cross.T @ inverse[:, n_shape]
         solved.append((free, inverse))
+    return matrix, gradient, solved
+
+
+def _gauss_newton(frames, shape: np.ndarray, states: np.ndarray, prior: _Prior, damping: float, limits: JointLimits):
+    """One damped step of shape and poses together, the poses eliminated."""
+    n_shape = len(shape)
+    matrix, gradient, solved = _without_poses(frames, shape, states, prior, damping, limits)
     moving = movable(shape, gradient, np.full(n_shape, -np.inf), prior.highest)
     step = np.zeros(n_shape)
     step[moving] = np.clip(-np.linalg.solve(damped(matrix[np.ix_(moving, moving)], damping, least=0.0), gradient[moving]), -0.1, 0.1)

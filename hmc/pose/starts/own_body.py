@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from hmc.body.dimensions import FitBodySettings
+from hmc.body.dimensions import FitBodySettings, prior_deviations, whole_deviations
 from hmc.body.flesh import surface_coordinates
 from hmc.body.model import BodyModel
 from hmc.pose.method import Subject
@@ -57,8 +57,8 @@ def own_body(
     refinement: RefineSettings,
     surface_samples: int,
     equip: Callable[[BodyModel], Subject],
-) -> Subject:
-    """The subject with a body fitted to some frames, if others agree.
+) -> tuple[Subject, tuple[float, ...]]:
+    """The subject with a body fitted to some frames, if others agree, and how well the frames tell it.
 
     Parameters
     ----------
@@ -75,13 +75,19 @@ def own_body(
         Points of the body's surface.
     equip : callable
         A body to its subject.
+
+    Returns
+    -------
+    subject : Subject
+    deviations : tuple of 17 floats
+        Of the logarithm of each of `hmc.body.dimensions.FITTED`; those of the prior where frames are too few.
     """
     picks, held_out = chosen
     if not picks or not held_out:
-        return subject
+        return subject, tuple(whole_deviations(np.diag(prior_deviations(settings) ** 2)).tolist())
     objectives, states = zip(*(poses[k] for k in picks), strict=True)
     coordinates, workers = surface_coordinates(subject.body, surface_samples), subject.capture.workers
-    body, _, _ = fit_body(objectives, np.array(states), coordinates, settings, workers)
+    body, _, info = fit_body(objectives, np.array(states), coordinates, settings, workers)
     fitted = equip(body)
     tried = [poses[k] for k in held_out]
 
@@ -90,4 +96,4 @@ def own_body(
 
     before, after = share_out([partial(costs, subject), partial(costs, fitted)], workers)
     # Of frames that it was not fitted to.
-    return fitted if np.mean(after) < WORTH_IT * np.mean(before) else subject
+    return fitted if np.mean(after) < WORTH_IT * np.mean(before) else subject, info.deviations

@@ -231,7 +231,7 @@ def _fit(subject: Subject, window: _Window, path: Sequence[tuple[Tracked, StepIn
         for part in chosen
         for k in part
     }
-    return own_body(
+    fitted, _ = own_body(
         subject,
         poses,
         chosen,
@@ -240,3 +240,4 @@ def _fit(subject: Subject, window: _Window, path: Sequence[tuple[Tracked, StepIn
         preset.surface_samples,
         lambda body: annealed_subject(body, subject.capture, preset),
     )
+    return fitted
