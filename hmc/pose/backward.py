@@ -143,7 +143,7 @@ def backward(
     pass_ = replace(pass_, states=people.states, footing=footing)
     if records:
         bodies = make_bodies({int(person): body for person, body in records[0]["bodies"].items()}, method.limits)
-        known = {int(person): told for person, told in records[0]["known"].items()}
+        known = {int(person): told for person, told in records[0].get("known", {}).items()}  # older journals do not say
     else:
         bodies, known = _bodies(pass_, people, fitted)
         if run.journal is not None:
