@@ -58,10 +58,11 @@ def act(
     cameras: int = 5,
     voxel_m: float = 0.035,
     fists: bool = False,
+    longer_left: tuple[float, float] = (0.0, 0.0),
 ) -> Act:
     """Let an actor do something in the middle of the ring."""
     rng = np.random.default_rng(5)
-    actor = make_actor(height_m, "average", rng, "man", cell_m=0.03, fists=fists)
+    actor = make_actor(height_m, "average", rng, "man", cell_m=0.03, fists=fists, longer_left=longer_left)
     times = np.arange(frames) / fps
     moved = place(MOTIONS[motion](actor.skeleton, times, rng), (-0.3, -0.2), heading_deg)
     rig, grid = ring(cameras), VoxelGrid.from_room(ROOM, voxel_m)

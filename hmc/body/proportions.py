@@ -18,13 +18,15 @@ from hmc.errors import InputError
 from hmc.landmarks import LANDMARKS
 
 __all__ = [
-    "CANTON_LENGTHS", "DEFAULT_LENGTHS", "GIRTHS", "SOLE", "SOLE_PITCH", "canton_body", "default_body", "landmark_segments", "make_bodies",
-    "make_body", "sole_ends", "stature", "stiff_body",
+    "ASYMMETRIES", "CANTON_LENGTHS", "DEFAULT_LENGTHS", "GIRTHS", "SOLE", "SOLE_PITCH", "canton_body", "default_body", "landmark_segments",
+    "longer", "make_bodies", "make_body", "sole_ends", "stature", "stiff_body",
 ]  # fmt: skip
 
 #: Joint-centre lengths over stature. Trunk: hip centres' middle to the base of the neck. Sources: Winter (2009), figure 4.1
 #: (limbs; shoulders: half its width of .259, less some 4 cm from the tip of the shoulder to the joint's centre; ankle: .039 and a
-#: sole of 1 cm), and the ranges that rendered and captured people show (trunk, head). The spine is behind: a standing person's
+#: sole of 1 cm), and the ranges that rendered and captured people show (trunk, head). Hips: wider than .36 of the distance
+#: between the pelvis's front spines (Bell, Brand and Pedersen 1989, Human Movement Science 8: 3), which is some .048 of the stature, as
+#: programs that render people have them at .053 to .067. The spine is behind: a standing person's
 #: last neck vertebra is behind the hip centres (Mac-Thiong et al. 2010, Spine 35: E1193), while the chest and the skull are over or
 #: before them. From the line of hips and neck the chest's middle is `chest_forward` to the front, the crown `head_forward`. The crown is
 #: the skull's; silhouettes have its hair as well. Joints are not in the middle of the flesh around them: with the arms stretched sideways
@@ -37,17 +39,20 @@ DEFAULT_LENGTHS: dict[str, float] = {
     "chest_forward": 0.010, "head_forward": 0.027, "hair": 0.010,
     "shoulder_flesh_low": 0.0046, "elbow_flesh_low": 0.0034, "wrist_flesh_low": 0.0069, "arm_flesh_forward": 0.0023,
     "waist_flesh_forward": 0.0046, "hip_flesh_forward": 0.0034, "hip_flesh_inward": 0.0020,
-    "ankle_flesh_outward": 0.0046, "head_flesh_back": 0.007, "lumbar": 0.143, "collar": 0.083,
+    "ankle_flesh_outward": 0.0046, "head_flesh_back": 0.007, "lumbar": 0.143, "collar": 0.083, "pelvis_flesh_forward": 0.0,
 }  # fmt: skip
+#: By how much of their length left limbs are longer than right ones; 0 in an average person.
+ASYMMETRIES: tuple[str, ...] = ("arms_longer_left", "legs_longer_left")
 #: What is 0 in a body that was stored before it was known, and in Canton's: joints in the middle of the flesh, which ends at the crown, and
 #: a trunk of one piece.
-_ONCE_UNKNOWN = ("hair", "lumbar", "collar", *(name for name in DEFAULT_LENGTHS if "_flesh_" in name))
+_ONCE_UNKNOWN = ("hair", "lumbar", "collar", *ASYMMETRIES, *(name for name in DEFAULT_LENGTHS if "_flesh_" in name))
 
 #: Table 6.1 of Canton (2009), which gives no widths (hips: ours; shoulders: so that the arms span about the height), no hand or foot.
 CANTON_LENGTHS: dict[str, float] = DEFAULT_LENGTHS | {
     "shoulder_half_width": 0.098,
     "trunk": 0.33, "head": 0.16, "upper_arm": 0.20, "forearm": 0.20, "hand": 0.0, "thigh": 0.26, "shank": 0.25,
-    "ankle_height": 0.0, "foot": 0.0, "chest_forward": 0.0, "head_forward": 0.0, **dict.fromkeys(_ONCE_UNKNOWN, 0.0),
+    "ankle_height": 0.0, "foot": 0.0, "chest_forward": 0.0, "head_forward": 0.0,
+    **{name: 0.0 for name in _ONCE_UNKNOWN if name in DEFAULT_LENGTHS},
 }  # fmt: skip
 
 #: The foot's axis at the heel, over the floor and over stature. Soles are round and cameras stand higher: the lowest 2 cm of feet are
@@ -90,9 +95,10 @@ def make_body(dimensions: dict[str, float], limits: JointLimits | None = None, s
     Parameters
     ----------
     dimensions : dict
-        ``height`` (metres), the lengths of `DEFAULT_LENGTHS` (metres) and ``girth_<group>`` for each of `GIRTHS` (factors). Without
-        hair the flesh ends at the crown, without lengths named ``_flesh_`` joints are in its middle, and without `lumbar` and `collar` the
-        trunk is of one piece, as in results that were made before these were known.
+        ``height`` (metres), the lengths of `DEFAULT_LENGTHS` (metres), ``girth_<group>`` for each of `GIRTHS` (factors) and `ASYMMETRIES`
+        (shares). Without hair the flesh ends at the crown, without lengths named ``_flesh_`` joints are in its middle, without `lumbar` and
+        `collar` the trunk is of one piece, and without asymmetries left and right are alike, as in results that were made before these were
+        known.
     limits : JointLimits, optional
         `default_limits` unless given.
     sole : float
@@ -105,14 +111,16 @@ def make_body(dimensions: dict[str, float], limits: JointLimits | None = None, s
     Raises
     ------
     InputError
-        When a dimension is missing, not finite or negative.
+        When a dimension is missing or not finite, or negative where that is no place beside a joint or an asymmetry.
     """
-    wanted = ["height", *DEFAULT_LENGTHS, *(f"girth_{group}" for group in GIRTHS)]
+    wanted = ["height", *DEFAULT_LENGTHS, *(f"girth_{group}" for group in GIRTHS), *ASYMMETRIES]
     dimensions = dict.fromkeys(_ONCE_UNKNOWN, 0.0) | dimensions
     for name in wanted:
         value = dimensions.get(name, np.nan)
-        if not np.isfinite(value) or value < 0:
-            raise InputError(f"body dimension '{name}' must be a number of at least 0; got {dimensions.get(name)}")
+        signed = "_flesh_" in name or name in ASYMMETRIES
+        if not np.isfinite(value) or (value < 0 and not signed):
+            least = "" if signed else " of at least 0"
+            raise InputError(f"body dimension '{name}' must be a number{least}; got {dimensions.get(name)}")
     d = dimensions
     offsets = np.zeros((len(SEGMENTS), 3))
     tips = np.zeros((len(LANDMARKS), 3))
@@ -126,15 +134,30 @@ def make_body(dimensions: dict[str, float], limits: JointLimits | None = None, s
     for side, sign in (("l", 1.0), ("r", -1.0)):
         put(f"{side}_clavicle", (0, sign * (d["shoulder_half_width"] - d["collar"]), d["trunk"] - d["shoulder_drop"] - lumbar))
         put(f"{side}_upper_arm", (0, sign * d["collar"], 0))
-        put(f"{side}_forearm", (0, sign * d["upper_arm"], 0))
+        arm, leg = longer(d, "arms", side), longer(d, "legs", side)
+        put(f"{side}_forearm", (0, sign * arm * d["upper_arm"], 0))
         put(f"{side}_thigh", (0, sign * d["hip_half_width"], 0))
-        put(f"{side}_shank", (0, 0, -d["thigh"]))
-        put(f"{side}_foot", (0, 0, -d["shank"]))
-        tips[LANDMARKS.index(f"{side}_wrist")] = (0, sign * d["forearm"], 0)
-        tips[LANDMARKS.index(f"{side}_ankle")] = (0, 0, -d["shank"])
+        put(f"{side}_shank", (0, 0, -leg * d["thigh"]))
+        put(f"{side}_foot", (0, 0, -leg * d["shank"]))
+        tips[LANDMARKS.index(f"{side}_wrist")] = (0, sign * arm * d["forearm"], 0)
+        tips[LANDMARKS.index(f"{side}_ankle")] = (0, 0, -leg * d["shank"])
     tips[LANDMARKS.index("head_top")] = (d["head_forward"], 0, d["head"])
     kept = {name: float(d[name]) for name in wanted}
     return BodyModel(float(d["height"]), offsets, tips, _flesh(d, sole), limits or default_limits(), kept)
+
+
+def longer(dimensions: Mapping[str, float], limbs: str, side: str) -> float:
+    """The factor on the lengths of the limbs of one side, whose dimensions are the mean of both sides.
+
+    Parameters
+    ----------
+    dimensions : mapping
+        As `make_body` takes them.
+    limbs : {"arms", "legs"}
+    side : {"l", "r"}
+    """
+    share = 0.5 * dimensions.get(f"{limbs}_longer_left", 0.0)
+    return 1 + share if side == "l" else 1 - share
 
 
 def make_bodies(dimensions: Mapping[int, Mapping[str, float | np.ndarray]], limits: JointLimits | None = None) -> dict[int, BodyModel]:
@@ -206,7 +229,8 @@ def _scaled(height_m: float, lengths: dict[str, float]) -> dict[str, float]:
         raise InputError(f"a height must be a number of metres; got {height_m!r}")
     if not 0.3 < height_m < 3.0:
         raise InputError(f"a height of {height_m:g} m is no person's; give the stature in metres")
-    return {"height": height_m} | {name: value * height_m for name, value in lengths.items()} | {f"girth_{g}": 1.0 for g in GIRTHS}
+    own = {"height": height_m} | {name: value * height_m for name, value in lengths.items()} | {f"girth_{g}": 1.0 for g in GIRTHS}
+    return own | dict.fromkeys(ASYMMETRIES, 0.0)
 
 
 def _flesh(d: dict[str, float], sole: float) -> Cones:
@@ -228,26 +252,34 @@ def _flesh(d: dict[str, float], sole: float) -> Cones:
 
     wide, deep, trunk = d["girth_torso"], d["girth_torso"] * d["girth_depth"], d["trunk"]
     x, y = np.eye(3)[:2]
-    chest, ahead = d["chest_forward"], d["head_forward"] - d["head_flesh_back"]
+    chest, face = d["chest_forward"], d["head_forward"] - d["head_flesh_back"]
     nape = 0.4 * chest
     waist = nape + d["waist_flesh_forward"]
+
+    def ahead(at: float) -> float:
+        """How far the trunk's flesh lies before the line from the hips to the neck, at a share of it: nothing at the neck."""
+        return (1 - at) * d["pelvis_flesh_forward"]
+
+    hips, belly = (ahead(0), 0, -0.035 * h), (waist + ahead(0.15), 0, 0.15 * trunk)
+    middle, high = chest + ahead(0.48), chest + ahead(0.82)
     # Radii over stature: [lateral, front to back] at both ends.
-    cone("pelvis", ((0, 0, -0.035 * h), (waist, 0, 0.15 * trunk)), ((0.090, 0.062), (0.086, 0.060)), y, (wide, deep))
-    cone("torso", ((waist, 0, 0.12 * trunk), (chest, 0, 0.48 * trunk)), ((0.084, 0.059), (0.082, 0.057)), y, (wide, deep))
+    cone("pelvis", (hips, belly), ((0.090, 0.062), (0.086, 0.060)), y, (wide, deep))
+    cone("torso", ((waist + ahead(0.12), 0, 0.12 * trunk), (middle, 0, 0.48 * trunk)), ((0.084, 0.059), (0.082, 0.057)), y, (wide, deep))
     low = d["lumbar"]
     upper = "chest" if low > 0 else "torso"
-    cone(upper, ((chest, 0, 0.48 * trunk - low), (chest, 0, 0.82 * trunk - low)), ((0.084, 0.058), (0.096, 0.058)), y, (wide, deep))
-    cone(upper, ((chest, 0, 0.82 * trunk - low), (nape, 0, trunk - low)), ((0.096, 0.056), (0.042, 0.036)), y, (wide, deep))
+    cone(upper, ((middle, 0, 0.48 * trunk - low), (high, 0, 0.82 * trunk - low)), ((0.084, 0.058), (0.096, 0.058)), y, (wide, deep))
+    cone(upper, ((high, 0, 0.82 * trunk - low), (nape, 0, trunk - low)), ((0.096, 0.056), (0.042, 0.036)), y, (wide, deep))
     head, g = d["head"], (d["girth_head"], d["girth_head"])
-    skull = 0.01 * h + 0.6 * ahead
-    cone("head", ((nape, 0, -0.02 * h), (0.004 * h + 0.4 * ahead, 0, 0.28 * head)), ((0.034, 0.034), (0.034, 0.040)), y, g)
-    cone("head", ((0.006 * h + 0.4 * ahead, 0, 0.22 * head), (skull, 0, 0.65 * head)), ((0.036, 0.046), (0.045, 0.057)), y, g)
+    skull = 0.01 * h + 0.6 * face
+    cone("head", ((nape, 0, -0.02 * h), (0.004 * h + 0.4 * face, 0, 0.28 * head)), ((0.034, 0.034), (0.034, 0.040)), y, g)
+    cone("head", ((0.006 * h + 0.4 * face, 0, 0.22 * head), (skull, 0, 0.65 * head)), ((0.036, 0.046), (0.045, 0.057)), y, g)
     cone("head", ((skull, 0, 0.65 * head), (skull - 0.002 * h, 0, head + d["hair"])), ((0.045, 0.057), (0.026, 0.032)), y, g)
     arms = (d["girth_arms"],) * 2
     thighs, shanks = (d["girth_thighs"],) * 2, (d["girth_shanks"],) * 2
     front = d["arm_flesh_forward"]
     for side, sign in (("r", -1.0), ("l", 1.0)):
-        arm, fore = sign * d["upper_arm"], sign * d["forearm"]
+        arm_longer, leg_longer = longer(d, "arms", side), longer(d, "legs", side)
+        arm, fore = sign * arm_longer * d["upper_arm"], sign * arm_longer * d["forearm"]
         armpit, elbow, wrist = (-d[f"{joint}_flesh_low"] for joint in ("shoulder", "elbow", "wrist"))
         if d["collar"] > 0:
             collar = ((0, 0, -0.01 * h), (0, sign * d["collar"], -0.005 * h))
@@ -256,9 +288,9 @@ def _flesh(d: dict[str, float], sole: float) -> Cones:
         cone(f"{side}_forearm", ((front, 0, elbow), (front, fore, wrist)), ((0.026, 0.026), (0.016, 0.016)), x, arms)
         shown = fore + sign * max(d["hand"] - FINGER_TIPS * h, 0.0)
         cone(f"{side}_forearm", ((front, fore, wrist), (front, shown, wrist)), ((0.021, 0.015), (0.016, 0.010)), x, arms)
-        hip = (d["hip_flesh_forward"], -sign * d["hip_flesh_inward"], 0)
-        cone(f"{side}_thigh", (hip, (0, 0, -d["thigh"])), ((0.050, 0.050), (0.033, 0.033)), x, thighs)
-        shank, ankle, foot = d["shank"], d["ankle_height"], d["foot"]
+        hip = (d["hip_flesh_forward"] + ahead(0), -sign * d["hip_flesh_inward"], 0)
+        cone(f"{side}_thigh", (hip, (0, 0, -leg_longer * d["thigh"])), ((0.050, 0.050), (0.033, 0.033)), x, thighs)
+        shank, ankle, foot = leg_longer * d["shank"], d["ankle_height"], d["foot"]
         calf, ankle_y = (-0.004 * h, 0, -0.4 * shank), sign * d["ankle_flesh_outward"]
         cone(f"{side}_shank", ((0, 0, 0), calf), ((0.030, 0.032), (0.031, 0.033)), y, shanks)
         cone(f"{side}_shank", (calf, (0, ankle_y, -shank - 0.3 * ankle)), ((0.031, 0.033), (0.020, 0.021)), y, shanks)

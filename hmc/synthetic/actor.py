@@ -79,6 +79,7 @@ def make_actor(
     clothes: Clothes | None = None,
     cell_m: float = 0.016,
     fists: bool = False,
+    longer_left: tuple[float, float] = (0.0, 0.0),
 ) -> Actor:
     """Model a person.
 
@@ -96,6 +97,8 @@ def make_actor(
         Edge length of the mesh, metres; 0.016 gives some 10,000 vertices.
     fists : bool
         Whether the hands are closed.
+    longer_left : tuple of (float, float)
+        By how much of its length the left arm, and the left leg, is longer than the right one.
 
     Returns
     -------
@@ -111,7 +114,7 @@ def make_actor(
     if sex not in ("man", "woman"):
         raise InputError(f"sex must be 'man' or 'woman'; got {sex!r}")
     clothes = clothes or Clothes()
-    skeleton = make_skeleton(height_m, sex, rng)
+    skeleton = make_skeleton(height_m, sex, rng, longer_left)
     frames = bind_orientations()
     joints = joint_positions(skeleton, np.array([0, 0, skeleton.hip_height]), frames)
     posed = PosedSkeleton(skeleton, joints, frames)

@@ -148,7 +148,7 @@ def assemble(skeleton: Skeleton, root: np.ndarray, upper: Upper, feet: Feet, arm
         hip = locate(f"{side}_thigh")
         facing = euler(np.column_stack([np.zeros((n, 2)), feet.yaw[:, s]]))
         pole = unit(0.5 * facing[:, :, 0] + 0.5 * frames[:, 0, :, 0])
-        first, second = reach(hip, feet.ankles[:, s], skeleton.length("l_shank"), skeleton.length("l_foot"), pole)
+        first, second = reach(hip, feet.ankles[:, s], skeleton.length(f"{side}_shank"), skeleton.length(f"{side}_foot"), pole)
         a, b = limb_orientations("leg", first, second, pole)
         put(f"{side}_thigh", a)
         put(f"{side}_shank", b)
@@ -204,10 +204,10 @@ def arms_by_hands(skeleton: Skeleton, targets: np.ndarray, frame: str = "chest",
     elbow_out : float
         How much the elbow points outwards rather than down and back.
     """
-    upper, fore = skeleton.length("l_forearm"), skeleton.length("l_hand")
 
     def arms(s: int, chest: np.ndarray, shoulder: np.ndarray):
         sign = 1 - 2 * s
+        upper, fore = skeleton.length(f"{'lr'[s]}_forearm"), skeleton.length(f"{'lr'[s]}_hand")
         goal = targets[:, s] if frame == "world" else shoulder + (upper + fore) * _turned(chest, targets[:, s])
         pole = _turned(chest, np.tile(unit(np.array([-0.5, sign * elbow_out, -0.8])), (len(chest), 1)))
         first, second = reach(shoulder, goal, upper, fore, pole)
@@ -235,10 +235,10 @@ def pelvis_height(
     smooth : float
         Standard deviation of the smoothing over frames.
     """
-    leg = (skeleton.length("l_shank") + skeleton.length("l_foot")) * slack
     heights = []
-    for s, bone in enumerate(("l_thigh", "r_thigh")):
-        out = skeleton.offsets[BONE_NAMES.index(bone), 1]
+    for s, side in enumerate("lr"):
+        leg = (skeleton.length(f"{side}_shank") + skeleton.length(f"{side}_foot")) * slack
+        out = skeleton.offsets[BONE_NAMES.index(f"{side}_thigh"), 1]
         hip = pelvis_xy + out * np.stack([-np.sin(yaw), np.cos(yaw)], axis=-1)
         level = np.sum((feet.ankles[:, s, :2] - hip) ** 2, axis=-1)
         heights.append(feet.ankles[:, s, 2] + np.sqrt(np.maximum(leg**2 - level, (0.3 * leg) ** 2)))

@@ -153,20 +153,19 @@ def body_sweeps(
         rows[:, 3:] *= scale
         return rows
 
-    thigh_scale = skeleton.length("l_shank") / 0.42
-    shank_scale = skeleton.length("l_foot") / 0.434
-    trousers = table("shank", factor["leg"] * limb, shank_scale, loose_m)
-    trousers[-3:, 1:3] = np.maximum(trousers[-3:, 1:3], (0.036 + 1.2 * loose_m) * scale)
     for side, sign in (("l", 1.0), ("r", -1.0)):
         out = [0.0, sign, 0.0]
         down = [0.0, 0.0, -1.0]
+        trousers = table("shank", factor["leg"] * limb, skeleton.length(f"{side}_foot") / 0.434, loose_m)
+        trousers[-3:, 1:3] = np.maximum(trousers[-3:, 1:3], (0.036 + 1.2 * loose_m) * scale)
         arm, end = factor["arm"] * limb, factor["end"] * (1 + 0.04 * girth - 0.08 * woman)
-        add("clavicle", f"{side}_clavicle", [forward, up, out], table("clavicle", arm, skeleton.length("l_upper_arm") / 0.17), 2, 0.06)
+        collar = table("clavicle", arm, skeleton.length(f"{side}_upper_arm") / 0.17)
+        add("clavicle", f"{side}_clavicle", [forward, up, out], collar, 2, 0.06)
         add(
             "upper_arm",
             f"{side}_upper_arm",
             [forward, up, out],
-            table("upper_arm", arm, skeleton.length("l_forearm") / 0.285, 0.6 * loose_m),
+            table("upper_arm", arm, skeleton.length(f"{side}_forearm") / 0.285, 0.6 * loose_m),
             2,
             0.035,
         )
@@ -174,7 +173,7 @@ def body_sweeps(
             "forearm",
             f"{side}_forearm",
             [forward, up, out],
-            table("forearm", arm, skeleton.length("l_hand") / 0.26, 0.4 * loose_m),
+            table("forearm", arm, skeleton.length(f"{side}_hand") / 0.26, 0.4 * loose_m),
             2,
             0.02,
         )
@@ -189,7 +188,7 @@ def body_sweeps(
                 0.012,
                 (0.022 * scale, sign * 0.025 * scale, 0),
             )
-        thigh = table("thigh", factor["leg"] * (limb + 0.10 * woman), thigh_scale, loose_m)
+        thigh = table("thigh", factor["leg"] * (limb + 0.10 * woman), skeleton.length(f"{side}_shank") / 0.42, loose_m)
         add("thigh", f"{side}_thigh", [left, forward, down], thigh, 2, 0.035)
         add("shank", f"{side}_shank", [left, forward, down], trousers, 2, 0.025)
         foot = scale * (0.94 if woman else 1.0)

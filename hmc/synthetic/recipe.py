@@ -161,6 +161,8 @@ class ActorRecipe:
     sleeves, legs : {"long", "short"}
     long_hair : bool
     hands : {"open", "fists"}
+    longer_left : (arm, leg)
+        By how much of its length the left arm, and the left leg, is longer than the right one.
     loose_m : float
         How far clothes stand off the body, metres.
     cube_m : float
@@ -199,6 +201,7 @@ class ActorRecipe:
     legs: str = "long"
     long_hair: bool = False
     hands: str = "open"
+    longer_left: tuple[float, float] = (0.0, 0.0)
     loose_m: float = 0.007
     cube_m: float = 0.0
     cube_color: Color = (0.15, 0.55, 0.20)
@@ -410,6 +413,8 @@ def check_recipe(recipe: Recipe, where: str) -> None:
         among(actor.legs, ("long", "short"), "legs")
         within(actor.height_m, 1.2, 2.2, "height_m")
         within(actor.loose_m, 0, 0.1, "loose_m")
+        for share, limb in zip(actor.longer_left, ("arm", "leg"), strict=True):
+            within(share, -0.2, 0.2, f"longer_left ({limb})")
         within(actor.cube_m, 0, 1, "cube_m")
         girth_of(actor.build)
         if (actor.motion == "bvh") != bool(actor.bvh):

@@ -153,7 +153,7 @@ def build_scene(recipe: Recipe, seed: int | None = None) -> Scene:
         clothes = Clothes(
             a.shirt, a.trousers, a.skin, a.hair, a.shoes, a.pattern, a.pattern_color, a.sleeves, a.legs, a.long_hair, a.loose_m
         )
-        actor = make_actor(a.height_m, a.build, rng_actors[2 * k], a.sex, clothes, recipe.cell_m, a.hands == "fists")
+        actor = make_actor(a.height_m, a.build, rng_actors[2 * k], a.sex, clothes, recipe.cell_m, a.hands == "fists", a.longer_left)
         actor = with_balls(actor, a.pattern_color) if a.pattern == "markers" else actor
         actors.append(with_cube(actor, a.cube_m, a.cube_color) if a.cube_m > 0 else actor)
         motions.append(make_motion(a, actor.skeleton, times, rng_actors[2 * k + 1], recipe.furniture))

@@ -61,8 +61,8 @@ class Skeleton:
 
     @property
     def hip_height(self) -> float:
-        """Height of the hip centres above the sole with straight legs, metres."""
-        return self.length("l_shank") + self.length("l_foot") + self.ankle_height
+        """Height of the hip centres above the sole with straight legs, the shorter one's, metres."""
+        return min(self.length(f"{side}_shank") + self.length(f"{side}_foot") for side in "lr") + self.ankle_height
 
     @property
     def ankle_height(self) -> float:
@@ -92,7 +92,7 @@ class PosedSkeleton:
 ANKLE_HEIGHT = 0.047
 
 
-def make_skeleton(height_m: float, sex: str, rng: np.random.Generator) -> Skeleton:
+def make_skeleton(height_m: float, sex: str, rng: np.random.Generator, longer_left: tuple[float, float] = (0.0, 0.0)) -> Skeleton:
     """A skeleton with the proportions of a person, which vary from person to person.
 
     Lengths between joint centres are fractions of stature as in anthropometric tables (Winter, *Biomechanics and Motor Control of Human
@@ -106,6 +106,8 @@ def make_skeleton(height_m: float, sex: str, rng: np.random.Generator) -> Skelet
         Women get wider hips and narrower shoulders.
     rng : Generator
         Individual variation, about 2.5 % (standard deviation) a length.
+    longer_left : tuple of (float, float)
+        By how much of its length the left arm, and the left leg, is longer than the right one.
 
     Returns
     -------
@@ -131,11 +133,12 @@ def make_skeleton(height_m: float, sex: str, rng: np.random.Generator) -> Skelet
     for side, sign in (("l", 1.0), ("r", -1.0)):
         offsets[f"{side}_clavicle"] = np.array([0.010, sign * 0.012, 0.37 * trunk])
         offsets[f"{side}_upper_arm"] = np.array([-0.014, sign * (shoulder - 0.012), -0.05 * trunk])
-        offsets[f"{side}_forearm"] = np.array([0, sign * upper_arm, 0])
-        offsets[f"{side}_hand"] = np.array([0, sign * forearm, 0])
+        arm, leg = (1 + 0.5 * sign * share for share in longer_left)
+        offsets[f"{side}_forearm"] = np.array([0, sign * arm * upper_arm, 0])
+        offsets[f"{side}_hand"] = np.array([0, sign * arm * forearm, 0])
         offsets[f"{side}_thigh"] = np.array([0, sign * hip, 0])
-        offsets[f"{side}_shank"] = np.array([0, 0, -thigh])
-        offsets[f"{side}_foot"] = np.array([0, 0, -shank])
+        offsets[f"{side}_shank"] = np.array([0, 0, -leg * thigh])
+        offsets[f"{side}_foot"] = np.array([0, 0, -leg * shank])
         offsets[f"{side}_toes"] = np.array([foot, 0, -0.032])
     crown = np.array([0.006, 0, 0.58 * head])
     return Skeleton(height_m, height_m * np.array([offsets[name] for name in BONE_NAMES]), height_m * crown)

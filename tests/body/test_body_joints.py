@@ -1,5 +1,7 @@
 """Degrees of freedom, joint limits and proportions against Table 6.1 of the thesis as printed, and mirrored and scaled bodies."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -9,7 +11,7 @@ from numpy.testing import assert_allclose
 from hmc.body.flesh import flesh_points
 from hmc.body.joints import DOF_NAMES, N_CANTON, N_DOF, SEGMENTS, canton_limits, default_limits, dof_index, mirror_state
 from hmc.body.kinematics import landmarks, segment_transforms
-from hmc.body.model import PARTS, neutral_state
+from hmc.body.model import PARTS, BodyModel, neutral_state
 from hmc.body.proportions import DEFAULT_LENGTHS, SOLE, canton_body, default_body, make_body
 from hmc.errors import InputError
 from hmc.landmarks import LANDMARKS, landmark_index
@@ -29,6 +31,11 @@ SIDES = [name for name in LANDMARKS if name[:2] in ("l_", "r_")]
 
 def swapped(name: str) -> str:
     return {"l": "r", "r": "l"}[name[0]] + name[1:]
+
+
+def unequal(arms: float, legs: float) -> BodyModel:
+    """A body of 1.7 m with a longer left arm and leg."""
+    return make_body(default_body(1.7).dimensions | {"arms_longer_left": arms, "legs_longer_left": legs})
 
 
 def test_limits_are_the_printed_ones():
@@ -68,16 +75,16 @@ def test_left_and_right_have_mirrored_limits(limits):
             assert_allclose(np.sort(bounds[:, k]), [limits.low[k], limits.high[k]])
 
 
-@given(seed=st.integers(0, 2**31))
-def test_a_mirrored_state_gives_mirrored_landmarks(seed):
-    body = default_body(1.7)
+@given(seed=st.integers(0, 2**31), arms=st.floats(-0.1, 0.1), legs=st.floats(-0.1, 0.1))
+def test_a_mirrored_state_of_a_mirrored_body_gives_mirrored_landmarks(seed, arms, legs):
+    body, mirrored = (unequal(sign * arms, sign * legs) for sign in (1, -1))
     low, high = np.where(np.isfinite(body.limits.low), body.limits.low, 0), np.where(np.isfinite(body.limits.high), body.limits.high, 0)
     state = np.random.default_rng(seed).uniform(low, high)
     state[:6] = 0
     state[dof_index("torso_x", "torso_z", "spine_x", "neck_x")] = 0  # what the mirror does not touch has to be symmetric
     there = landmarks(body, state) * [1, -1, 1]
     expected = np.array([there[landmark_index(swapped(name) if name in SIDES else name)] for name in LANDMARKS])
-    assert_allclose(landmarks(body, mirror_state(state)), expected, atol=1e-12)
+    assert_allclose(landmarks(mirrored, mirror_state(state)), expected, atol=1e-12)
     assert_allclose(mirror_state(mirror_state(state)), state)
 
 
@@ -121,6 +128,46 @@ def test_dimensions_are_what_landmarks_show():
     assert points["l_wrist"][1] > points["l_shoulder"][1] > 0 > points["r_shoulder"][1]  # Y to the person's left
 
 
+@pytest.mark.parametrize(("kind", "bones"), [("arms", ("shoulder", "elbow", "wrist")), ("legs", ("hip", "knee", "ankle"))])
+def test_unequal_limbs_differ_by_their_share_and_their_flesh_with_them(kind, bones):
+    usual, body = default_body(1.7), unequal(**{"arms": 0.0, "legs": 0.0} | {kind: 0.06})
+    points, before = (dict(zip(LANDMARKS, landmarks(one, neutral_state("down", one.limits)), strict=True)) for one in (body, usual))
+    for above, below in pairwise(bones):
+        left, right = (np.linalg.norm(points[f"{side}_{above}"] - points[f"{side}_{below}"]) for side in "lr")
+        mean = np.linalg.norm(before[f"l_{above}"] - before[f"l_{below}"])
+        assert (left, right) == pytest.approx((1.03 * mean, 0.97 * mean))
+    ratio = body.cones.lengths / usual.cones.lengths
+    parts = np.array([PARTS[part] for part in usual.cones.part])
+    longer = {part for part, by in zip(parts, ratio, strict=True) if by > 1.01}
+    shorter = {part for part, by in zip(parts, ratio, strict=True) if by < 0.99}
+    assert longer == {swapped(part) for part in shorter} and len(longer) == 2
+    assert {part.split("_")[0] for part in longer} == {"l"}
+    assert_allclose(ratio[[part[:2] not in ("l_", "r_") for part in parts]], 1)
+
+
+def test_hips_that_lie_farther_back_in_the_flesh_leave_joints_and_the_neck_where_they_are():
+    usual = default_body(1.7)
+    moved = make_body(usual.dimensions | {"pelvis_flesh_forward": 0.02})
+    state = neutral_state("down", usual.limits)
+    assert_allclose(landmarks(moved, state), landmarks(usual, state))
+    rotations, positions = segment_transforms(usual, state[None])
+    carrier = usual.cones.segment
+
+    def ends(body: BodyModel) -> np.ndarray:
+        return np.concatenate(
+            [(rotations[0, carrier] @ at[..., None])[..., 0] + positions[0, carrier] for at in (body.cones.start, body.cones.end)]
+        )
+
+    before, by = ends(usual), ends(moved) - ends(usual)
+    assert_allclose(by[:, 1:], 0, atol=1e-12)
+    # Sheared: all at the hips' height, nothing at the neck, in between as much as that is from the neck.
+    hip, neck = landmarks(usual, state)[[landmark_index("pelvis"), landmark_index("neck")], 2]
+    trunk = np.tile(np.isin([PARTS[part] for part in usual.cones.part], ["torso"]), 2) & (np.abs(before[:, 2] - hip) > 0.07)
+    trunk &= by[:, 0] > 0
+    assert trunk.any() and by[:, 0].max() == pytest.approx(0.02) and by[:, 0].min() == 0
+    assert_allclose(by[trunk, 0], 0.02 * (neck - before[trunk, 2]) / (neck - hip), atol=1e-9)
+
+
 @pytest.mark.parametrize("group", ["torso", "depth", "head", "arms", "thighs", "shanks"])
 def test_girths_change_radii_and_nothing_else(group):
     body = default_body(1.75)
@@ -149,7 +196,9 @@ def test_nobody_has_such_a_height(height):
         default_body(height)
 
 
-@pytest.mark.parametrize(("name", "value"), [("trunk", None), ("trunk", np.nan), ("girth_head", -0.1), ("height", np.inf)])
+@pytest.mark.parametrize(
+    ("name", "value"), [("trunk", None), ("trunk", np.nan), ("girth_head", -0.1), ("height", np.inf), ("legs_longer_left", np.nan)]
+)
 def test_wrong_dimensions_are_named(name, value):
     dimensions = dict(default_body(1.7).dimensions)
     dimensions.pop(name)

@@ -9,7 +9,7 @@ from hmc.body import reach as module
 from hmc.body.kinematics import segment_transforms
 from hmc.body.limbs import LIMBS
 from hmc.body.model import neutral_state
-from hmc.body.proportions import default_body
+from hmc.body.proportions import default_body, make_body
 from hmc.body.reach import limb_joint, limb_lengths, reach
 from hmc.body.twists import rotations_about
 
@@ -20,13 +20,16 @@ def ends(body, limb, states):
     """Where the limb's end is: along the forearm or down the shank."""
     rotations, positions = segment_transforms(body, states)
     along = {"r_arm": [0, -1, 0], "l_arm": [0, 1, 0]}.get(limb, [0, 0, -1])
+    upper, _ = limb_lengths(body, limb)
+    joint = segment_transforms(body, states)[1][:, LIMBS[limb].segments[0]]
+    assert_allclose(np.linalg.norm(positions[:, LOWER[limb]] - joint, axis=1), upper)
     return positions[:, LOWER[limb]] + rotations[:, LOWER[limb]] @ (limb_lengths(body, limb)[1] * np.array(along))
 
 
 @pytest.mark.parametrize("limb", LIMBS)
 def test_ends_come_where_they_were(limb):
     rng = np.random.default_rng(3)
-    body, n = default_body(1.75), 300
+    body, n = make_body(default_body(1.75).dimensions | {"arms_longer_left": 0.08, "legs_longer_left": -0.08}), 300
     state = neutral_state("down")
     state[:3] = rng.normal(size=3)
     state[3:9] = rng.uniform(-0.4, 0.4, 6)

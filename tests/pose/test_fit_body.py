@@ -12,7 +12,8 @@ from hmc.body.dimensions import FITTED, FitBodySettings, prior_deviations, resha
 from hmc.body.flesh import surface_coordinates
 from hmc.body.joints import N_DOF
 from hmc.body.kinematics import landmarks
-from hmc.body.proportions import DEFAULT_LENGTHS, default_body
+from hmc.body.proportions import ASYMMETRIES, DEFAULT_LENGTHS, default_body
+from hmc.landmarks import landmark_index
 from hmc.pose.objectives.symmetric import Symmetric, body_points
 from hmc.pose.starts.fit_body import _Prior, _without_poses, fit_body
 from hmc.pose.steps.refine import RefineSettings, refine
@@ -49,6 +50,11 @@ def stature(body) -> float:
     return sum_of_lengths(body.dimensions) / sum_of_lengths(default_body(1.0).dimensions)
 
 
+def sized(body) -> list[str]:
+    """Dimensions that are sizes, not differences from what is nothing in an average person."""
+    return [name for name, value in body.dimensions.items() if value > 0]
+
+
 @pytest.mark.parametrize("height", [1.62, 1.84])
 def test_stature_is_recovered_from_perfect_silhouettes(height):
     """Seven cameras keep the hull from being much fatter than the person."""
@@ -79,8 +85,9 @@ def test_the_body_stays_a_person(walking):
     body = objectives[0].body
     fitted, _, _ = fit_body(objectives, states, surface_coordinates(body, 200), FitBodySettings())
     assert set(fitted.dimensions) == set(body.dimensions)
-    ratio = np.array([fitted.dimensions[name] / body.dimensions[name] for name in body.dimensions])
+    ratio = np.array([fitted.dimensions[name] / body.dimensions[name] for name in sized(body)])
     assert np.all((ratio > 0.5) & (ratio < 2.0))
+    assert abs(fitted.dimensions["pelvis_flesh_forward"]) < 0.03 and all(abs(fitted.dimensions[name]) < 0.03 for name in ASYMMETRIES)
     assert fitted.height_m == fitted.dimensions["height"]
     assert_allclose(fitted.limits.low, body.limits.low)
     # What the fit leaves free follows the common scale.
@@ -104,6 +111,25 @@ def test_fists_shorten_hands():
     assert hands[False] <= DEFAULT_LENGTHS["hand"] * 1.0001
 
 
+def test_unequal_limbs_are_told_by_their_sides():
+    """Fits of a person and of the one with sides exchanged: what both have in common is the gait's and the cameras'."""
+    found = []
+    for sign in (1, -1):
+        acted = act("walk", fps=8, cameras=7, longer_left=(-0.06 * sign, 0.06 * sign))
+        true = acted.landmarks[0]
+        limbs = {"legs": ("hip", "knee", "ankle"), "arms": ("shoulder", "elbow", "wrist")}
+        for kind, names in limbs.items():
+            left, right = (
+                sum(np.linalg.norm(np.diff([true[landmark_index(f"{side}_{name}")] for name in names], axis=0), axis=1)) for side in "lr"
+            )
+            assert left - right == pytest.approx(sign * (0.06 if kind == "legs" else -0.06) * (left + right) / 2)
+        objectives, states = start(acted, 1.78)
+        fitted, _, _ = fit_body(objectives, states, surface_coordinates(objectives[0].body, 250), FitBodySettings())
+        found.append([fitted.dimensions[f"{kind}_longer_left"] for kind in ("legs", "arms")])
+    legs, arms = (np.array(found[0]) - found[1]) / 2
+    assert 0.008 < legs < 0.06 and -0.06 < arms < -0.001
+
+
 def test_the_body_does_not_depend_on_the_number_of_processes(walking):
     objectives, states = walking
     coordinates, settings = surface_coordinates(objectives[0].body, 100), FitBodySettings(iterations=2)
@@ -122,7 +148,7 @@ def test_a_strong_prior_keeps_the_body(walking):
     weak, _, _ = fit_body(objectives, states, coordinates, FitBodySettings())
 
     def change(fitted):
-        return max(abs(np.log(fitted.dimensions[name] / body.dimensions[name])) for name in body.dimensions)
+        return max(abs(np.log(fitted.dimensions[name] / body.dimensions[name])) for name in sized(body))
 
     assert change(strong) < 0.01 < change(weak)
     assert info.cost_after <= info.cost_before

@@ -26,7 +26,7 @@ from hmc.search.gauss_newton import damped, movable
 __all__ = ["WORTH_IT", "FitBodyInfo", "fit_body", "with_known_stature"]
 
 #: Deviation of the stature's logarithm where the stature was given.
-KNOWN_STATURE = 0.015
+KNOWN_STATURE = 0.0075
 #: A fitted body is taken where it lowers the cost to this share at most.
 WORTH_IT = 0.97
 

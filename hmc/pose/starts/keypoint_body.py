@@ -10,7 +10,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hmc.body.dimensions import FitBodySettings
 from hmc.body.joints import JointLimits
 from hmc.body.keypoint_places import BODY_KEYPOINTS
 from hmc.body.model import BodyModel
@@ -21,6 +20,8 @@ __all__ = ["body_of_keypoints", "measured_lengths"]
 
 #: Statures: the middle of adults, metres, and the deviation of the logarithm, children among them; one that is given is known so well.
 STATURE_M, STATURE_DEVIATION, KNOWN_DEVIATION = 1.70, 0.08, 0.01
+#: The deviation of the logarithms of single lengths, from what they are at the common scale.
+LENGTH_DEVIATION = 0.07
 #: A length is measured in so many frames at least; so many frames one after the other tell as much as one.
 LEAST_FRAMES, ALIKE = 3, 3
 #: What is measured: the dimensions that go with it, its length over stature, and whose landmarks are its ends.
@@ -68,7 +69,7 @@ def body_of_keypoints(points: np.ndarray, height_m: float | None = None, limits:
     limits : JointLimits, optional
         Of the body.
     """
-    names, own = list(_MEASURES), FitBodySettings().length_deviation
+    names, own = list(_MEASURES), LENGTH_DEVIATION
     size = len(names) + 1  # the common scale, then what each length differs by
     deviation = STATURE_DEVIATION if height_m is None else KNOWN_DEVIATION
     matrix, vector = np.diag(np.r_[deviation, np.full(len(names), own)] ** -2.0), np.zeros(size)

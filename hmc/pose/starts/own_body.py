@@ -79,7 +79,7 @@ def own_body(
     Returns
     -------
     subject : Subject
-    deviations : tuple of 17 floats
+    deviations : tuple of 20 floats
         Of the logarithm of each of `hmc.body.dimensions.FITTED`; those of the prior where frames are too few.
     """
     picks, held_out = chosen
