@@ -19,7 +19,7 @@ from hmc.landmarks import LANDMARKS
 
 __all__ = [
     "ASYMMETRIES", "CANTON_LENGTHS", "DEFAULT_LENGTHS", "GIRTHS", "SOLE", "SOLE_PITCH", "canton_body", "default_body", "landmark_segments",
-    "longer", "make_bodies", "make_body", "sole_ends", "stature", "stiff_body",
+    "make_bodies", "make_body", "side_factor", "sole_ends", "stature", "stiff_body",
 ]  # fmt: skip
 
 #: Joint-centre lengths over stature. Trunk: hip centres' middle to the base of the neck. Sources: Winter (2009), figure 4.1
@@ -32,7 +32,8 @@ __all__ = [
 #: the skull's; silhouettes have its hair as well. Joints are not in the middle of the flesh around them: with the arms stretched sideways
 #: that of the arms is lower and more to the front; that of waist and hips is to the front, of hips inward, of ankles and feet outward, of
 #: the head to the back, by the lengths that are named so. The spine bends `lumbar` above the hips' middle, about at the lowest rib;
-#: each shoulder turns with its collar bone about a point `collar` inward (`python -m hmc.experiments run body-bias`).
+#: each shoulder turns with its collar bone about a point `collar` inward (`python -m hmc.experiments run body-bias`). How far the hips
+#: lie behind that in the flesh is each person's (`pelvis_flesh_forward`): all flesh below the neck is sheared by it.
 DEFAULT_LENGTHS: dict[str, float] = {
     "trunk": 0.318, "head": 0.147, "shoulder_half_width": 0.104, "shoulder_drop": 0.060, "hip_half_width": 0.060,
     "upper_arm": 0.157, "forearm": 0.150, "hand": 0.085, "thigh": 0.245, "shank": 0.250, "ankle_height": 0.046, "foot": 0.105,
@@ -134,7 +135,7 @@ def make_body(dimensions: dict[str, float], limits: JointLimits | None = None, s
     for side, sign in (("l", 1.0), ("r", -1.0)):
         put(f"{side}_clavicle", (0, sign * (d["shoulder_half_width"] - d["collar"]), d["trunk"] - d["shoulder_drop"] - lumbar))
         put(f"{side}_upper_arm", (0, sign * d["collar"], 0))
-        arm, leg = longer(d, "arms", side), longer(d, "legs", side)
+        arm, leg = side_factor(d, "arms", side), side_factor(d, "legs", side)
         put(f"{side}_forearm", (0, sign * arm * d["upper_arm"], 0))
         put(f"{side}_thigh", (0, sign * d["hip_half_width"], 0))
         put(f"{side}_shank", (0, 0, -leg * d["thigh"]))
@@ -146,7 +147,7 @@ def make_body(dimensions: dict[str, float], limits: JointLimits | None = None, s
     return BodyModel(float(d["height"]), offsets, tips, _flesh(d, sole), limits or default_limits(), kept)
 
 
-def longer(dimensions: Mapping[str, float], limbs: str, side: str) -> float:
+def side_factor(dimensions: Mapping[str, float], limbs: str, side: str) -> float:
     """The factor on the lengths of the limbs of one side, whose dimensions are the mean of both sides.
 
     Parameters
@@ -278,7 +279,7 @@ def _flesh(d: dict[str, float], sole: float) -> Cones:
     thighs, shanks = (d["girth_thighs"],) * 2, (d["girth_shanks"],) * 2
     front = d["arm_flesh_forward"]
     for side, sign in (("r", -1.0), ("l", 1.0)):
-        arm_longer, leg_longer = longer(d, "arms", side), longer(d, "legs", side)
+        arm_longer, leg_longer = side_factor(d, "arms", side), side_factor(d, "legs", side)
         arm, fore = sign * arm_longer * d["upper_arm"], sign * arm_longer * d["forearm"]
         armpit, elbow, wrist = (-d[f"{joint}_flesh_low"] for joint in ("shoulder", "elbow", "wrist"))
         if d["collar"] > 0:

@@ -12,7 +12,7 @@ from hmc.body.joints import SEGMENTS
 from hmc.body.kinematics import segment_transforms
 from hmc.body.limbs import LIMBS
 from hmc.body.model import BodyModel
-from hmc.body.proportions import longer
+from hmc.body.proportions import side_factor
 from hmc.body.twists import rotations_about
 
 __all__ = ["limb_joint", "limb_lengths", "reach"]
@@ -21,7 +21,7 @@ __all__ = ["limb_joint", "limb_lengths", "reach"]
 def limb_lengths(body: BodyModel, limb: str) -> tuple[float, float]:
     """Lengths of a limb's two links, metres: the lower one to the middle of the hand, or of the ankle's height."""
     d, kind, side = body.dimensions, "arms" if LIMBS[limb].is_arm else "legs", "l" if LIMBS[limb].is_left else "r"
-    factor = longer(d, kind, side)
+    factor = side_factor(d, kind, side)
     if LIMBS[limb].is_arm:
         return factor * d["upper_arm"], factor * d["forearm"] + 0.5 * d["hand"]
     return factor * d["thigh"], factor * d["shank"] + 0.5 * d["ankle_height"]

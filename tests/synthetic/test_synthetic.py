@@ -189,16 +189,21 @@ def test_angles_rebuild_the_motion(actor):
     np.testing.assert_allclose(world, motion.orientations, atol=1e-9)
 
 
-@pytest.mark.parametrize("radius", [0.0, 1.5, -1.2])
-def test_planted_feet_do_not_slide_and_the_walker_gets_ahead(actor, radius):
-    motion = gait.walk(actor.skeleton, TIMES, np.random.default_rng(0), 1.2, radius)
-    marks = landmark_positions(actor.skeleton, motion.root, motion.orientations)
+@pytest.mark.parametrize(("radius", "longer_left"), [(0.0, 0.0), (1.5, 0.0), (-1.2, 0.0), (1.5, 0.05), (-1.2, -0.05)])
+def test_planted_feet_do_not_slide_and_the_walker_gets_ahead(radius, longer_left):
+    skeleton = make_skeleton(1.72, "man", np.random.default_rng(3), (-longer_left, longer_left))
+    motion = gait.walk(skeleton, TIMES, np.random.default_rng(0), 1.2, radius)
+    marks = landmark_positions(skeleton, motion.root, motion.orientations)
+    for bones, share in ((("hip", "knee", "ankle"), longer_left), (("shoulder", "elbow", "wrist"), -longer_left)):
+        at = np.array([[marks[0, landmark_index(f"{side}_{bone}")] for bone in bones] for side in "lr"])
+        left, right = np.linalg.norm(np.diff(at, axis=1), axis=2)
+        np.testing.assert_allclose(left - right, share * (left + right) / 2, atol=1e-9)
     speed = np.linalg.norm(np.diff(motion.root[:, :2], axis=0), axis=1).sum() / TIMES[-1]
     assert speed == pytest.approx(1.2, rel=0.05)
     flat = np.array([motion.orientations[:, BONE_NAMES.index(f"{side}_foot"), 2, 0] for side in "lr"]).T  # sine of the foot's pitch
     for s, side in enumerate("lr"):
         ankle = marks[:, landmark_index(f"{side}_ankle")]
-        down = (np.abs(flat[:, s]) < 0.01) & (ankle[:, 2] < actor.skeleton.ankle_height + 0.01)
+        down = (np.abs(flat[:, s]) < 0.01) & (ankle[:, 2] < skeleton.ankle_height + 0.01)
         planted = down[1:] & down[:-1]
         assert planted.mean() > 0.15
         assert np.linalg.norm(np.diff(ankle, axis=0), axis=1)[planted].max() < 0.005

@@ -239,6 +239,7 @@ def test_the_shipped_recipes_cover_the_motions():
         ({"furniture": [{"kind": "table", "at_m": [0, 0], "size_m": [1, 1e9, 1]}]}, "each side of a piece of furniture, size_m, must lie"),
         ({"rig": {"size_px": [10**6, 480]}}, "each side of the images, size_px, must lie between"),
         ({"actor": [{"loose_m": 1e6}]}, "loose_m must lie between"),
+        ({"actor": [{"longer_left": [0.0, 0.5]}]}, r"longer_left \(leg\) must lie between"),
         ({"actor": [{"motion": "bvh"}]}, "go together"),
         ({"actor": [{}] * 6}, "at most 5 actors"),
         ({"rig": 3}, r"\[rig\]: must be a table"),
