@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hmc.body.proportions import DEFAULT_LENGTHS
 from hmc.io.results import read_joints
 from hmc.landmarks import landmark_index
 
@@ -37,7 +38,9 @@ def true_lengths(positions: np.ndarray) -> dict[str, float]:
     true |= {name: apart(at[joint]["l"], at[joint]["r"]) / 2 for name, joint in ACROSS.items()}
     hips = (at["hip"]["l"] + at["hip"]["r"]) / 2
     neck, crown = (positions[:, landmark_index(name)] for name in ("neck", "head_top"))
-    true |= {"trunk": apart(neck, hips), "head": apart(crown, neck)}
+    # The crown is before the line of neck and head, along which the head is measured.
+    slant = np.hypot(1, DEFAULT_LENGTHS["head_forward"] / DEFAULT_LENGTHS["head"])
+    true |= {"trunk": apart(neck, hips), "head": apart(crown, neck) / float(slant)}
     for name, bones in ASYMMETRIC.items():
         left, right = (sum(sides[bone][k] for bone in bones) for k in (0, 1))
         true[name] = 2 * (left - right) / (left + right)
@@ -52,9 +55,9 @@ def main() -> None:
     off: dict[str, list[tuple[float, float]]] = {}
     for pair in args.results:
         result, recording = (Path(part) for part in pair.split("="))
-        known = next(iter(tomllib.loads((result / "run.toml").read_text())["bodies"]["known_to_percent"].values()))
+        person, known = next(iter(tomllib.loads((result / "run.toml").read_text())["bodies"]["known_to_percent"].items()))
         with np.load(result / "pose.npz") as stored:
-            own = {name.split("/")[-1]: float(stored[name]) for name in stored.files if name.startswith("body/")}
+            own = {name: float(stored[f"body/{person}/{name}"]) for name in known}
         for name, value in true_lengths(read_joints(recording / "truth" / "joints.csv").positions).items():
             error = own[name] - value if name in ASYMMETRIC else np.log(own[name] / value)
             off.setdefault(name, []).append((100 * error, known[name]))

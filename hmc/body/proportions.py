@@ -32,8 +32,8 @@ __all__ = [
 #: the skull's; silhouettes have its hair as well. Joints are not in the middle of the flesh around them: with the arms stretched sideways
 #: that of the arms is lower and more to the front; that of waist and hips is to the front, of hips inward, of ankles and feet outward, of
 #: the head to the back, by the lengths that are named so. The spine bends `lumbar` above the hips' middle, about at the lowest rib;
-#: each shoulder turns with its collar bone about a point `collar` inward (`python -m hmc.experiments run body-bias`). How far the hips
-#: lie behind that in the flesh is each person's (`pelvis_flesh_forward`): all flesh below the neck is sheared by it.
+#: each shoulder turns with its collar bone about a point `collar` inward (`python -m hmc.experiments run body-bias`). How far the flesh
+#: of hips and trunk lies before their joints is each person's besides (`pelvis_flesh_forward`): all of it at the hips, nothing at the neck.
 DEFAULT_LENGTHS: dict[str, float] = {
     "trunk": 0.318, "head": 0.147, "shoulder_half_width": 0.104, "shoulder_drop": 0.060, "hip_half_width": 0.060,
     "upper_arm": 0.157, "forearm": 0.150, "hand": 0.085, "thigh": 0.245, "shank": 0.250, "ankle_height": 0.046, "foot": 0.105,
@@ -42,10 +42,11 @@ DEFAULT_LENGTHS: dict[str, float] = {
     "waist_flesh_forward": 0.0046, "hip_flesh_forward": 0.0034, "hip_flesh_inward": 0.0020,
     "ankle_flesh_outward": 0.0046, "head_flesh_back": 0.007, "lumbar": 0.143, "collar": 0.083, "pelvis_flesh_forward": 0.0,
 }  # fmt: skip
-#: By how much of their length left limbs are longer than right ones; 0 in an average person.
+#: By how much of their length left limbs are longer than right ones, 0 in an average person, and how much that may be.
 ASYMMETRIES: tuple[str, ...] = ("arms_longer_left", "legs_longer_left")
-#: What is 0 in a body that was stored before it was known, and in Canton's: joints in the middle of the flesh, which ends at the crown, and
-#: a trunk of one piece.
+MOST_ASYMMETRY = 0.5
+#: What is 0 in a body that was stored before it was known, and in Canton's: joints in the middle of the flesh, which ends at the crown, a
+#: trunk of one piece, and limbs as long on both sides.
 _ONCE_UNKNOWN = ("hair", "lumbar", "collar", *ASYMMETRIES, *(name for name in DEFAULT_LENGTHS if "_flesh_" in name))
 
 #: Table 6.1 of Canton (2009), which gives no widths (hips: ours; shoulders: so that the arms span about the height), no hand or foot.
@@ -112,16 +113,20 @@ def make_body(dimensions: dict[str, float], limits: JointLimits | None = None, s
     Raises
     ------
     InputError
-        When a dimension is missing or not finite, or negative where that is no place beside a joint or an asymmetry.
+        When a dimension is missing or not finite, when a size is negative, and when an asymmetry is beyond `MOST_ASYMMETRY`.
     """
     wanted = ["height", *DEFAULT_LENGTHS, *(f"girth_{group}" for group in GIRTHS), *ASYMMETRIES]
     dimensions = dict.fromkeys(_ONCE_UNKNOWN, 0.0) | dimensions
     for name in wanted:
         value = dimensions.get(name, np.nan)
-        signed = "_flesh_" in name or name in ASYMMETRIES
-        if not np.isfinite(value) or (value < 0 and not signed):
-            least = "" if signed else " of at least 0"
-            raise InputError(f"body dimension '{name}' must be a number{least}; got {dimensions.get(name)}")
+        if name in ASYMMETRIES:
+            right, wanted_of = abs(value) <= MOST_ASYMMETRY, f"a share between -{MOST_ASYMMETRY} and {MOST_ASYMMETRY}"
+        elif name == "pelvis_flesh_forward":
+            right, wanted_of = True, "a number of metres"
+        else:
+            right, wanted_of = value >= 0, "a number of at least 0"
+        if not (np.isfinite(value) and right):
+            raise InputError(f"body dimension '{name}' must be {wanted_of}; got {dimensions.get(name)}")
     d = dimensions
     offsets = np.zeros((len(SEGMENTS), 3))
     tips = np.zeros((len(LANDMARKS), 3))

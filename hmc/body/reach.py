@@ -20,8 +20,7 @@ __all__ = ["limb_joint", "limb_lengths", "reach"]
 
 def limb_lengths(body: BodyModel, limb: str) -> tuple[float, float]:
     """Lengths of a limb's two links, metres: the lower one to the middle of the hand, or of the ankle's height."""
-    d, kind, side = body.dimensions, "arms" if LIMBS[limb].is_arm else "legs", "l" if LIMBS[limb].is_left else "r"
-    factor = side_factor(d, kind, side)
+    d, factor = body.dimensions, side_factor(body.dimensions, limb[2:] + "s", limb[0])
     if LIMBS[limb].is_arm:
         return factor * d["upper_arm"], factor * d["forearm"] + 0.5 * d["hand"]
     return factor * d["thigh"], factor * d["shank"] + 0.5 * d["ankle_height"]

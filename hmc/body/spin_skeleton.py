@@ -148,6 +148,7 @@ def model_of_body(body: BodyModel, thesis: bool = False) -> SkeletonModel:
     Parameters
     ----------
     body : BodyModel
+        Both sides get the mean of its limbs.
     thesis : bool
         Ranges as printed.
     """

@@ -8,6 +8,7 @@ what keeps the start off it is that our joints are not.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -134,7 +135,11 @@ def _body(points: np.ndarray, without: tuple[str, ...], sole: float, held: tuple
         "thigh": both("hip", "knee"),
         "shank": both("knee", "ankle"),
     }
-    dimensions = default_body(stature(DEFAULT_LENGTHS | lengths)).dimensions | lengths
+    sides: dict[str, float] = {}
+    for kind, joints in (("arms", ("shoulder", "elbow", "wrist")), ("legs", ("hip", "knee", "ankle"))):
+        left, right = (sum(apart((f"{side}_{one}", f"{side}_{other}")) for one, other in pairwise(joints)) for side in "lr")
+        sides[f"{kind}_longer_left"] = 2 * (left - right) / (left + right)
+    dimensions = default_body(stature(DEFAULT_LENGTHS | lengths)).dimensions | lengths | sides
     return make_body(dimensions | dict.fromkeys(without, 0.0), default_limits(held), sole)
 
 

@@ -78,8 +78,8 @@ class PosedPeople(FinishedPeople):
     turned : mapping of str to ndarray, shape (3,)
         Cameras that were turned back before poses were found (`hmc.pose.turned_back`).
     known : mapping of int to mapping of str to float
-        How well each fitted dimension of each person's body is known: deviation of its logarithm. Of methods that fit none over the run
-        none.
+        How well each fitted dimension of each person's body is known (`hmc.body.dimensions.whole_deviations`). Of methods that fit none
+        over the run none.
     """
 
     poses: PoseTable

@@ -159,7 +159,7 @@ def sit(skeleton: Skeleton, times: np.ndarray, rng: np.random.Generator, seat_m:
     #       pelvis back, drop, pelvis pitch, spine pitch, head pitch, hands (x, z)
     up = [0.0, 0.01, 0.0, 0.03, 0.0, 0.10, -0.94]
     bent = [0.18, 0.45 * (stretch - down), 0.55, 0.35, -0.45, 0.55, -0.55]
-    seated = [0.80 * skeleton.length("l_shank"), stretch - down, 0.12, 0.05, -0.05, 0.50, -0.74]
+    seated = [0.80 * min(skeleton.length("l_shank"), skeleton.length("r_shank")), stretch - down, 0.12, 0.05, -0.05, 0.50, -0.74]
     settled = [*seated[:2], -0.14, 0.10, -0.02, 0.50, -0.72]
     curve = keyframes(times, at, np.array([up, bent, seated, settled, settled, seated, bent, up]))
     back, drop, tilt, spine, nod, x, z = curve.T

@@ -283,8 +283,9 @@ def _foot(forward: np.ndarray, shank: np.ndarray, slope: float) -> np.ndarray:
 
 def _root(joint: dict[str, np.ndarray], skeleton: Skeleton) -> np.ndarray:
     """The path of the hips, scaled by the length of the legs; that settles the file's unit too."""
-    lengths = [np.linalg.norm(joint[f"l_{b}"] - joint[f"l_{a}"], axis=-1).mean() for a, b in (("hip", "knee"), ("knee", "ankle"))]
-    scale = (skeleton.length("l_shank") + skeleton.length("l_foot")) / sum(lengths)
+    bones = (("hip", "knee"), ("knee", "ankle"))
+    lengths = [np.linalg.norm(joint[f"{side}_{b}"] - joint[f"{side}_{a}"], axis=-1).mean() for side in "lr" for a, b in bones]
+    scale = sum(skeleton.length(f"{side}_{bone}") for side in "lr" for bone in ("shank", "foot")) / sum(lengths)
     return (joint["l_hip"] + joint["r_hip"]) / 2 * scale
 
 

@@ -66,24 +66,25 @@ def dress(region: np.ndarray, vertices: np.ndarray, posed: PosedSkeleton, clothe
     """
     skeleton, joints = posed.skeleton, posed.joints
 
-    def along(bone: str) -> np.ndarray:
-        k = BONE_NAMES.index(f"l_{bone}")
-        mirrored = vertices * [1, -1, 1] * (vertices[:, 1:2] < 0) + vertices * (vertices[:, 1:2] >= 0)
-        return (mirrored - joints[k]) @ posed.frames[k]
+    def along(bone: str, below: str) -> np.ndarray:
+        """Where vertices are in the frame of their side's bone, as of the left one, in lengths from it to the bone below."""
+        left, right = (BONE_NAMES.index(f"{side}_{bone}") for side in "lr")
+        of_left = (vertices - joints[left]) @ posed.frames[left] / skeleton.length(f"l_{below}")
+        mirrored = (vertices * [1, -1, 1] - joints[right] * [1, -1, 1]) @ posed.frames[left] / skeleton.length(f"r_{below}")
+        return np.where(vertices[:, 1:2] >= 0, of_left, mirrored)
 
     trunk_height = joints[BONE_NAMES.index("neck"), 2] - joints[0, 2]
     height = (vertices[:, 2] - joints[0, 2]) / trunk_height
     shirt = ((region == "trunk") & (height > 0.20) & (height < 0.965)) | (region == "clavicle")
-    arm_length = skeleton.length("l_forearm")
     if clothes.sleeves == "long":
         shirt |= (region == "upper_arm") | (region == "forearm")
     else:
-        shirt |= (region == "upper_arm") & (along("upper_arm")[:, 1] < 0.62 * arm_length)
+        shirt |= (region == "upper_arm") & (along("upper_arm", "forearm")[:, 1] < 0.62)
     trousers = ((region == "trunk") & (height <= 0.20)) | (region == "thigh")
     if clothes.legs == "long":
         trousers |= region == "shank"
     else:
-        trousers &= (region != "thigh") | (along("thigh")[:, 2] > -0.85 * skeleton.length("l_shank"))
+        trousers &= (region != "thigh") | (along("thigh", "shank")[:, 2] > -0.85)
     head = vertices - joints[BONE_NAMES.index("head")]
     scalp = np.isin(region, ["head"]) & ((head[:, 2] > 0.095) | ((head[:, 0] < -0.005) & (head[:, 2] > 0.0)))
     hair = scalp | np.isin(region, ["hair", "long_hair"])

@@ -61,7 +61,7 @@ class Skeleton:
 
     @property
     def hip_height(self) -> float:
-        """Height of the hip centres above the sole with straight legs, the shorter one's, metres."""
+        """Height of the hip centres above the sole where the shorter leg is straight, metres."""
         return min(self.length(f"{side}_shank") + self.length(f"{side}_foot") for side in "lr") + self.ankle_height
 
     @property

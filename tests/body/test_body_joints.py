@@ -162,10 +162,14 @@ def test_hips_that_lie_farther_back_in_the_flesh_leave_joints_and_the_neck_where
     assert_allclose(by[:, 1:], 0, atol=1e-12)
     # Sheared: all at the hips' height, nothing at the neck, in between as much as that is from the neck.
     hip, neck = landmarks(usual, state)[[landmark_index("pelvis"), landmark_index("neck")], 2]
-    trunk = np.tile(np.isin([PARTS[part] for part in usual.cones.part], ["torso"]), 2) & (np.abs(before[:, 2] - hip) > 0.07)
-    trunk &= by[:, 0] > 0
-    assert trunk.any() and by[:, 0].max() == pytest.approx(0.02) and by[:, 0].min() == 0
+    names = np.tile([SEGMENTS[k].name for k in carrier], 2)
+    trunk = np.isin(names, ["pelvis", "torso", "chest"]) & (before[:, 2] > hip)
+    assert np.count_nonzero(trunk) == 7
     assert_allclose(by[trunk, 0], 0.02 * (neck - before[trunk, 2]) / (neck - hip), atol=1e-9)
+    tops = (np.abs(before[:, 2] - hip) < 1e-9) | (np.isin(names, ["pelvis"]) & ~trunk)
+    assert np.count_nonzero(tops) == 3
+    assert_allclose(by[tops, 0], 0.02)
+    assert_allclose(by[~trunk & ~tops, 0], 0, atol=1e-12)
 
 
 @pytest.mark.parametrize("group", ["torso", "depth", "head", "arms", "thighs", "shanks"])
@@ -197,7 +201,16 @@ def test_nobody_has_such_a_height(height):
 
 
 @pytest.mark.parametrize(
-    ("name", "value"), [("trunk", None), ("trunk", np.nan), ("girth_head", -0.1), ("height", np.inf), ("legs_longer_left", np.nan)]
+    ("name", "value"),
+    [
+        ("trunk", None),
+        ("trunk", np.nan),
+        ("girth_head", -0.1),
+        ("height", np.inf),
+        ("legs_longer_left", np.nan),
+        ("arms_longer_left", -0.6),
+        ("hip_flesh_forward", -0.01),
+    ],
 )
 def test_wrong_dimensions_are_named(name, value):
     dimensions = dict(default_body(1.7).dimensions)

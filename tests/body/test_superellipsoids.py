@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from hmc.body.contours import contour_points, hidden, make_strips
 from hmc.body.joints import default_limits
 from hmc.body.model import neutral_state
-from hmc.body.proportions import default_body
+from hmc.body.proportions import default_body, make_body
 from hmc.body.solid_samples import draw_samples, surface_grid
 from hmc.body.solids import CHAINS, FREE_NAMES, GROUPS, solid_body, to_world
 from hmc.body.superellipsoids import Superellipsoids, inside_outside, normals_at, points_at
@@ -86,6 +86,18 @@ def test_draws_are_from_the_groups_without_repeats(body):
     assert len(np.unique(first)) == 160
     np.testing.assert_array_equal(np.bincount(grid.group[first]), counts)
     assert len(np.intersect1d(first, second)) < 80
+
+
+def test_solids_are_as_long_as_their_side_and_lie_where_the_flesh_does():
+    usual = default_body(1.7)
+    other = solid_body(make_body(usual.dimensions | {"arms_longer_left": 0.06, "legs_longer_left": -0.04, "pelvis_flesh_forward": 0.02}))
+    before = solid_body(usual)
+    ratio = dict(zip(other.names, (other.solids.along / before.solids.along)[:, 1], strict=True))
+    moved = dict(zip(other.names, (other.origin - before.origin)[:, 0], strict=True))
+    for side, sign in (("l", 1), ("r", -1)):
+        assert (ratio[f"{side}_upper_arm"], ratio[f"{side}_thigh"]) == pytest.approx((1 + 0.03 * sign, 1 - 0.02 * sign))
+        assert moved[f"{side}_thigh"] == pytest.approx(0.02) and moved[f"{side}_shank"] == 0
+    assert moved["pelvis"] > moved["chest"] > 0 == moved["head"]
 
 
 def test_contour_of_a_sphere_is_the_circle_of_tangents():

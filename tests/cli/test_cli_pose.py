@@ -19,6 +19,7 @@ from hmc.io.results import read_joints, read_pose, read_run, read_tracks
 from hmc.landmarks import LANDMARKS
 from hmc.pose import backward, follow, registry
 from hmc.pose.clear_views import BorneOut
+from hmc.pose.starts.fit_body import KNOWN_STATURE
 from hmc.pose.trust import trust_features, trust_of
 from hmc.voxels import hulls as frontend
 
@@ -82,7 +83,8 @@ def test_a_run_leaves_its_files_and_its_silhouettes_and_nothing_else(finished):
     assert run["method"] == "apf" and run["seed"] == 0
     known = run["bodies"]["known_to_percent"]["0"]
     assert list(known) == list(FITTED)
-    assert known["height"] == 0.8 and known["girth_arms"] == 10.0  # the stature is given, and five frames tell too little
+    # The stature is given, and five frames tell too little.
+    assert known["height"] == round(100 * KNOWN_STATURE, 1) and known["girth_arms"] == 10.0
     # Of five coarse frames, with little work, the one or the other landmark is not trusted; nothing else is odd.
     assert len(run["problems"]) <= 1 and all("by their trust" in line for line in run["problems"])
     assert run["parameters"]["voxel_size_m"] == 0.05 and run["parameters"]["preset"]["name"] == "default"
@@ -98,7 +100,9 @@ def test_of_a_good_run_nothing_is_told(tmp_path, monkeypatch):
     run, joints, truth = read_run(tmp_path / "run.toml"), read_joints(tmp_path / "joints.csv"), read_joints(TINY / "truth" / "joints.csv")
     assert run["problems"] == []
     by_the_prior = 100 * whole_deviations(np.diag(prior_deviations(FitBodySettings()) ** 2))
-    assert all(0 < told < prior for told, prior in zip(run["bodies"]["known_to_percent"]["0"].values(), by_the_prior, strict=True))
+    told = run["bodies"]["known_to_percent"]["0"]
+    assert all(0 < own <= round(prior, 1) for own, prior in zip(told.values(), by_the_prior, strict=True))
+    assert all(told[name] < 0.8 * by_the_prior[FITTED.index(name)] for name in ("height", "thigh", "trunk", "girth_torso"))
     assert np.median(np.linalg.norm(joints.positions - truth.where(truth.frames < 8).positions, axis=-1)) < 0.03
 
 

@@ -81,7 +81,8 @@ def result(tmp_path_factory):
 
 def test_bodies_from_before_the_trunk_bent_are_drawn_as_they_were(result, tmp_path):
     shutil.copytree(result, tmp_path / "old")
-    now, then = read_pose(result / "pose.npz"), {"lumbar": 0.0, "collar": 0.0}
+    now = read_pose(result / "pose.npz")
+    then = dict.fromkeys(("lumbar", "collar", "pelvis_flesh_forward", "arms_longer_left", "legs_longer_left"), 0.0)
     lengths = {name: value for name, value in now.bodies[0].items() if name not in then}
     write_pose(tmp_path / "old" / "pose.npz", PoseStates(now.frames, now.persons, now.states[:, :27], DOF_NAMES[:27], {0: lengths}))
     old = read_result(tmp_path / "old")

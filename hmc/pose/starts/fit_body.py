@@ -1,9 +1,9 @@
 """The person's own dimensions: lengths and girths fitted together with the poses of some frames.
 
-The thesis scales one table by the stature and leaves the fit open (Canton 2009, section 9.2). Here the logarithms of the
-dimensions and the poses of all frames are found together by damped Gauss-Newton steps on the symmetric cost; a Gaussian
-prior keeps the dimensions near the average person's. The poses are eliminated frame by frame (Schur complement), so the
-work grows linearly with the frames.
+The thesis scales one table by the stature and leaves the fit open (Canton 2009, section 9.2). Here the body's shape
+(`hmc.body.dimensions.reshaped`) and the poses of all frames are found together by damped Gauss-Newton steps on the symmetric
+cost; a Gaussian prior keeps the dimensions near the average person's. The poses are eliminated frame by frame (Schur
+complement), so the work grows linearly with the frames.
 """
 
 from __future__ import annotations
@@ -23,10 +23,12 @@ from hmc.pose.objectives.symmetric import body_points
 from hmc.processes import share_out
 from hmc.search.gauss_newton import damped, movable
 
-__all__ = ["WORTH_IT", "FitBodyInfo", "fit_body", "with_known_stature"]
+__all__ = ["WORTH_IT", "FitBodyInfo", "fit_body", "of_a_start", "with_known_stature"]
 
 #: Deviation of the stature's logarithm where the stature was given.
 KNOWN_STATURE = 0.0075
+#: Deviation of asymmetries at a start, which may have taken one leg for the other: only a whole run tells which is longer.
+SIDES_UNKNOWN = 1e-3
 #: A fitted body is taken where it lowers the cost to this share at most.
 WORTH_IT = 0.97
 
@@ -42,7 +44,8 @@ class FitBodyInfo:
     cost_before, cost_after : float
         Mean of a frame, square metres.
     deviations : tuple of n_fitted floats
-        How well the frames and the prior tell each dimension: deviation of its logarithm, by the weight of the prior against the cost.
+        How well the frames and the prior tell each dimension (`hmc.body.dimensions.whole_deviations`), by the weight of the prior against
+        the cost.
     """
 
     cost_before: float
@@ -61,7 +64,7 @@ class _Prior:
     hold : ndarray, shape (37,)
         Cost of a squared unit away from them.
     precision : ndarray, shape (n_fitted,)
-        Cost a frame of a squared change of each dimension's logarithm.
+        Cost a frame of a squared change of the shape.
     highest : ndarray, shape (n_fitted,)
         The largest change of each.
     """
@@ -75,6 +78,11 @@ class _Prior:
 def with_known_stature(settings: FitBodySettings, known: bool) -> FitBodySettings:
     """Settings by which the fit changes the stature little, where it is known."""
     return replace(settings, scale_deviation=KNOWN_STATURE) if known else settings
+
+
+def of_a_start(settings: FitBodySettings, known: bool) -> FitBodySettings:
+    """Settings by which a start fits a body, both sides alike; whether the stature is known."""
+    return with_known_stature(replace(settings, asymmetry_deviation=SIDES_UNKNOWN), known)
 
 
 def fit_body(
@@ -101,7 +109,7 @@ def fit_body(
     info : FitBodyInfo
     """
     body = objectives[0].body
-    hold = 4e-6 / np.r_[np.full(3, 0.1), np.full(N_DOF - 3, 0.5)] ** 2
+    hold = 1e-6 / np.r_[np.full(3, 0.05), np.full(N_DOF - 3, 0.25)] ** 2
     precision = settings.prior_weight / prior_deviations(settings) ** 2
     states = np.clip(states, body.limits.low, body.limits.high)
     prior = _Prior(states, hold, precision, highest_shape(body))

@@ -80,7 +80,7 @@ def own_body(
     -------
     subject : Subject
     deviations : tuple of 20 floats
-        Of the logarithm of each of `hmc.body.dimensions.FITTED`; those of the prior where frames are too few.
+        Of each of `hmc.body.dimensions.FITTED` (`hmc.body.dimensions.whole_deviations`); those of the prior where frames are too few.
     """
     picks, held_out = chosen
     if not picks or not held_out:

@@ -10,7 +10,7 @@ import numpy as np
 from hmc.body.flesh import surface_coordinates
 from hmc.body.model import BodyModel
 from hmc.pose.method import Capture, make_subject
-from hmc.pose.starts.fit_body import WORTH_IT, fit_body, with_known_stature
+from hmc.pose.starts.fit_body import WORTH_IT, fit_body, of_a_start
 from hmc.pose.steps.descent.tracker import SmdPreset, SmdTracker, TrackState, make_tracker, track_init, track_step
 from hmc.pose.steps.polish import fine_objective
 from hmc.pose.steps.presets import PRESETS
@@ -104,7 +104,7 @@ def fitted_body(
         return None
     picks = np.unique(np.linspace(0, len(states) - 1, FIT_FRAMES).round().astype(int))
     objectives = [fine_objective(rng, subject, PersonView(target=targets[k]), preset.polish) for k in picks]
-    settings = with_known_stature(preset.fit_body, height_known)
+    settings = of_a_start(preset.fit_body, height_known)
     coordinates = surface_coordinates(body, preset.surface_samples)
     found, _, info = fit_body(objectives, np.array([states[k] for k in picks]), coordinates, settings)
     return found if info.cost_after < WORTH_IT * info.cost_before else None

@@ -20,7 +20,7 @@ from hmc.body.model import BodyModel, neutral_state
 from hmc.body.proportions import canton_body, default_body, stiff_body
 from hmc.pose.method import Capture, FrameRng, StartPose, StepInfo, Subject, Tracked, begin_tracking
 from hmc.pose.starts.candidates import StartSettings, candidates, search_all, walk_factor
-from hmc.pose.starts.fit_body import with_known_stature
+from hmc.pose.starts.fit_body import of_a_start
 from hmc.pose.starts.own_body import choose_frames, own_body
 from hmc.pose.starts.stature import possible_heights, usable_frames
 from hmc.pose.starts.walk import quick_step, walk
@@ -235,7 +235,7 @@ def _fit(subject: Subject, window: _Window, path: Sequence[tuple[Tracked, StepIn
         subject,
         poses,
         chosen,
-        with_known_stature(preset.fit_body, height_known),
+        of_a_start(preset.fit_body, height_known),
         preset.polish.refine,
         preset.surface_samples,
         lambda body: annealed_subject(body, subject.capture, preset),
