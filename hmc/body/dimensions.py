@@ -42,8 +42,8 @@ class FitBodySettings:
         That of joints' places in the flesh, over the stature.
     asymmetry_deviation : float
         That of how much longer left limbs are than right ones, in shares of their length. Legs differ by 5.2 mm on the mean (deviation 4.1;
-        Knutson 2005, Chiropractic & Osteopathy 13: 11), which is .8 %. By this one legs get a third of what a free fit has, which for people
-        with equal legs is off by 1.2 % (docs/accuracy.md, "Hips in the flesh, shoulders and sides").
+        Knutson 2005, Chiropractic & Osteopathy 13: 11), which is .8 %. By this one legs get a third of what a free fit has, which is off by
+        1.2 % for people with equal legs (docs/accuracy.md, "Hips in the flesh, shoulders and sides").
     prior_weight : float
         Square metres that one prior deviation in one dimension costs a frame. Residuals of neighbouring frames and places go together; by
         this weight dimensions are about as far off as the fit says (`python docs/known_lengths.py`).
