@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from hmc.body.dimensions import FitBodySettings
 from hmc.errors import InputError
 from hmc.experiments.engine.experiment import Cell, Parameters, Results, Source
 from hmc.experiments.engine.inputs import Inputs, once, recipe_of
@@ -48,6 +49,8 @@ FEW, MANY = 4, 7
 _KEY = "chain"
 #: To six decimals, as in ``joints.csv``, metres.
 _DECIMALS = 6
+#: A deviation by which nothing moves.
+_HELD = 1e-6
 
 
 @dataclass(frozen=True)
@@ -77,6 +80,9 @@ PARTS: dict[str, Part] = {
     WHOLE: Part(),
     "second pass": Part(back=None),
     "own body of the whole run": Part(back={"fit_body": None}),
+    "hips where each has them": Part(preset={"fit_body": FitBodySettings(place_deviation=_HELD)}),
+    "shoulders as people's differ": Part(preset={"fit_body": FitBodySettings(shoulders_deviation=FitBodySettings().length_deviation)}),
+    "limbs of unequal length": Part(back={"fit_body": FitBodySettings(asymmetry_deviation=_HELD)}),
     "what furniture hides": Part(back={"hidden_places": False}),
     "others' rays": Part(back={"own_rays": False}),
     "a trunk that bends": Part(preset={"body": "stiff"}),
