@@ -26,7 +26,7 @@ LABEL = "tiny@0"
 FRAMES, SEED = 8, 2
 #: Parts of the second pass, whose first pass is the whole's.
 SECOND = (
-    "second pass", "own body of the whole run", "what furniture hides", "others' rays",
+    "second pass", "own body of the whole run", "limbs of unequal length", "what furniture hides", "others' rays",
     "fresh starts for who is lost",
     "turning about who faces backwards",
     "colors of a person's parts",
@@ -101,6 +101,8 @@ def test_every_part_changes_one_thing_only():
         method = chain_runs.method_without(part)
         changed = [method.settings != whole.settings, (method.recover is None) or (method.legs is None), method.back != whole.back]
         assert any(changed) == (name != WHOLE and not part.frontend), name
+    for name, field in (("hips where each has them", "place_deviation"), ("limbs of unequal length", "asymmetry_deviation")):
+        assert getattr(chain_runs.method_without(PARTS[name]).back.fit_body, field) < 1e-4 < getattr(whole.back.fit_body, field)
     stiff = chain_runs.method_without(PARTS["a trunk that bends"])
     held = np.array([name.startswith(TRUNK_JOINTS) for name in DOF_NAMES])
     assert not stiff.limits.low[held].any() and not stiff.limits.high[held].any()
