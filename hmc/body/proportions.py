@@ -8,6 +8,7 @@ than people's; it is the preset `canton_body`.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from numbers import Real
 
 import numpy as np
@@ -18,8 +19,8 @@ from hmc.errors import InputError
 from hmc.landmarks import LANDMARKS
 
 __all__ = [
-    "ASYMMETRIES", "CANTON_LENGTHS", "DEFAULT_LENGTHS", "GIRTHS", "SOLE", "SOLE_PITCH", "canton_body", "default_body", "landmark_segments",
-    "make_bodies", "make_body", "side_factor", "sole_ends", "stature", "stiff_body",
+    "ASYMMETRIES", "CANTON_LENGTHS", "DEFAULT_LENGTHS", "GIRTHS", "SOLE", "SOLE_PITCH", "canton_body", "default_body", "flesh_ahead",
+    "landmark_segments", "make_bodies", "make_body", "side_factor", "sole_ends", "stature", "stiff_body",
 ]  # fmt: skip
 
 #: Joint-centre lengths over stature. Trunk: hip centres' middle to the base of the neck. Sources: Winter (2009), figure 4.1
@@ -42,9 +43,10 @@ DEFAULT_LENGTHS: dict[str, float] = {
     "waist_flesh_forward": 0.0046, "hip_flesh_forward": 0.0034, "hip_flesh_inward": 0.0020,
     "ankle_flesh_outward": 0.0046, "head_flesh_back": 0.007, "lumbar": 0.143, "collar": 0.083, "pelvis_flesh_forward": 0.0,
 }  # fmt: skip
-#: By how much of their length left limbs are longer than right ones, 0 in an average person, and how much that may be.
+#: By how much of their length left limbs are longer than right ones, 0 in an average person.
 ASYMMETRIES: tuple[str, ...] = ("arms_longer_left", "legs_longer_left")
-MOST_ASYMMETRY = 0.5
+#: Between what dimensions lie that may be negative, shares and metres.
+_BOUNDS = dict.fromkeys(ASYMMETRIES, (-0.5, 0.5)) | {"pelvis_flesh_forward": (-0.5, 0.5)}
 #: What is 0 in a body that was stored before it was known, and in Canton's: joints in the middle of the flesh, which ends at the crown, a
 #: trunk of one piece, and limbs as long on both sides.
 _ONCE_UNKNOWN = ("hair", "lumbar", "collar", *ASYMMETRIES, *(name for name in DEFAULT_LENGTHS if "_flesh_" in name))
@@ -113,20 +115,16 @@ def make_body(dimensions: dict[str, float], limits: JointLimits | None = None, s
     Raises
     ------
     InputError
-        When a dimension is missing or not finite, when a size is negative, and when an asymmetry is beyond `MOST_ASYMMETRY`.
+        When a dimension is missing or not finite, when a size is negative, and when a difference is no person's.
     """
     wanted = ["height", *DEFAULT_LENGTHS, *(f"girth_{group}" for group in GIRTHS), *ASYMMETRIES]
     dimensions = dict.fromkeys(_ONCE_UNKNOWN, 0.0) | dimensions
     for name in wanted:
         value = dimensions.get(name, np.nan)
-        if name in ASYMMETRIES:
-            right, wanted_of = abs(value) <= MOST_ASYMMETRY, f"a share between -{MOST_ASYMMETRY} and {MOST_ASYMMETRY}"
-        elif name == "pelvis_flesh_forward":
-            right, wanted_of = True, "a number of metres"
-        else:
-            right, wanted_of = value >= 0, "a number of at least 0"
-        if not (np.isfinite(value) and right):
-            raise InputError(f"body dimension '{name}' must be {wanted_of}; got {dimensions.get(name)}")
+        least, most = _BOUNDS.get(name, (0, np.inf))
+        if not (np.isfinite(value) and least <= value <= most):
+            between = f" of at least {least}" if most == np.inf else f" between {least} and {most}"
+            raise InputError(f"body dimension '{name}' must be a number{between}; got {dimensions.get(name)}")
     d = dimensions
     offsets = np.zeros((len(SEGMENTS), 3))
     tips = np.zeros((len(LANDMARKS), 3))
@@ -164,6 +162,19 @@ def side_factor(dimensions: Mapping[str, float], limbs: str, side: str) -> float
     """
     share = 0.5 * dimensions.get(f"{limbs}_longer_left", 0.0)
     return 1 + share if side == "l" else 1 - share
+
+
+def flesh_ahead(dimensions: Mapping[str, float], at: float) -> float:
+    """How far the trunk's flesh lies before the line from the hips to the neck, metres, beside what it does in an average person.
+
+    Parameters
+    ----------
+    dimensions : mapping
+        As `make_body` takes them.
+    at : float
+        Share of the line: all of it at the hips, 0, and nothing at the neck, 1.
+    """
+    return (1 - at) * dimensions["pelvis_flesh_forward"]
 
 
 def make_bodies(dimensions: Mapping[int, Mapping[str, float | np.ndarray]], limits: JointLimits | None = None) -> dict[int, BodyModel]:
@@ -261,11 +272,7 @@ def _flesh(d: dict[str, float], sole: float) -> Cones:
     chest, face = d["chest_forward"], d["head_forward"] - d["head_flesh_back"]
     nape = 0.4 * chest
     waist = nape + d["waist_flesh_forward"]
-
-    def ahead(at: float) -> float:
-        """How far the trunk's flesh lies before the line from the hips to the neck, at a share of it: nothing at the neck."""
-        return (1 - at) * d["pelvis_flesh_forward"]
-
+    ahead = partial(flesh_ahead, d)
     hips, belly = (ahead(0), 0, -0.035 * h), (waist + ahead(0.15), 0, 0.15 * trunk)
     middle, high = chest + ahead(0.48), chest + ahead(0.82)
     # Radii over stature: [lateral, front to back] at both ends.

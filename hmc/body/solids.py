@@ -14,7 +14,7 @@ import numpy as np
 from hmc.body.joints import ADDED_JOINTS, DOF_NAMES, SEGMENTS, dof_index
 from hmc.body.limbs import CHAIN_OF_PART, LIMBS
 from hmc.body.model import PART_OF_SEGMENT, BodyModel
-from hmc.body.proportions import side_factor
+from hmc.body.proportions import flesh_ahead, side_factor
 from hmc.body.superellipsoids import Superellipsoids
 
 __all__ = ["CHAINS", "FREE", "FREE_NAMES", "GROUPS", "SolidBody", "solid_body", "to_world"]
@@ -120,14 +120,11 @@ def solid_body(skeleton: BodyModel) -> SolidBody:
         has_edges = _GROUP_OF_SEGMENT[index] >= GROUPS.index("r_arm") and not name.endswith("foot")
         rows.append((name, index, _GROUP_OF_SEGMENT[index], has_edges, origin, np.stack(axes, axis=1), across, along, eps1, eps2))
 
-    def ahead_of(at: float) -> float:
-        """As the flesh of `hmc.body.proportions` lies before the line from the hips to the neck, at a share of it."""
-        return (1 - at) * d["pelvis_flesh_forward"]
-
     upright = (x, y, z)
     hips, ribs = (0.063 * h * deep, 0.092 * h * wide), (0.059 * h * deep, 0.097 * h * wide)
-    solid("pelvis", "pelvis", ((0.3 * chest + ahead_of(0.05), 0, 0.05 * trunk), upright), hips, (0.062 * h, 0.42 * trunk), (0.7, 0.6), 0.8)
-    solid("chest", "torso", ((chest + ahead_of(0.60), 0, 0.60 * trunk), upright), ribs, (0.42 * trunk, 0.40 * trunk), (0.7, 0.7), 0.8)
+    belly, breast = 0.3 * chest + flesh_ahead(d, 0.05), chest + flesh_ahead(d, 0.60)
+    solid("pelvis", "pelvis", ((belly, 0, 0.05 * trunk), upright), hips, (0.062 * h, 0.42 * trunk), (0.7, 0.6), 0.8)
+    solid("chest", "torso", ((breast, 0, 0.60 * trunk), upright), ribs, (0.42 * trunk, 0.40 * trunk), (0.7, 0.7), 0.8)
     wide_head = 0.046 * h * d["girth_head"]
     solid("head", "head", ((skull, 0, 0.56 * head), upright), (1.25 * wide_head, wide_head), (0.62 * head, 0.45 * head), (1.0, 0.9))
     for side, sign in (("r", -1.0), ("l", 1.0)):
@@ -136,7 +133,7 @@ def solid_body(skeleton: BodyModel) -> SolidBody:
         fore = 0.027 * h * d["girth_arms"]
         longer_arm, longer_leg = side_factor(d, "arms", side), side_factor(d, "legs", side)
         shank = longer_leg * d["shank"] + 0.3 * d["ankle_height"]
-        joint, hip = (0, 0, 0), (ahead_of(0), 0, 0)
+        joint, hip = (0, 0, 0), (flesh_ahead(d, 0), 0, 0)
         for name, frame, radius, length, eps1 in (
             ("upper_arm", (joint, outwards), arm, longer_arm * d["upper_arm"] * _reach(0.75, 0.5), (1.0, 0.5)),
             ("forearm", (joint, outwards), fore, longer_arm * d["forearm"] + d["hand"], (1.0, 0.8)),

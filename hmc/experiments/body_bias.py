@@ -8,7 +8,6 @@ what keeps the start off it is that our joints are not.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from itertools import pairwise
 
 import numpy as np
 
@@ -37,7 +36,7 @@ from hmc.pose.views.person_view import views_of
 from hmc.tracking.resumable import person_grid
 from hmc.voxels.hulls import stream_hulls
 
-__all__ = ["AS_IT_IS", "EXPERIMENT", "FLAT", "MIDDLE", "NEITHER", "STIFF", "VARIANTS"]
+__all__ = ["AS_IT_IS", "EXPERIMENT", "FLAT", "MIDDLE", "NEITHER", "STIFF", "VARIANTS", "true_lengths"]
 
 CLIPS = ("crossing", "close_white", "jog", "pale", "dance", "close_queue", "throw_catch", "gesture")
 QUICK_CLIPS, QUICK_FRAMES = 3, 61
@@ -59,6 +58,11 @@ VARIANTS: dict[str, tuple[tuple[str, ...], float, tuple[str, ...]]] = {
 MOST_START_M = 0.06
 #: Hair and soles are to help on so many of the recordings, and what is left may lift or lower bodies by so much.
 LEAST_HELPED, MOST_UP_MM = 0.75, 10.0
+#: The bones of limbs, and the landmarks between which they lie.
+_BONES_OF = {
+    "arms": {"upper_arm": ("shoulder", "elbow"), "forearm": ("elbow", "wrist")},
+    "legs": {"thigh": ("hip", "knee"), "shank": ("knee", "ankle")},
+}
 _POLISH = PRESETS["default"].polish
 
 
@@ -113,33 +117,38 @@ def _true_masks(recording: Recording, frames: int) -> Iterator[MaskStep]:
             yield MaskStep(frame, nothing, masks, nothing)
 
 
-def _body(points: np.ndarray, without: tuple[str, ...], sole: float, held: tuple[str, ...]) -> BodyModel:
-    """The body of the joint lengths that a person's landmarks (n, 15, 3) have; what they do not tell is as usual for the stature."""
+def true_lengths(points: np.ndarray) -> dict[str, float]:
+    """The dimensions of a body that a person's landmarks show, metres, and its asymmetries.
 
-    def apart(*pairs: tuple[str, str]) -> float:
-        ways = [points[:, landmark_index(one)] - points[:, landmark_index(other)] for one, other in pairs]
-        return float(np.mean([np.nanmedian(np.linalg.norm(way, axis=1)) for way in ways]))
+    Parameters
+    ----------
+    points : ndarray, shape (n, 15, 3)
+        World, metres; medians over the frames are taken.
+    """
 
-    def both(one: str, other: str) -> float:
-        return apart(*((f"{side}_{one}", f"{side}_{other}") for side in "lr"))
+    def apart(one: str, other: str) -> float:
+        return float(np.nanmedian(np.linalg.norm(points[:, landmark_index(one)] - points[:, landmark_index(other)], axis=1)))
 
     head = DEFAULT_LENGTHS["head"]
     lengths = {
-        "trunk": apart(("pelvis", "neck")),
+        "trunk": apart("pelvis", "neck"),
         # The crown is before the line of neck and head, along which the head is measured.
-        "head": apart(("neck", "head_top")) * head / float(np.hypot(head, DEFAULT_LENGTHS["head_forward"])),
-        "shoulder_half_width": apart(("l_shoulder", "r_shoulder")) / 2,
-        "hip_half_width": apart(("l_hip", "r_hip")) / 2,
-        "upper_arm": both("shoulder", "elbow"),
-        "forearm": both("elbow", "wrist"),
-        "thigh": both("hip", "knee"),
-        "shank": both("knee", "ankle"),
+        "head": apart("neck", "head_top") * head / float(np.hypot(head, DEFAULT_LENGTHS["head_forward"])),
+        "shoulder_half_width": apart("l_shoulder", "r_shoulder") / 2,
+        "hip_half_width": apart("l_hip", "r_hip") / 2,
     }
-    sides: dict[str, float] = {}
-    for kind, joints in (("arms", ("shoulder", "elbow", "wrist")), ("legs", ("hip", "knee", "ankle"))):
-        left, right = (sum(apart((f"{side}_{one}", f"{side}_{other}")) for one, other in pairwise(joints)) for side in "lr")
-        sides[f"{kind}_longer_left"] = 2 * (left - right) / (left + right)
-    dimensions = default_body(stature(DEFAULT_LENGTHS | lengths)).dimensions | lengths | sides
+    for kind, bones in _BONES_OF.items():
+        sides = np.array([[apart(f"{side}_{one}", f"{side}_{other}") for one, other in bones.values()] for side in "lr"])
+        lengths |= dict(zip(bones, sides.mean(axis=0).tolist(), strict=True))
+        left, right = sides.sum(axis=1).tolist()
+        lengths[f"{kind}_longer_left"] = 2 * (left - right) / (left + right)
+    return lengths
+
+
+def _body(points: np.ndarray, without: tuple[str, ...], sole: float, held: tuple[str, ...]) -> BodyModel:
+    """The body of the joint lengths that a person's landmarks (n, 15, 3) have; what they do not tell is as usual for the stature."""
+    lengths = true_lengths(points)
+    dimensions = default_body(stature(DEFAULT_LENGTHS | lengths)).dimensions | lengths
     return make_body(dimensions | dict.fromkeys(without, 0.0), default_limits(held), sole)
 
 
