@@ -23,9 +23,9 @@ from hmc.camera.light import FEW, as_image, brought_back, gains_of, is_same_ligh
 from hmc.camera.mixture import SHADOW, ask_mixture, coarse
 from hmc.camera.noise import blur_for, blurred, is_grey, left_of_noise, noise_floor
 from hmc.camera.segmentation_settings import SegmentationSettings
-from hmc.camera.shade import shade_features, told_by_chance
-from hmc.camera.silhouettes import GapRules, cut_halo, evidence, fill_gaps, filled_for_darkness, in_planes, without_specks
-from hmc.camera.zoom import enlarged, enlarged_mask, largest_in, reduced_mask
+from hmc.camera.shade import chance_map, shade_features, told_by_chance
+from hmc.camera.silhouettes import Evidence, GapRules, cut_halo, evidence, fill_gaps, filled_for_darkness, in_planes, without_specks
+from hmc.camera.zoom import enlarged, enlarged_mask, reduced_mask
 from hmc.errors import InputError
 
 __all__ = [
@@ -221,10 +221,7 @@ def train_background(
 def shades_of(model: BackgroundModel, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The pixels of an image that may be shadows or people, flat, and what tells of each (`hmc.camera.shade.shade_features`)."""
     _, found = ask_mixture(model.mixture, image, model.coarse)
-    seeds = cv2.morphologyEx(found, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
-    seen = evidence(image, model.mean, model.deviation)
-    scale = max(image.shape[:2]) / 640
-    return shade_features(image, model.mean, model.deviation, seen, seeds, scale, model.floor)
+    return _shades(model, image, found, (slice(None), slice(None)))
 
 
 def segment(
@@ -349,7 +346,7 @@ def _complete(
     """
     scale = max(image.shape[:2]) / 640
     zoom = _zoom(image.shape)
-    # The network has learnt from sharp images in color of 640 x 480; images of half of that, enlarged, are sharp enough.
+    # The network has learnt from sharp images in color of 640 x 480 and of half of that.
     guesses = settings.least_chance > 0 and zoom <= MOST_ZOOM and not model.blur and not model.grey
     mask = np.zeros_like(found)
     filled, chance = (None, np.zeros_like(found)) if guesses else (np.zeros(found.shape, bool), None)
@@ -362,6 +359,7 @@ def _complete(
     rows = slice(max(0, top - margin), min(top + height + margin, found.shape[0]))
     columns = slice(max(0, left - margin), min(left + width + margin, found.shape[1]))
     seeds = cv2.morphologyEx(enlarged_mask(found[rows, columns], zoom), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+    as_read = image[rows, columns]
     image = enlarged(image[rows, columns], zoom)
     mean, deviation = (one[zoom * rows.start : zoom * rows.stop, zoom * columns.start : zoom * columns.stop] for one in model.large)
     seen = evidence(image, mean, deviation)
@@ -376,16 +374,30 @@ def _complete(
     scale *= zoom
     part = cut_halo(fill_gaps(seeds, seen, rules, scale), seen, settings.halo_share, scale)
     if chance is not None:
-        floor = None if model.floor is None else enlarged_mask(model.floor[rows, columns].view(np.uint8), zoom)
-        shades = shade_features(image, mean, deviation, seen, seeds, scale, floor)
-        part, guess = told_by_chance(part, *shades, settings.least_chance)
+        box = rows, columns  # as it was read: enlarged it shows no more
+        shades = _shades(model, as_read, found[box], box, seen if zoom == 1 else None)
+        guess = chance[box] = chance_map(as_read.shape[:2], *shades, scale / zoom)
+        part = told_by_chance(part, seen, guess, settings.least_chance)
         part = cut_halo(without_specks(part, seeds, seen, rules, scale), seen, settings.halo_share, scale)
-        chance[rows, columns] = largest_in(guess, zoom)
     elif filled is not None:
         filled[rows, columns] = reduced_mask(filled_for_darkness(part, seeds, seen, rules), zoom)
     mask[rows, columns] = reduced_mask(part, zoom)
     doubtful[rows, columns] |= reduced_mask(((seen.chroma2 > DOUBT**2) | (np.abs(seen.luma) > DOUBT)).view(np.uint8), zoom)
     return mask, filled, chance, cv2.morphologyEx(doubtful, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+
+
+def _shades(
+    model: BackgroundModel, image: np.ndarray, found: np.ndarray, box: tuple[slice, slice], seen: Evidence | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """The shades of a part of an image, flat, and `hmc.camera.shade.shade_features` of them.
+
+    `found` is what the mixture found there, `seen` the evidence, where that is known.
+    """
+    mean, deviation = model.mean[box], model.deviation[box]
+    seen = evidence(image, mean, deviation) if seen is None else seen
+    floor = None if model.floor is None else model.floor[box]
+    seeds = cv2.morphologyEx(found, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+    return shade_features(image, mean, deviation, seen, seeds, max(model.mean.shape[:2]) / 640, floor)
 
 
 def _zoom(shape: tuple[int, ...]) -> int:

@@ -27,6 +27,7 @@ from hmc.errors import InputError
 __all__ = [
     "FEATURES",
     "ShadeNet",
+    "chance_map",
     "default_net",
     "floor_pixels",
     "is_shade",
@@ -50,6 +51,8 @@ FEATURES = (
 LEAST_LUMA, LOST, MOST_CHROMA, REACH_PX = 4.0, (0.02, 0.65), 8.0, 60
 #: Surely a person: found by the mixture, and off by so many deviations in chroma or brighter, or darker than any shadow.
 SURE, DARKEST = 6.0, 0.45
+#: Chances are averaged over squares of this side, pixels of a 640 x 480 image.
+SMOOTH_PX = 5
 #: Chances are no nearer to 0 and 1 than that of this logit.
 MOST_LOGIT = 30.0
 #: Where it is not known whether a pixel looks at the floor.
@@ -225,30 +228,53 @@ def person_chance(net: ShadeNet, features: np.ndarray) -> np.ndarray:
     return np.asarray(1 / (1 + np.exp(-logits)), np.float32)
 
 
-def told_by_chance(mask: np.ndarray, pixels: np.ndarray, features: np.ndarray, least: float) -> tuple[np.ndarray, np.ndarray]:
-    """A silhouette in which each shade is what its chance says, averaged over the shades around it.
+def chance_map(shape: tuple[int, int], pixels: np.ndarray, features: np.ndarray, scale: float) -> np.ndarray:
+    """How likely each shade of an image is a person, averaged over the shades around it.
+
+    Parameters
+    ----------
+    shape : tuple of int
+        Height and width.
+    pixels, features
+        As `shade_features` returns them.
+    scale : float
+        Size of the image against 640 x 480.
+
+    Returns
+    -------
+    ndarray of uint8, shape (height, width)
+        From 1 to 255; 0 of all other pixels.
+    """
+    shade, chance = np.zeros((2, *shape), np.float32)
+    shade.ravel()[pixels], chance.ravel()[pixels] = 1, person_chance(default_net(), features)
+    around = _square(SMOOTH_PX, scale)
+    chance = cv2.GaussianBlur(chance, around, 0) / np.maximum(cv2.GaussianBlur(shade, around, 0), 0.2)
+    return np.where(shade > 0, np.maximum(255 * chance, 1), 0).astype(np.uint8)
+
+
+def told_by_chance(mask: np.ndarray, seen: Evidence, chance: np.ndarray, least: float) -> np.ndarray:
+    """A silhouette in which each shade is what its chance says.
 
     Parameters
     ----------
     mask : ndarray of uint8, shape (height, width)
-    pixels, features
-        As `shade_features` returns them.
+    seen : Evidence
+    chance : ndarray of uint8
+        As `chance_map` has it, of the same image or of a smaller one.
     least : float
         Chance from which on a shade is a person.
 
     Returns
     -------
-    mask : ndarray of uint8, shape (height, width)
+    ndarray of uint8, shape (height, width)
         Without specks and whiskers.
-    chance : ndarray of uint8, shape (height, width)
-        Of each shade, how likely it is a person, from 1 to 255; 0 of all other pixels.
     """
-    shade, chance = np.zeros((2, *mask.shape), np.float32)
-    shade.ravel()[pixels], chance.ravel()[pixels] = 1, person_chance(default_net(), features)
-    chance = cv2.GaussianBlur(chance, (5, 5), 0) / np.maximum(cv2.GaussianBlur(shade, (5, 5), 0), 0.2)
-    told = np.where(shade > 0, (chance > least).view(np.uint8), mask)
-    guess = np.where(shade > 0, np.maximum(255 * chance, 1), 0).astype(np.uint8)
-    return cv2.morphologyEx(told, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)), guess
+    known = cv2.threshold(chance, 0, 1, cv2.THRESH_BINARY)[1].astype(np.float32)
+    chance = chance.astype(np.float32)
+    if chance.shape != mask.shape:
+        chance, known = (cv2.resize(one, mask.shape[::-1], interpolation=cv2.INTER_LINEAR) for one in (chance, known))
+    told = np.where(is_shade(seen) & (known > 0), (chance > 255 * least * known).view(np.uint8), mask)
+    return cv2.morphologyEx(told, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
 
 
 @functools.cache

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import functools
-
 import cv2
 import numpy as np
 
-__all__ = ["enlarged", "enlarged_mask", "largest_in", "reduced_mask"]
+__all__ = ["enlarged", "enlarged_mask", "reduced_mask"]
 
 
 def enlarged(array: np.ndarray, zoom: int) -> np.ndarray:
@@ -26,11 +24,3 @@ def enlarged_mask(mask: np.ndarray, zoom: int) -> np.ndarray:
 def reduced_mask(mask: np.ndarray, zoom: int) -> np.ndarray:
     """The mask as it was before it was enlarged: 1 where half of a pixel is."""
     return mask if zoom == 1 else cv2.resize(mask * 255, None, fx=1 / zoom, fy=1 / zoom, interpolation=cv2.INTER_AREA) // 128
-
-
-def largest_in(array: np.ndarray, zoom: int) -> np.ndarray:
-    """A map as large as before it was enlarged: the largest value in each square."""
-    if zoom == 1:
-        return array
-    # Pixel by pixel of the squares: a maximum over axes of two takes forty times as long.
-    return functools.reduce(np.maximum, [array[row::zoom, column::zoom] for row in range(zoom) for column in range(zoom)])

@@ -96,9 +96,17 @@ def floor_balance(tables: CompletionTables, scenes: Mapping[int, np.ndarray]) ->
     seen = seen[has][..., shared]
     balance, more = np.zeros((len(scenes), 3, 1), np.float32), np.zeros((1, 3, 1), np.float32)
     for _ in range(BALANCE_ROUNDS if has.any() else 0):
-        more = np.nanmedian(seen - np.nanmedian(seen - more, axis=0), axis=-1, keepdims=True)
+        more = _median(seen - _median(seen - more, axis=0), axis=-1)
     balance[has] = more
     return dict(zip(scenes, balance, strict=True))
+
+
+def _median(values: np.ndarray, axis: int) -> np.ndarray:
+    """`numpy.nanmedian` along an axis that is kept and has a number everywhere; a quarter of its time, as nothing is looked at twice."""
+    values = np.sort(values, axis=axis)  # with NaN last
+    n = np.isfinite(values).sum(axis=axis, keepdims=True)
+    middle = (np.take_along_axis(values, place, axis) for place in ((n - 1) // 2, n // 2))
+    return np.asarray(sum(middle) / 2, values.dtype)
 
 
 def floor_evidence(

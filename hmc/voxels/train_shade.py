@@ -14,11 +14,12 @@ from pathlib import Path
 
 import numpy as np
 
+from hmc.camera.reduction import reduce_mask
 from hmc.camera.segmentation import SegmentationSettings, segment, shades_of, train_background
 from hmc.camera.shade import FEATURES, FLOOR_UNKNOWN, ShadeNet, floor_pixels, person_chance
 from hmc.errors import InputError
 from hmc.io.files import atomic_write
-from hmc.io.recording import Recording, background_frames, iterate_frames, open_recording
+from hmc.io.recording import Recording, background_frames, iterate_frames, open_recording, reduced
 from hmc.io.true_silhouettes import true_frames, true_silhouettes
 
 __all__ = ["main", "shade_examples", "train_shade", "write_net"]
@@ -26,7 +27,9 @@ __all__ = ["main", "shade_examples", "train_shade", "write_net"]
 logger = logging.getLogger("hmc")
 
 #: Of each camera's image, shades that are learnt from, at most; frames of the empty scene; hidden units.
-MOST_SHADES, EMPTY_FRAMES, HIDDEN = 1500, 60, 32
+MOST_SHADES, EMPTY_FRAMES, HIDDEN = 1500, 60, 64
+#: Images are learnt from as they were recorded, and so many times smaller, as runs read them (`hmc.camera.reduction`).
+FACTORS = (1, 2)
 #: Each pixel of a person counts as so many: a leg that is lost is lost, a shadow the other cameras may still take away.
 PERSON_COUNTS = 3
 #: Share of the examples of which the network is not told whether they look at the floor: it must do without where nobody knows.
@@ -56,7 +59,9 @@ def shade_examples(recording: Recording, rng: np.random.Generator, every: int = 
     """
     frames = true_frames(recording)[::every]
     models = [
-        train_background(background_frames(recording, c, EMPTY_FRAMES), floor=floor_pixels(camera, recording.room))
+        train_background(
+            background_frames(recording, c, EMPTY_FRAMES), floor=floor_pixels(camera, recording.room), factor=recording.factors[c]
+        )
         for c, camera in enumerate(recording.rig)
     ]
     nobody = (None,) * len(recording.rig)
@@ -71,7 +76,7 @@ def shade_examples(recording: Recording, rng: np.random.Generator, every: int = 
             pixels, found = shades_of(models[c], image)
             chosen = rng.choice(len(pixels), min(MOST_SHADES, len(pixels)), replace=False)
             features.append(found[chosen])
-            people.append(true.ravel()[pixels[chosen]])
+            people.append(reduce_mask(true, recording.factors[c]).ravel()[pixels[chosen]])
     return np.concatenate(features), np.concatenate(people)
 
 
@@ -125,7 +130,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m hmc.voxels.train_shade", description=(__doc__ or "").splitlines()[0])
     parser.add_argument("recordings", nargs="+", type=Path, metavar="RECORDING", help="with truth/silhouettes")
     parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="the network, as CSV")
-    parser.add_argument("--most", type=int, default=20000, metavar="N", help="examples of each recording, at most (default: 20000)")
+    parser.add_argument("--most", type=int, default=20000, metavar="N", help="examples of each recording, a size (default: 20000)")
     parser.add_argument("--frames", type=int, default=12, metavar="N", help="true silhouettes of each camera, at most (default: 12)")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="(default: 0)")
     args = parser.parse_args(argv)
@@ -134,10 +139,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         examples = []
         for path in args.recordings:
             recording = open_recording(path)
-            features, people = shade_examples(recording, rng, max(1, len(true_frames(recording)) // args.frames))
-            chosen = rng.choice(len(people), min(args.most, len(people)), replace=False)
-            examples.append((features[chosen], people[chosen]))
-            logger.info("%s: %d shades, %.1f%% of them people", path.name, len(people), 100 * people.mean())
+            every = max(1, len(true_frames(recording)) // args.frames)
+            for factor in FACTORS:
+                features, people = shade_examples(reduced(recording, [factor] * len(recording.rig)), rng, every)
+                chosen = rng.choice(len(people), min(args.most, len(people)), replace=False)
+                examples.append((features[chosen], people[chosen]))
+                logger.info("%s: 1 / %d: %d shades, %.1f%% of them people", path.name, factor, len(people), 100 * people.mean())
         features, people = (np.concatenate(column) for column in zip(*examples, strict=True))
         net = train_shade(features, people, args.seed)
         right = (person_chance(net, features) > PERSON_COUNTS / (PERSON_COUNTS + 1)) == people

@@ -7,8 +7,19 @@ from scipy import ndimage
 from sklearn.neural_network import MLPClassifier
 
 from hmc.camera.segmentation import SegmentationSettings, segment, train_background
-from hmc.camera.shade import FEATURES, ShadeNet, default_net, floor_pixels, is_shade, person_chance, read_net, shade_features
-from hmc.camera.silhouettes import evidence
+from hmc.camera.shade import (
+    FEATURES,
+    ShadeNet,
+    chance_map,
+    default_net,
+    floor_pixels,
+    is_shade,
+    person_chance,
+    read_net,
+    shade_features,
+    told_by_chance,
+)
+from hmc.camera.silhouettes import Evidence, evidence
 from hmc.errors import InputError
 from hmc.io.recording import background_frames, iterate_frames, open_recording
 from hmc.voxels.train_shade import PERSON_COUNTS, train_shade, write_net
@@ -70,6 +81,40 @@ def test_a_shadow_keeps_the_texture_and_cloth_does_not(scene):
     chance = person_chance(default_net(), features)
     assert ((chance >= 0) & (chance <= 1)).all()
     assert np.median(chance[shadow]) < np.median(chance[cloth])
+
+
+@pytest.mark.parametrize(("scale", "side"), [(1.0, 5), (0.5, 3)])
+def test_chances_are_averaged_over_shades_alone(scene, scale, side):
+    mean, deviation, image, seeds, seen = scene
+    pixels, features = shade_features(image, mean, deviation, seen, seeds, scale)
+    guess = chance_map(SHAPE, pixels, features, scale)
+    shade, chance = np.zeros((2, SHAPE[0] * SHAPE[1]))
+    shade[pixels], chance[pixels] = 1, person_chance(default_net(), features)
+    shade, chance = shade.reshape(SHAPE), chance.reshape(SHAPE)
+    assert ((guess > 0) == (shade > 0)).all() and len(pixels) > 1000
+    kernel = cv2.getGaussianKernel(side, 0)[:, 0]
+    smooth = [ndimage.correlate1d(ndimage.correlate1d(one, kernel, 0, mode="mirror"), kernel, 1, mode="mirror") for one in (chance, shade)]
+    expected = 255 * smooth[0] / np.maximum(smooth[1], 0.2)
+    assert np.abs(guess - np.maximum(expected, 1))[shade > 0].max() <= 1.001
+
+
+def test_chances_of_half_the_size_tell_of_the_whole_image():
+    """What is a shade in the large image is what the nearest chances say; what is none stays as it was."""
+    luma = np.full((80, 120), -10.0, np.float32)
+    luma[:, :20] = 0  # as the empty scene
+    mask, zeros = np.zeros((80, 120), np.uint8), np.zeros((80, 120), np.float32)
+    mask[10:70, 5:50] = 1
+    seen = Evidence(luma, zeros, np.full_like(zeros, 0.2), zeros)
+    chance = np.ones((40, 60), np.uint8)
+    chance[10:30, 15:40] = 255
+    told = told_by_chance(mask, seen, chance, 0.4).astype(bool)
+    expected = np.zeros((80, 120), bool)
+    expected[20:60, 30:80] = True
+    expected[10:70, 5:20] = True
+    assert (told == expected).mean() > 0.97  # but for outlines
+    np.testing.assert_array_equal(told[:, :20], expected[:, :20])
+    whole = told_by_chance(mask, seen, chance.repeat(2, axis=0).repeat(2, axis=1), 0.4).astype(bool)
+    np.testing.assert_array_equal(whole, expected)
 
 
 def test_nothing_is_asked_where_nobody_is(scene):

@@ -4,6 +4,8 @@ import cv2
 import numpy as np
 import pytest
 from drawn import floor_patch, silhouette
+from hypothesis import given
+from hypothesis import strategies as st
 
 from hmc.camera.light import in_light_of, light_gains
 from hmc.camera.shade import floor_pixels
@@ -15,6 +17,7 @@ from hmc.voxels.floor_light import (
     SAME_LUMA,
     UNLIKE,
     FloorEvidence,
+    _median,
     floor_balance,
     floor_evidence,
     person_by_floor,
@@ -275,3 +278,12 @@ def test_what_the_network_is_sure_of_is_not_cut_for_the_floor_alone(tables, peop
     assert left(tuple(guesses(shadows, 0.99))) > 0.9 * whole  # told, and left
     assert left(none) < 0.5 * whole  # where there was no guess, the floor decides as before
     assert left(tuple(guesses(shadows, 0.3))) < 0.2 * whole
+
+
+@given(st.integers(0, 10**6), st.sampled_from([0, -1]), st.integers(1, 8), st.integers(1, 9))
+def test_medians_of_what_is_seen_are_those_of_numpy(seed, axis, n, m):
+    rng = np.random.default_rng(seed)
+    values = rng.normal(size=(n, 3, m)).astype(np.float32)
+    values[rng.random(values.shape) < 0.4] = np.nan
+    values[(slice(None), slice(None), 0) if axis else (0,)] = 1  # a number everywhere
+    np.testing.assert_array_equal(_median(values, axis), np.nanmedian(values, axis=axis, keepdims=True))
