@@ -23,7 +23,7 @@ from hmc.camera.light import FEW, as_image, brought_back, gains_of, is_same_ligh
 from hmc.camera.mixture import SHADOW, ask_mixture, coarse
 from hmc.camera.noise import blur_for, blurred, is_grey, left_of_noise, noise_floor
 from hmc.camera.segmentation_settings import SegmentationSettings
-from hmc.camera.shade import chance_map, shade_features, told_by_chance
+from hmc.camera.shade import chance_map, noise_px, shade_features, told_by_chance
 from hmc.camera.silhouettes import Evidence, GapRules, cut_halo, evidence, fill_gaps, filled_for_darkness, in_planes, without_specks
 from hmc.camera.zoom import enlarged, enlarged_mask, reduced_mask
 from hmc.errors import InputError
@@ -221,7 +221,8 @@ def train_background(
 def shades_of(model: BackgroundModel, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The pixels of an image that may be shadows or people, flat, and what tells of each (`hmc.camera.shade.shade_features`)."""
     _, found = ask_mixture(model.mixture, image, model.coarse)
-    return _shades(model, image, found, (slice(None), slice(None)))
+    zoom = _zoom(image.shape)
+    return _shades(model, image, reduced_mask(_seeds(found, zoom), zoom), (slice(None), slice(None)))
 
 
 def segment(
@@ -344,8 +345,7 @@ def _complete(
 
     Only the part of the image around what was found is looked at.
     """
-    scale = max(image.shape[:2]) / 640
-    zoom = _zoom(image.shape)
+    scale, zoom = _scale(image.shape), _zoom(image.shape)
     # The network has learnt from sharp images in color of 640 x 480 and of half of that.
     guesses = settings.least_chance > 0 and zoom <= MOST_ZOOM and not model.blur and not model.grey
     mask = np.zeros_like(found)
@@ -358,9 +358,10 @@ def _complete(
     margin = round(MARGIN_PX * scale)
     rows = slice(max(0, top - margin), min(top + height + margin, found.shape[0]))
     columns = slice(max(0, left - margin), min(left + width + margin, found.shape[1]))
-    seeds = cv2.morphologyEx(enlarged_mask(found[rows, columns], zoom), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
-    as_read = image[rows, columns]
-    image = enlarged(image[rows, columns], zoom)
+    box = rows, columns
+    seeds = _seeds(found[box], zoom)
+    as_read = image[box]
+    image = enlarged(as_read, zoom)
     mean, deviation = (one[zoom * rows.start : zoom * rows.stop, zoom * columns.start : zoom * columns.stop] for one in model.large)
     seen = evidence(image, mean, deviation)
     rules = GapRules(
@@ -374,30 +375,35 @@ def _complete(
     scale *= zoom
     part = cut_halo(fill_gaps(seeds, seen, rules, scale), seen, settings.halo_share, scale)
     if chance is not None:
-        box = rows, columns  # as it was read: enlarged it shows no more
-        shades = _shades(model, as_read, found[box], box, seen if zoom == 1 else None)
-        guess = chance[box] = chance_map(as_read.shape[:2], *shades, scale / zoom)
+        # In the image as it was read: enlarged it shows no more.
+        shades = _shades(model, as_read, reduced_mask(seeds, zoom), box, seen if zoom == 1 else None)
+        guess = chance[box] = chance_map(as_read.shape[:2], *shades, _scale(found.shape))
         part = told_by_chance(part, seen, guess, settings.least_chance)
         part = cut_halo(without_specks(part, seeds, seen, rules, scale), seen, settings.halo_share, scale)
     elif filled is not None:
-        filled[rows, columns] = reduced_mask(filled_for_darkness(part, seeds, seen, rules), zoom)
-    mask[rows, columns] = reduced_mask(part, zoom)
-    doubtful[rows, columns] |= reduced_mask(((seen.chroma2 > DOUBT**2) | (np.abs(seen.luma) > DOUBT)).view(np.uint8), zoom)
+        filled[box] = reduced_mask(filled_for_darkness(part, seeds, seen, rules), zoom)
+    mask[box] = reduced_mask(part, zoom)
+    doubtful[box] |= reduced_mask(((seen.chroma2 > DOUBT**2) | (np.abs(seen.luma) > DOUBT)).view(np.uint8), zoom)
     return mask, filled, chance, cv2.morphologyEx(doubtful, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
 
 
-def _shades(
-    model: BackgroundModel, image: np.ndarray, found: np.ndarray, box: tuple[slice, slice], seen: Evidence | None = None
-) -> tuple[np.ndarray, np.ndarray]:
-    """The shades of a part of an image, flat, and `hmc.camera.shade.shade_features` of them.
+def _seeds(found: np.ndarray, zoom: int) -> np.ndarray:
+    """What the mixture found, so many times as wide and high, without specks."""
+    return cv2.morphologyEx(enlarged_mask(found, zoom), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
 
-    `found` is what the mixture found there, `seen` the evidence, where that is known.
-    """
-    mean, deviation = model.mean[box], model.deviation[box]
-    seen = evidence(image, mean, deviation) if seen is None else seen
-    floor = None if model.floor is None else model.floor[box]
-    seeds = cv2.morphologyEx(found, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
-    return shade_features(image, mean, deviation, seen, seeds, max(model.mean.shape[:2]) / 640, floor)
+
+def _shades(
+    model: BackgroundModel, image: np.ndarray, seeds: np.ndarray, box: tuple[slice, slice], seen: Evidence | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """The shades of a part of an image, flat, and `hmc.camera.shade.shade_features` of them; `seen` is the evidence, where it is known."""
+    mean, deviation, scale = model.mean[box], model.deviation[box], _scale(model.mean.shape)
+    seen = evidence(image, mean, deviation, noise_px(scale)) if seen is None else seen
+    return shade_features(image, mean, deviation, seen, seeds, scale, None if model.floor is None else model.floor[box])
+
+
+def _scale(shape: tuple[int, ...]) -> float:
+    """Size of images of a shape against 640 x 480."""
+    return max(shape[:2]) / 640
 
 
 def _zoom(shape: tuple[int, ...]) -> int:

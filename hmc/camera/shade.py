@@ -31,6 +31,7 @@ __all__ = [
     "default_net",
     "floor_pixels",
     "is_shade",
+    "noise_px",
     "person_chance",
     "read_net",
     "shade_features",
@@ -51,8 +52,9 @@ FEATURES = (
 LEAST_LUMA, LOST, MOST_CHROMA, REACH_PX = 4.0, (0.02, 0.65), 8.0, 60
 #: Surely a person: found by the mixture, and off by so many deviations in chroma or brighter, or darker than any shadow.
 SURE, DARKEST = 6.0, 0.45
-#: Chances are averaged over squares of this side, pixels of a 640 x 480 image.
-SMOOTH_PX = 5
+#: Chances are averaged, and noise is, over squares of these sides, pixels of a 640 x 480 image. One that was made half as wide has less
+#: noise, and details that such a square would wash out: shoes before a floor of their color.
+SMOOTH_PX, NOISE_PX = 5, 3
 #: Chances are no nearer to 0 and 1 than that of this logit.
 MOST_LOGIT = 30.0
 #: Where it is not known whether a pixel looks at the floor.
@@ -141,7 +143,7 @@ def shade_features(
         In the order of `FEATURES`.
     """
     told = ((seen.chroma2 > SURE**2) | (seen.luma > SURE) | (seen.lost > 1 - DARKEST)).view(np.uint8)
-    sure = cv2.morphologyEx(np.bitwise_and(seeds, told), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+    sure = cv2.morphologyEx(np.bitwise_and(seeds, told), cv2.MORPH_OPEN, np.ones((noise_px(scale),) * 2, np.uint8))
     near = cv2.dilate(sure, np.ones(_square(2 * REACH_PX + 1, scale), np.uint8))
     pixels = np.flatnonzero(is_shade(seen) & near.view(bool))
     if not len(pixels):
@@ -157,6 +159,11 @@ def shade_features(
     rows["floor"] = np.full(len(pixels), FLOOR_UNKNOWN) if floor is None else floor.ravel().take(pixels)
     # A row a feature, as they are made: the other way round costs more than all of the network.
     return pixels, np.array([rows[name] for name in FEATURES], np.float32).T
+
+
+def noise_px(scale: float) -> int:
+    """Side of the square over which noise is averaged, and in which specks of it are sought, in images of a size against 640 x 480."""
+    return _square(NOISE_PX, min(scale, 1.0))[0]
 
 
 def _square(width: int, scale: float) -> tuple[int, int]:
@@ -180,7 +187,7 @@ def _neighbourhood(
 
     small = _square(7, scale)
     color = cv2.cvtColor(image, cv2.COLOR_BGR2YCrCb)
-    luma, red, blue = (cv2.GaussianBlur(cv2.extractChannel(color, channel), (3, 3), 0) for channel in range(3))
+    luma, red, blue = (cv2.GaussianBlur(cv2.extractChannel(color, channel), (noise_px(scale),) * 2, 0) for channel in range(3))
     luma, scene = luma.astype(np.float32), np.ascontiguousarray(mean[..., 0])
     own_scene, color_noise = at(scene), at(deviation[..., 1])
     own_noise = np.maximum(at(deviation[..., 0]), 1.5)
@@ -248,8 +255,8 @@ def chance_map(shape: tuple[int, int], pixels: np.ndarray, features: np.ndarray,
     shade, chance = np.zeros((2, *shape), np.float32)
     shade.ravel()[pixels], chance.ravel()[pixels] = 1, person_chance(default_net(), features)
     around = _square(SMOOTH_PX, scale)
-    chance = cv2.GaussianBlur(chance, around, 0) / np.maximum(cv2.GaussianBlur(shade, around, 0), 0.2)
-    return np.where(shade > 0, np.maximum(255 * chance, 1), 0).astype(np.uint8)
+    smooth = cv2.GaussianBlur(chance, around, 0) / np.maximum(cv2.GaussianBlur(shade, around, 0), 0.2)
+    return np.where(shade > 0, np.maximum(255 * smooth, 1), 0).astype(np.uint8)
 
 
 def told_by_chance(mask: np.ndarray, seen: Evidence, chance: np.ndarray, least: float) -> np.ndarray:
@@ -269,11 +276,11 @@ def told_by_chance(mask: np.ndarray, seen: Evidence, chance: np.ndarray, least: 
     ndarray of uint8, shape (height, width)
         Without specks and whiskers.
     """
-    known = cv2.threshold(chance, 0, 1, cv2.THRESH_BINARY)[1].astype(np.float32)
-    chance = chance.astype(np.float32)
+    both = np.stack([chance.astype(np.float32), (chance > 0).astype(np.float32)], axis=-1)
     if chance.shape != mask.shape:
-        chance, known = (cv2.resize(one, mask.shape[::-1], interpolation=cv2.INTER_LINEAR) for one in (chance, known))
-    told = np.where(is_shade(seen) & (known > 0), (chance > 255 * least * known).view(np.uint8), mask)
+        both = np.asarray(cv2.resize(both, mask.shape[::-1], interpolation=cv2.INTER_LINEAR), np.float32)
+    likely, known = both[..., 0], both[..., 1]
+    told = np.where(is_shade(seen) & (known > 0), (likely > 255 * least * known).view(np.uint8), mask)
     return cv2.morphologyEx(told, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
 
 
