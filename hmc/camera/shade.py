@@ -276,11 +276,12 @@ def told_by_chance(mask: np.ndarray, seen: Evidence, chance: np.ndarray, least: 
     ndarray of uint8, shape (height, width)
         Without specks and whiskers.
     """
-    both = np.stack([chance.astype(np.float32), (chance > 0).astype(np.float32)], axis=-1)
+    known, person = chance > 0, chance > 255 * least
     if chance.shape != mask.shape:
-        both = np.asarray(cv2.resize(both, mask.shape[::-1], interpolation=cv2.INTER_LINEAR), np.float32)
-    likely, known = both[..., 0], both[..., 1]
-    told = np.where(is_shade(seen) & (known > 0), (likely > 255 * least * known).view(np.uint8), mask)
+        both = [np.asarray(one, np.float32) for one in (chance, known)]
+        likely, share = (cv2.resize(one, mask.shape[::-1], interpolation=cv2.INTER_LINEAR) for one in both)
+        known, person = share > 0, likely > 255 * least * share  # of the shades between which a pixel lies
+    told = np.where(is_shade(seen) & known, person.view(np.uint8), mask)
     return cv2.morphologyEx(told, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
 
 

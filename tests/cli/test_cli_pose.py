@@ -221,7 +221,8 @@ def test_what_a_method_tells_of_each_frame_stands_beside_the_poses(tmp_path, mon
     assert [int(row["frame"]) for row in rows] == list(range(5)) and fitted == sorted(set(joints.frames.tolist()))
     errors = [float(row["error_m"]) for row in rows if row["status"] == "fitted"]
     assert 0 < min(errors) and max(errors) < 1
-    assert not full or np.median(errors) < 0.15  # in a frame a swarm may end elsewhere; refinement does the rest
+    if full:  # the first frame's swarm begins anywhere, and may end elsewhere; those after it follow
+        assert max(errors[1:]) < 0.3 and np.median(errors) < 0.15
     told = read_run(tmp_path / "run.toml")
     assert told["method"] == "pso" and told["parameters"]["preset"]["swarm"]["swarm"]["voxels"] is True
 
