@@ -44,7 +44,7 @@ logger = logging.getLogger("hmc")
 #: Images of the empty scene by which it is told whether a camera has moved.
 SCENE_IMAGES = 5
 #: What a camera takes for a person with this chance is not cut for what the floor shows. Less leaves shadows, more loses shoes and shanks
-#: of the floor's color (`pale`: at .8 ankles were out by 56 and 51 mm for 38 and 26).
+#: of the floor's color (`pale`: at .8 ankles are out by 45 and 38 mm for 38 and 25).
 KEPT_CHANCE = 0.7
 
 
