@@ -11,7 +11,7 @@ from dataclasses import replace
 
 from hmc.synthetic.recipe import Recipe, load_recipe
 
-__all__ = ["DRILLS", "clip_names", "drill_recipes", "training_name"]
+__all__ = ["DRILLS", "clip_names", "drill_recipes", "slow_names", "training_name"]
 
 #: Shipped recipes of the drills; each is the first clip of its drill.
 DRILLS = ("kick_turn", "pedal_arms", "dance", "play_cube")
@@ -31,12 +31,22 @@ def training_name(drill: str) -> str:
     return f"{drill}_{_TRAINING[0]}"
 
 
+def slow_names(drill: str) -> tuple[str, ...]:
+    """Recipes of a drill of which half is done in as many frames, twice as many a second: people move half as far from one to the next."""
+    return tuple(f"{name}_slow" for name in clip_names(drill))
+
+
 def drill_recipes() -> list[Recipe]:
-    """Every drill by those who are not in the shipped recipe, the clip to train on last."""
+    """Every drill by those who are not in the shipped recipe, the clip to train on last, and the slow ones by all."""
     recipes = []
     for drill in DRILLS:
         base = load_recipe(drill)
         for number, (suffix, height_m, sex, build, heading) in enumerate((*_OTHERS, _TRAINING), start=1):
             who = replace(base.actors[0], height_m=height_m, sex=sex, build=build, heading_deg=heading)
             recipes.append(replace(base, name=f"{drill}_{suffix}", seed=base.seed + 100 * number, actors=(who,)))
-    return recipes
+    by_all = [*recipes, *(load_recipe(drill) for drill in DRILLS)]
+    return [*recipes, *(_slow(recipe) for recipe in by_all if not recipe.name.endswith(_TRAINING[0]))]
+
+
+def _slow(recipe: Recipe) -> Recipe:
+    return replace(recipe, name=f"{recipe.name}_slow", fps=2 * recipe.fps, seconds=recipe.seconds / 2)

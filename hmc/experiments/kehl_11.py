@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from hmc.experiments import kehl_runs
+from hmc.experiments.drill_clips import clip_names
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
 from hmc.experiments.kehl_cues import compared_cues
 from hmc.landmarks import LANDMARKS
@@ -23,7 +24,7 @@ SHOWN_S = (1.9, 3.2, 6.2)
 
 def grid(plan: Plan) -> list[dict]:
     """The combinations of cues, three times each on every clip."""
-    return kehl_runs.cell_grid(plan, "pedal_arms", list(CUES), SHOWN_S)
+    return kehl_runs.cell_grid(plan, clip_names("pedal_arms"), list(CUES), SHOWN_S)
 
 
 def report(cells: Sequence[Cell], plan: Plan) -> Report:

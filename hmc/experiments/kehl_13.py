@@ -14,7 +14,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from hmc.experiments import kehl_runs
-from hmc.experiments.drill_clips import training_name
+from hmc.experiments.drill_clips import clip_names, training_name
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
 from hmc.experiments.engine.inputs import rendered
 from hmc.experiments.engine.intervals import decide
@@ -34,11 +34,11 @@ PAPER = {"SMD": (28.9, 1.3), "LM, 5 times the points": (42.7, 0.73)}
 def grid(plan: Plan) -> list[dict]:
     """Every method on every clip, and Levenberg-Marquardt with every tolerance on the clip to train on, once."""
     stops = _lm_variants(kehl_runs.TOLERANCES[: 2 if plan.quick else None])
-    tests = kehl_runs.cell_grid(plan, "kick_turn", [*(f"SMD{ending}" for ending in ENDINGS), *BESIDE.values(), *stops])
+    tests = kehl_runs.cell_grid(plan, clip_names("kick_turn"), [*(f"SMD{ending}" for ending in ENDINGS), *BESIDE.values(), *stops])
     if plan.recordings:  # these may be anything: there is none apart
         return tests
     apart = replace(plan, recordings=(rendered(training_name("kick_turn")),))
-    return tests + [one for one in kehl_runs.cell_grid(apart, "kick_turn", stops) if one[REPEAT] == 0]
+    return tests + [one for one in kehl_runs.cell_grid(apart, (), stops) if one[REPEAT] == 0]
 
 
 def _lm_variants(tolerances: Sequence[float]) -> list[str]:

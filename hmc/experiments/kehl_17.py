@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from hmc.experiments import kehl_runs
+from hmc.experiments.drill_clips import clip_names
 from hmc.experiments.engine.experiment import Cell, Claim, Experiment, Plan, Report, Table
 from hmc.experiments.kehl_cues import compared_cues
 from hmc.landmarks import LANDMARKS
@@ -26,7 +27,7 @@ SHOWN_S = (1.3, 2.0, 4.3)
 
 def grid(plan: Plan) -> list[dict]:
     """With colors and without, three times each on every clip."""
-    return kehl_runs.cell_grid(plan, "play_cube", list(CUES), SHOWN_S)
+    return kehl_runs.cell_grid(plan, clip_names("play_cube"), list(CUES), SHOWN_S)
 
 
 def report(cells: Sequence[Cell], plan: Plan) -> Report:

@@ -17,7 +17,6 @@ import numpy as np
 from hmc.body.kinematics import landmarks
 from hmc.camera.model import project
 from hmc.errors import InputError
-from hmc.experiments.drill_clips import clip_names
 from hmc.experiments.engine.experiment import Cell, Claim, Parameters, Plan, Results
 from hmc.experiments.engine.inputs import Inputs, rendered
 from hmc.experiments.engine.intervals import Interval, decide
@@ -105,9 +104,9 @@ def preset_of(variant: str) -> SmdPreset:
     return replace(preset, cues=replace(preset.cues, **cues), **more)
 
 
-def cell_grid(plan: Plan, drill: str, variants: Sequence[str], shown_s: Sequence[float] = ()) -> list[dict]:
-    """Every variant, several times, on the user's recordings or on the clips of a drill; in the quick mode on one clip, 45 frames of it."""
-    sources = plan.recordings or tuple(rendered(name) for name in clip_names(drill)[: 1 if plan.quick else None])
+def cell_grid(plan: Plan, clips: Sequence[str], variants: Sequence[str], shown_s: Sequence[float] = ()) -> list[dict]:
+    """Every variant, several times, on the user's recordings or on some clips; in the quick mode on the first clip, 45 frames of it."""
+    sources = plan.recordings or tuple(rendered(name) for name in clips[: 1 if plan.quick else None])
     return [
         {
             "recording": source.label, "variant": variant, REPEAT: k, "shown_s": list(shown_s) if k == 0 else [],

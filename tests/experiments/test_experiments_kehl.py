@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hmc.experiments import kehl_1, kehl_9, kehl_11, kehl_13, kehl_14, kehl_17, kehl_runs
-from hmc.experiments.drill_clips import clip_names, drill_recipes, training_name
+from hmc.experiments.drill_clips import clip_names, drill_recipes, slow_names, training_name
 from hmc.experiments.engine.experiment import Cell, Plan
 from hmc.experiments.engine.inputs import Inputs
 from hmc.experiments.engine.library import find_experiment
@@ -78,7 +78,7 @@ def test_cues_are_compared_by_the_arms(experiment, better):
 
 def test_fast_motion_tells_loss():
     report = kehl_14.report(cells_of(kehl_14, {"SMD": 0.15}, {}), Plan())
-    assert [claim.holds for claim in report.claims] == [True, False]
+    assert [claim.holds for claim in report.claims] == [True, False, True, False]
     lost = [row for row in report.tables[0].rows if row["method"] == "SMD"]
     assert lost[0]["last_tenth_mm"] == pytest.approx(150, rel=0.02)
     assert (lost[0]["paper_largest_turn_deg"], lost[0]["paper_mean_turn_deg"]) == (31.0, 4.1)
@@ -108,7 +108,10 @@ def test_drills_keep_feet_above_the_floor_and_bones_their_length(name):
 @pytest.mark.parametrize(("name", "frames"), [("kick_turn", 115), ("dance", 375), ("play_cube", 200)])
 def test_drills_have_the_papers_lengths_and_every_clip_as_many(name, frames):
     assert load_recipe(name).n_frames == frames
-    clips = [one for one in drill_recipes() if one.name.startswith(name)]
+    clips = [one for one in drill_recipes() if one.name.startswith(name) and not one.name.endswith("_slow")]
+    slow = [one for one in drill_recipes() if one.name in slow_names(name)]
     assert [one.n_frames for one in clips] == [frames] * 3
+    assert [one.fps for one in slow] == [30] * 3
+    assert all(abs(one.n_frames - frames) <= 1 for one in slow)
     assert training_name(name) not in clip_names(name)
     assert len({one.seed for one in clips} | {load_recipe(name).seed}) == 4
