@@ -246,10 +246,15 @@ def _seen_by(camera: Camera, mask: np.ndarray, people: _Placed) -> _Seen:
     seen &= people.known
     side, (n_rows, n_columns) = cell_grid(camera, people.points[people.known], CELL_M)
     cell = row // side * n_columns + column // side
+    places = cell[seen]
     there = np.zeros((n_people, _N_CHAINS, n_rows * n_columns), bool)
-    there[person[seen], chain[seen], cell[seen]] = True
-    chains_in, people_in = there.sum(axis=(0, 1))[cell], there.any(axis=1).sum(axis=0)[cell]
-    alone = seen & np.where(chain > 0, chains_in == 1, people_in == 1)
+    there[person[seen], chain[seen], places] = True
+    # Sums of bytes, as no place has more than 255 limbs or people.
+    chains_in, people_in = (
+        kinds.view(np.uint8).sum(axis=0, dtype=np.uint8)[places] for kinds in (there.reshape(-1, n_rows * n_columns), there.any(axis=1))
+    )
+    alone = np.zeros(len(seen), bool)
+    alone[seen] = np.where(chain[seen] > 0, chains_in == 1, people_in == 1)
     inside = mask[row, column]
     shown, denied = (
         # Counts, whole numbers that single precision holds.
@@ -257,21 +262,27 @@ def _seen_by(camera: Camera, mask: np.ndarray, people: _Placed) -> _Seen:
         for clear in (alone & inside, alone & ~inside)
     )
     cells = np.zeros((n_rows, n_columns), np.uint8)
-    cells.ravel()[cell[seen]] = 1
+    cells.ravel()[places] = 1
     # Outlines are a cell thick: flesh is sampled by points, and clothes are wider than it.
     wide = np.asarray(cv2.dilate(cells, np.ones((3, 3), np.uint8)))
-    pixels = _in_cells(mask, side, (n_rows, n_columns))
-    full = 2 * pixels > side**2
-    bare = (np.argwhere(full & (wide == 0))[:, ::-1] + 0.5) * side
-    bare_m2 = np.array([_bare_near(camera, places, bare, side) for places in people.landmarks])
+    pixels, (top, left) = _in_cells(mask, side)
+    wide = wide[top : top + pixels.shape[0], left : left + pixels.shape[1]]
+    bare = np.stack(divmod(np.flatnonzero((2 * pixels > side**2) & (wide == 0)), pixels.shape[1]), axis=1) + (top, left)
+    bare_m2 = np.array([_bare_near(camera, points, (bare[:, ::-1] + 0.5) * side, side) for points in people.landmarks])
     return _Seen(shown, denied, bare_m2, int(pixels[wide > 0].sum()))
 
 
-def _in_cells(mask: np.ndarray, side: int, shape: tuple[int, int]) -> np.ndarray:
-    """How many pixels of a mask are in each cell."""
-    rows, columns = (np.minimum(np.arange(n + 1) * side, size) for n, size in zip(shape, mask.shape, strict=True))
-    corners = cv2.integral(mask.view(np.uint8))[rows[:, None], columns]
-    return np.asarray(np.diff(np.diff(corners, axis=0), axis=1))
+def _in_cells(mask: np.ndarray, side: int) -> tuple[np.ndarray, tuple[int, int]]:
+    """How many pixels of a mask are in each of the cells that it reaches, and the row and the column of the first of these cells."""
+    left, top, width, height = cv2.boundingRect(mask.view(np.uint8))
+    if not width:
+        return np.zeros((0, 1), int), (0, 0)
+    first = top // side, left // side
+    corners = [np.arange(start * side, end + side, side) for start, end in zip(first, (top + height, left + width), strict=True)]
+    part = mask[corners[0][0] : corners[0][-1], corners[1][0] : corners[1][-1]].view(np.uint8)
+    rows, columns = (np.minimum(at - at[0], size) for at, size in zip(corners, part.shape, strict=True))
+    counts = cv2.integral(part)[rows[:, None], columns]
+    return np.asarray(np.diff(np.diff(counts, axis=0), axis=1)), first
 
 
 def _bare_near(camera: Camera, places: np.ndarray, bare: np.ndarray, side: int) -> np.ndarray:
