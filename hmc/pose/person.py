@@ -7,7 +7,7 @@ frame alone, so a run can go on from the rows that it left (`resumed`). It is th
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -19,13 +19,13 @@ from hmc.pose.legs import choose_legs, limb_points, no_alternatives
 from hmc.pose.method import Alternatives, Capture, PoseMethod, StepInfo, StepResult, Subject, Tracked, begin_tracking
 from hmc.pose.starts.walk import walk
 from hmc.pose.views.person_view import PersonView
-from hmc.processes import share_out
+from hmc.processes import ahead, may_fork, share_out
 
 __all__ = ["DecidedFrames", "PersonState", "PersonTrack", "PoseTask", "end_person", "person_step", "resumed", "starts_with"]
 
 NO_START = "nothing to start from"
-#: Frames of which alternatives are found at once by several processes, which cost a hundredth of a second to start: their views are kept
-#: for so long.
+#: Frames of which alternatives are found by one process, which costs a hundredth of a second to start: their views are kept for so long,
+#: and a decision waits for so many frames more.
 TOGETHER = 15
 
 
@@ -63,6 +63,11 @@ class PoseTask:
         """Frames of which alternatives are found at once: as they come, where nobody shares the work."""
         return TOGETHER if self.capture.workers > 1 else 1
 
+    @property
+    def meanwhile(self) -> bool:
+        """Whether a process of its own finds alternatives while later frames are followed."""
+        return self.capture.workers > 1 and may_fork()
+
     def rng(self, person: int, frame: int) -> np.random.Generator:
         """The random numbers of a person's frame."""
         return np.random.default_rng([self.seed, person, frame])
@@ -96,13 +101,15 @@ class PersonTrack:
 
 @dataclass(frozen=True)
 class FollowedFrame:
-    """A frame that is followed and not decided yet; its alternatives may still be to be found, from the random numbers and the view."""
+    """A frame that is followed and not decided yet; its alternatives may still be to be found, from the random numbers and the view, or be
+    on their way: what is coming gives those of several frames in their order."""
 
     frame: int
     tracked: Tracked
     info: StepInfo
     find_from: tuple[np.random.Generator, PersonView] | None
     found: Alternatives | None = None
+    coming: Iterator[Alternatives] | None = None
 
     @property
     def alternatives(self) -> Alternatives:
@@ -202,7 +209,7 @@ def person_step(task: PoseTask, person: PersonTrack, state: PersonState, view: P
         if task.method.recover is not None:
             stepped = task.method.recover(rng, state.tracked, stepped, view)
         followed = (*state.followed, _followed(task, rng, stepped, view))
-        state = replace(state, tracked=stepped[0], followed=_with_alternatives(task, followed, task.together))
+        state = replace(state, tracked=stepped[0], followed=_asking(task, followed))
     return _decide(task, person, state, is_last)
 
 
@@ -254,44 +261,78 @@ def _followed(task: PoseTask, rng: np.random.Generator, stepped: StepResult, vie
     return FollowedFrame(view.frame, *stepped, None if task.method.alternatives is None else (rng, view))
 
 
-def _with_alternatives(task: PoseTask, followed: tuple[FollowedFrame, ...], at_least: int = 1) -> tuple[FollowedFrame, ...]:
-    """The same frames with the alternatives of all, shared out, once so many lack them. No later frame is followed from them."""
-    find = task.method.alternatives
-    lacking = [] if find is None else [(row, *row.find_from) for row in followed if row.find_from is not None]
-    if find is None or len(lacking) < at_least:
+def _asking(task: PoseTask, followed: tuple[FollowedFrame, ...]) -> tuple[FollowedFrame, ...]:
+    """The same frames; once enough lack alternatives, they are found or on their way. No later frame is followed from them."""
+    tasks = _to_find(task, followed)
+    if len(tasks) < task.together:
         return followed
-    tasks = [partial(find, rng, (row.tracked, row.info), view) for row, rng, view in lacking]
-    found = iter(share_out(tasks, task.capture.workers))
-    return tuple(row if row.find_from is None else replace(row, find_from=None, found=next(found)) for row in followed)
+    if not task.meanwhile:
+        return _with_alternatives(task, followed)
+    coming = ahead(lambda: (one() for one in tasks), task.capture.workers)
+    return tuple(row if row.find_from is None else replace(row, find_from=None, coming=coming) for row in followed)
+
+
+def _with_alternatives(task: PoseTask, followed: tuple[FollowedFrame, ...]) -> tuple[FollowedFrame, ...]:
+    """The same frames with the alternatives of all: those that are on their way, and the others, shared out."""
+    there = [row if row.coming is None else replace(row, coming=None, found=next(row.coming)) for row in followed]
+    found = iter(share_out(_to_find(task, followed), task.capture.workers))
+    return tuple(row if row.find_from is None else replace(row, find_from=None, found=next(found)) for row in there)
+
+
+def _to_find(task: PoseTask, followed: tuple[FollowedFrame, ...]) -> list[partial[Alternatives]]:
+    """What finds the alternatives of the frames that lack them."""
+    find = task.method.alternatives
+    if find is None:
+        return []
+    return [
+        partial(find, rng, (row.tracked, row.info), view) for row in followed if row.find_from is not None for rng, view in [row.find_from]
+    ]
 
 
 def _decide(task: PoseTask, person: PersonTrack, state: PersonState, is_last: bool) -> tuple[PersonState, list[DecidedFrames]]:
     """Decide what has waited for its legs long enough; everything in the person's last frame."""
-    lag = task.lag
-    # The window's frames were followed from its middle on; a run goes on from frames that were followed one after the other.
-    enough = 2 * lag if state.context else task.window + lag
-    subject = state.subject
-    if subject is None or (lag and len(state.followed) < enough and not is_last):
+    if state.subject is None:
         return state, []
-    state = replace(state, followed=_with_alternatives(task, state.followed))
-    picks = _picks(task, state)
-    rows = state.followed if is_last else state.followed[: len(state.followed) - lag]
-    chosen = [(row, int(pick)) for row, pick in zip(rows, picks, strict=False)]
+    decided: list[DecidedFrames] = []
+    wait = task.together if task.meanwhile else 0
+    # By the same frames, however long they have waited.
+    while task.lag and len(state.followed) >= _enough(task, state) + (1 if is_last else wait):
+        state, one = _with_decided(task, person, state, _enough(task, state), task.lag)
+        decided.append(one)
+    if state.followed and (is_last or not task.lag):
+        state, one = _with_decided(task, person, state, len(state.followed), 0)
+        decided.append(one)
+    return state, decided
+
+
+def _enough(task: PoseTask, state: PersonState) -> int:
+    """Frames from which those before the last `lag` are decided.
+
+    The window's frames were followed from its middle on; a run goes on from frames that were followed one after the other.
+    """
+    return 2 * task.lag if state.context else task.window + task.lag
+
+
+def _with_decided(task: PoseTask, person: PersonTrack, state: PersonState, asked: int, undecided: int) -> tuple[PersonState, DecidedFrames]:
+    """So many of the first frames are asked, and all but the last of these decided by them."""
+    rows, later = _with_alternatives(task, state.followed[:asked]), state.followed[asked:]
+    picks, due = _picks(task, state, rows), asked - undecided
+    chosen = [(row, int(pick)) for row, pick in zip(rows[:due], picks, strict=False)]
     decided = DecidedFrames(
         person.number,
-        tuple(row.frame for row in rows),
+        tuple(row.frame for row, _ in chosen),
         np.array([row.alternatives.states[pick] for row, pick in chosen]),
         tuple(replace(row.info, cost=float(row.alternatives.costs[pick])) if pick else row.info for row, pick in chosen),
-        rows[-1].tracked,
-        subject.body,
+        chosen[-1][0].tracked,
+        None if state.subject is None else state.subject.body,
     )
-    state = replace(state, followed=state.followed[len(rows) :], context=_context(task, state.context, decided), done_to=rows[-1].frame)
-    return state, [decided]
+    context = _context(task, state.context, decided)
+    return replace(state, followed=(*rows[due:], *later), context=context, done_to=decided.frames[-1]), decided
 
 
-def _picks(task: PoseTask, state: PersonState) -> np.ndarray:
-    """Which of the alternatives of every frame that is not decided the motion bears out; the first, where there are none."""
-    rows, legs = state.followed, task.method.legs
+def _picks(task: PoseTask, state: PersonState, rows: Sequence[FollowedFrame]) -> np.ndarray:
+    """Which of the alternatives of every frame the motion bears out; the first, where there are none."""
+    legs = task.method.legs
     if legs is None or state.subject is None:
         return np.zeros(len(rows), int)
     n = max(len(row.alternatives.costs) for row in rows)
