@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from hmc.cli.common import selected_workers
 from hmc.io.files import real_path
 
-__all__ = ["MASKS", "add_silhouette_options", "given_silhouettes", "leave_silhouettes", "silhouettes_source", "take_silhouettes"]
+__all__ = [
+    "MASKS", "add_silhouette_options", "given_silhouettes", "leave_silhouettes", "leaving_silhouettes", "silhouettes_source",
+    "take_silhouettes",
+]  # fmt: skip
 
 #: Silhouettes of a run that is not finished, which its stages share.
 MASKS = ".masks"
@@ -103,3 +108,20 @@ def leave_silhouettes(args: argparse.Namespace, recording, key: str, on_problem:
     remove_silhouettes(args.out)
     if args.silhouettes:
         on_problem(f"{args.out / SILHOUETTES}: not kept, as the run did not hold all of them")
+
+
+@contextmanager
+def leaving_silhouettes(args: argparse.Namespace, recording, key: str, on_problem: Callable[[str], None]) -> Iterator[Callable[[], object]]:
+    """`leave_silhouettes` for a run that goes on: call what it gives when that is over. Silhouettes that are all there by now are written
+    meanwhile."""
+    from hmc.io.masks import kept_frames, kept_masks
+    from hmc.io.silhouettes import silhouettes_ahead
+
+    leave = partial(leave_silhouettes, args, recording, key, on_problem)
+    frames, masks = range(recording.start, recording.start + recording.n_frames), args.out / MASKS
+    there = args.silhouettes and kept_masks(masks, key, frames.start, frames.stop) is not None
+    if not there or real_path(args.out) == real_path(recording.path):
+        yield leave
+        return
+    with silhouettes_ahead(args.out, recording, lambda: kept_frames(masks, key, frames) or (), selected_workers(args)) as finish:
+        yield finish

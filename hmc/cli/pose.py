@@ -31,7 +31,7 @@ from hmc.cli.common import (
     whole_number,
     written_digests,
 )
-from hmc.cli.kept import MASKS, add_silhouette_options, given_silhouettes, leave_silhouettes, silhouettes_source, take_silhouettes
+from hmc.cli.kept import MASKS, add_silhouette_options, given_silhouettes, leaving_silhouettes, silhouettes_source, take_silhouettes
 from hmc.cli.option_tables import add_like_option, repeated_preset, told_options
 from hmc.cli.pose_markers import MARKERS_JOURNAL, add_marker_options, read_markers, refuse_markers
 from hmc.cli.run_bar import FIRST_POSE, FITTING, FOLLOWING, LEARNING, SECOND_PASS, TRACKING, VIEWS, RunBar
@@ -245,6 +245,7 @@ def _run(args: argparse.Namespace, held: ExitStack) -> int:
         )
     elif given is None and method.needs_tracks:
         tracks = tracks_of_keypoints(recording, source_of_keypoints, kept(JOURNAL, TRACKING))
+    leave = held.enter_context(leaving_silhouettes(args, recording, key, problems.append)) if hulls else None
     bar.people = 1 if tracks is None else len(set(tracks.persons.tolist()))
     detections = None if markers is None else markers.table(args, key, problems)
     runs = ChainRuns(kept(POSE_JOURNAL, FOLLOWING), kept(BACK_JOURNAL, SECOND_PASS), kept(POSE_JOURNAL, VIEWS))
@@ -255,8 +256,8 @@ def _run(args: argparse.Namespace, held: ExitStack) -> int:
     problems += people.notes
     if source_of_keypoints is not None:
         problems += source_of_keypoints.notes
-    if hulls:
-        leave_silhouettes(args, recording, key, problems.append)
+    if leave is not None:
+        leave()
     write_tracks(paths["tracks.csv"], _pelvis_tracks(people) if tracks is None else tracks)
     people.save(args.out)
     note_changes(recording, source, problems)

@@ -9,7 +9,8 @@ A camera that told nothing in a frame has no file of it. ``doubtful/CAMERA/`` ha
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -23,9 +24,9 @@ from hmc.io.door import read_image
 from hmc.io.masks import MaskStep
 from hmc.io.recording import Recording
 from hmc.io.results import read_run
-from hmc.processes import share_out
+from hmc.processes import ahead, share_out
 
-__all__ = ["DOUBTFUL", "SILHOUETTES", "KeptSilhouettes", "open_silhouettes", "remove_silhouettes", "write_silhouettes"]
+__all__ = ["DOUBTFUL", "SILHOUETTES", "KeptSilhouettes", "open_silhouettes", "remove_silhouettes", "silhouettes_ahead", "write_silhouettes"]
 
 #: Folders in a result's folder.
 SILHOUETTES, DOUBTFUL = "silhouettes", "doubtful"
@@ -145,23 +146,86 @@ def write_silhouettes(directory: str | Path, recording: Recording, lots: Sequenc
         When they cannot be written.
     """
     directory = Path(directory)
-    part = directory / PART
     try:
-        shutil.rmtree(part, ignore_errors=True)
-        for name in recording.rig.names:
-            (part / SILHOUETTES / name).mkdir(parents=True)
-        written = sum(share_out([partial(_write_lot, part, recording, steps) for steps in lots], workers))
-        remove_silhouettes(directory)
-        for folder in (part / DOUBTFUL, part / SILHOUETTES):
-            if folder.is_dir():
-                folder.rename(directory / folder.name)
+        with _told_of(directory):
+            part = _begun(directory, recording)
+            written = sum(share_out([partial(_write_lot, part, recording, steps) for steps in lots], workers))
+            _put_in_place(directory)
+    finally:
+        shutil.rmtree(directory / PART, ignore_errors=True)
+    return written
+
+
+@contextmanager
+def silhouettes_ahead(
+    directory: str | Path, recording: Recording, steps: Callable[[], Iterable[MaskStep]], workers: int
+) -> Iterator[Callable[[], int]]:
+    """As `write_silhouettes`, by a process that begins with this call while this one does something else.
+
+    Parameters
+    ----------
+    directory : path
+    recording : Recording
+    steps : callable
+        Gives the frames; it is called there.
+    workers : int
+        With fewer than two all is written when it is asked for.
+
+    Yields
+    ------
+    callable
+        To be called once: waits until all is written, puts it in place, and tells the bytes of all files. Nothing is left of what is not
+        asked for.
+
+    Raises
+    ------
+    InputError
+        When they cannot be written: from that call.
+    """
+    directory, part = Path(directory), Path(directory) / PART
+
+    def write() -> Iterator[int]:
+        yield _write_lot(_begun(directory, recording), recording, steps())
+
+    with closing(ahead(write, workers)) as written:  # type: ignore[type-var]
+
+        def finish() -> int:
+            with _told_of(directory):
+                n_bytes = next(written)
+                _put_in_place(directory)
+            return n_bytes
+
+        try:
+            yield finish
+        finally:
+            written.close()  # type: ignore[attr-defined]
+            shutil.rmtree(part, ignore_errors=True)
+
+
+@contextmanager
+def _told_of(directory: Path) -> Iterator[None]:
+    try:
+        yield
     except OSError as error:
         raise InputError(
             f"{directory / SILHOUETTES}: cannot be written ({error.strerror or error}); --no-silhouettes leaves it out"
         ) from None
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
-    return written
+
+
+def _begun(directory: Path, recording: Recording) -> Path:
+    """The empty folder for what is not complete."""
+    part = directory / PART
+    shutil.rmtree(part, ignore_errors=True)
+    for name in recording.rig.names:
+        (part / SILHOUETTES / name).mkdir(parents=True)
+    return part
+
+
+def _put_in_place(directory: Path) -> None:
+    remove_silhouettes(directory)
+    for folder in (directory / PART / DOUBTFUL, directory / PART / SILHOUETTES):
+        if folder.is_dir():
+            folder.rename(directory / folder.name)
 
 
 def _write_lot(directory: Path, recording: Recording, steps: Iterable[MaskStep]) -> int:

@@ -16,7 +16,6 @@ from dataclasses import dataclass, field
 import cv2
 import numpy as np
 
-from hmc.camera.model import Camera
 from hmc.tracking.blobs import Observation
 from hmc.tracking.views import FrameViews, cell_grid, cells_of
 
@@ -210,11 +209,7 @@ def explaining(views: FrameViews, points: np.ndarray, columns: Columns, voxel_si
     ndarray of bool, shape (m,)
         All true without silhouettes.
     """
-    covered = [
-        _covered(camera, mask, points, columns, voxel_size_m)
-        for camera, mask in zip(views.rig, views.masks, strict=True)
-        if mask is not None
-    ]
+    covered = _covered(views, points, columns, voxel_size_m)
     real = np.ones(len(columns), bool)
     if not covered:
         return real
@@ -255,9 +250,7 @@ def missed(
     ndarray of bool, shape (m,)
     """
     both, n = Columns(np.concatenate([known.centres, columns.centres]), known.voxels + columns.voxels), len(known)
-    covered = [
-        _covered(camera, mask, points, both, voxel_size_m) for camera, mask in zip(views.rig, views.masks, strict=True) if mask is not None
-    ]
+    covered = _covered(views, points, both, voxel_size_m)
     found = np.zeros(len(columns), bool)
     taken = [cells[:n].any(axis=0) for cells in covered]
     while len(covered) >= MISSED_VIEWS and not found.all() and (most is None or n + found.sum() < most):
@@ -273,16 +266,20 @@ def missed(
     return found
 
 
-def _covered(camera: Camera, mask: np.ndarray, points: np.ndarray, columns: Columns, voxel_size_m: float) -> np.ndarray:
-    """Which cells of the silhouette each column covers, (m, n_cells)."""
-    rows = np.unique(np.concatenate([np.zeros(0, int), *columns.voxels]))
-    there = points[rows]
-    side, shape = cell_grid(camera, there, voxel_size_m)
-    cells = cells_of(camera, there, side, mask)
-    covered = np.zeros((len(columns), shape[0] * shape[1] + 1), bool)
-    for j, voxels in enumerate(columns.voxels):
-        covered[j, cells[np.searchsorted(rows, voxels)]] = True
-    return covered[:, :-1]
+def _covered(views: FrameViews, points: np.ndarray, columns: Columns, voxel_size_m: float) -> list[np.ndarray]:
+    """Of each camera with a silhouette, which of its cells each column covers, (m, n_cells)."""
+    rows, which = np.unique(np.concatenate([np.zeros(0, int), *columns.voxels]), return_inverse=True)
+    there, own = points[rows], np.split(which, np.cumsum([len(voxels) for voxels in columns.voxels])[:-1])
+    found = []
+    for camera, mask in zip(views.rig, views.masks, strict=True):
+        if mask is not None:
+            side, shape = cell_grid(camera, there, voxel_size_m)
+            cells = cells_of(camera, there, side, mask)
+            covered = np.zeros((len(columns), shape[0] * shape[1] + 1), bool)
+            for j, voxels in enumerate(own):
+                covered[j, cells[voxels]] = True
+            found.append(covered[:, :-1])
+    return found
 
 
 def _disc(radius: float) -> np.ndarray:

@@ -17,7 +17,7 @@ from hmc.errors import InputError
 from hmc.io.files import write_toml
 from hmc.io.masks import MaskStep
 from hmc.io.recording import iterate_frames, open_recording, reduced
-from hmc.io.silhouettes import open_silhouettes, write_silhouettes
+from hmc.io.silhouettes import open_silhouettes, silhouettes_ahead, write_silhouettes
 
 
 def steps_of(recording, seed, doubts=()):
@@ -118,7 +118,32 @@ def test_processes_that_share_the_frames_write_the_same(recording_folder, tmp_pa
 
 
 @pytest.mark.parametrize("workers", [1, 2])
-def test_a_disk_that_takes_no_more_is_told_by_whoever_writes(recording_folder, tmp_path, monkeypatch, workers):
+def test_those_that_are_written_meanwhile_are_the_same_and_there_when_they_are_asked_for(recording_folder, tmp_path, workers):
+    recording = open_recording(recording_folder, frames=6)
+    steps = list(steps_of(recording, 1, doubts=(4,)))
+    size = write_silhouettes(tmp_path / "alone", recording, [steps])
+    with silhouettes_ahead(tmp_path / "meanwhile", recording, lambda: steps, workers) as finish:
+        assert open_silhouettes(tmp_path / "meanwhile") is None and not list(tmp_path.glob("meanwhile/silhouettes"))
+        assert finish() == size
+    alone, meanwhile = (
+        {path.relative_to(out): path.read_bytes() for path in out.rglob("*.png")} for out in (tmp_path / "alone", tmp_path / "meanwhile")
+    )
+    assert alone == meanwhile and {path.name for path in (tmp_path / "meanwhile").iterdir()} == {"silhouettes", "doubtful"}
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_nothing_is_left_of_those_that_are_not_asked_for(recording_folder, tmp_path, workers):
+    recording = open_recording(recording_folder, frames=6)
+    keep(tmp_path, recording, steps_of(recording, 1))
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*.png")}
+    with pytest.raises(KeyError), silhouettes_ahead(tmp_path, recording, lambda: steps_of(recording, 2), workers):
+        raise KeyError
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*.png")} == before
+
+
+@pytest.mark.parametrize("meanwhile", [False, True])
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_disk_that_takes_no_more_is_told_by_whoever_writes(recording_folder, tmp_path, monkeypatch, workers, meanwhile):
     recording = open_recording(recording_folder, frames=6)
     steps = list(steps_of(recording, 1))
 
@@ -128,7 +153,11 @@ def test_a_disk_that_takes_no_more_is_told_by_whoever_writes(recording_folder, t
     out = tmp_path / "result"
     monkeypatch.setattr(Path, "write_bytes", full)
     with pytest.raises(InputError, match=r"silhouettes: cannot be written \(No space left on device\); --no-silhouettes leaves it out"):
-        write_silhouettes(out, recording, [steps[:3], steps[3:]], workers)
+        if meanwhile:
+            with silhouettes_ahead(out, recording, lambda: steps, workers) as finish:
+                finish()
+        else:
+            write_silhouettes(out, recording, [steps[:3], steps[3:]], workers)
     assert not list(out.iterdir())
 
 
