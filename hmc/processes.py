@@ -123,6 +123,7 @@ def ahead(make: Callable[[], Iterable[T]], workers: int = 2) -> Iterator[T]:
 def _items(run: Callable[[Connection], None]) -> Iterator[Any]:
     """None when the process has been started, then the items that it sends."""
     process, here = _forked(run)
+    del run  # what it holds is needed there alone
     try:
         yield None
         while (message := _received(process, here))[0] == ITEM:

@@ -1,12 +1,15 @@
 """Generators that run ahead in a process, and tasks that are shared out: the same items as without, and ends that leave nothing behind."""
 
+import gc
 import multiprocessing
 import os
 import signal
 import subprocess
 import sys
 import time
+import weakref
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -77,6 +80,16 @@ def test_processes_begin_before_they_are_asked():
             time.sleep(0.01)
         assert begun.value == 2
     assert not multiprocessing.active_children()
+
+
+def test_what_items_are_made_of_is_not_held_here_too():
+    large = np.zeros(8)
+    left = weakref.ref(large)
+    items = ahead(partial(iter, large), 2)
+    del large
+    gc.collect()
+    assert left() is None
+    assert list(items) == [0.0] * 8
 
 
 def test_no_more_arrays_wait_than_there_is_room_for():
