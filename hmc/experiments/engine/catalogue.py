@@ -250,9 +250,9 @@ CATALOGUE = (
         why=_EARLY_STOP,
     ),
     Entry("kehl-14", KEHL, "fast motion", "up to 31 degrees between frames, 4.1 on the mean, still tracked", _OWN_VIDEOS,
-        why="Our dance is faster: the upper arm turns by up to 44 to 48 degrees between frames and by 8 to 10 on the mean. That is not why: "
-        "at half the speed, where it turns as far as the paper's on the mean and by 24 degrees at most, the printed system is lost too, "
-        "with 117 to 299 mm in its nine runs. " + _EARLY_STOP,
+        why="Our dance is faster: the upper arm turns by up to 44 to 48 degrees between frames and by 8 to 10 on the mean. That is not "
+        "why: at half the speed, where it turns as far as the paper's on the mean and by 24 degrees at most, the printed system is lost "
+        "too, with 117 to 299 mm in its nine runs. " + _EARLY_STOP,
     ),
     Entry("kehl-17", KEHL, "holding an object", "color keeps it out of the arm", _OWN_VIDEOS,
         why="The paper's cube changes hands, is thrown, kicked and picked up, at 128^3 voxels; ours stays in the right hand, at voxels of "
