@@ -219,8 +219,8 @@ CATALOGUE = (
     Entry("hsiao-3.16", HSIAO, "extracted skeletons", "one curve a limb", _OWN_VIDEOS),
     Entry("hsiao-4", HSIAO, "nine actions", "a fitted skeleton in every sequence, over time", _OWN_VIDEOS,
         why="Limbs that touch the body have no curve, and the thesis prints neither lengths nor the thresholds of its segmentation. With "
-        "every voxel's true part the same system follows who waves, sits and walks (why-hsiao); whether more particles or other "
-        "ranges help is undecided. Self-spin is not tested by itself.",
+        "every voxel's true part the same system has 72 and 80 % of who sits and walks within 100 mm, for 16 and 41 (why-hsiao); more "
+        "particles and other ranges change nothing that three clips would tell. Self-spin is not tested by itself.",
     ),
     Entry(
         "hsiao-pso", HSIAO, "hierarchical against flat PSO, and against scipy.optimize", "hierarchical better at equal evaluations",
