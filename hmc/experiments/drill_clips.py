@@ -37,15 +37,15 @@ def slow_names(drill: str) -> tuple[str, ...]:
 
 
 def drill_recipes() -> list[Recipe]:
-    """Every drill by those who are not in the shipped recipe, the clip to train on last, and the slow ones by all."""
+    """Every drill by those who are not in the shipped recipe, the clip to train on last, and the slow ones by all but who trains."""
     recipes = []
     for drill in DRILLS:
-        base = load_recipe(drill)
+        base, others = load_recipe(drill), []
         for number, (suffix, height_m, sex, build, heading) in enumerate((*_OTHERS, _TRAINING), start=1):
             who = replace(base.actors[0], height_m=height_m, sex=sex, build=build, heading_deg=heading)
-            recipes.append(replace(base, name=f"{drill}_{suffix}", seed=base.seed + 100 * number, actors=(who,)))
-    by_all = [*recipes, *(load_recipe(drill) for drill in DRILLS)]
-    return [*recipes, *(_slow(recipe) for recipe in by_all if not recipe.name.endswith(_TRAINING[0]))]
+            others.append(replace(base, name=f"{drill}_{suffix}", seed=base.seed + 100 * number, actors=(who,)))
+        recipes += [*others, *map(_slow, (base, *others[:-1]))]
+    return recipes
 
 
 def _slow(recipe: Recipe) -> Recipe:

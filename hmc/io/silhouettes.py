@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -182,24 +182,26 @@ def silhouettes_ahead(
     InputError
         When they cannot be written: from that call.
     """
-    directory, part = Path(directory), Path(directory) / PART
+    directory = Path(directory)
 
     def write() -> Iterator[int]:
+        """The bytes of all files, when they are written."""
         yield _write_lot(_begun(directory, recording), recording, steps())
 
-    with closing(ahead(write, workers)) as written:  # type: ignore[type-var]
+    written = ahead(write, workers)
 
-        def finish() -> int:
-            with _told_of(directory):
-                n_bytes = next(written)
-                _put_in_place(directory)
-            return n_bytes
+    def finish() -> int:
+        """Wait for them, and put them in place."""
+        with _told_of(directory):
+            n_bytes = next(written)
+            _put_in_place(directory)
+        return n_bytes
 
-        try:
-            yield finish
-        finally:
-            written.close()  # type: ignore[attr-defined]
-            shutil.rmtree(part, ignore_errors=True)
+    try:
+        yield finish
+    finally:
+        written.close()  # type: ignore[attr-defined]
+        shutil.rmtree(directory / PART, ignore_errors=True)
 
 
 @contextmanager
